@@ -108,6 +108,7 @@
 
 pub mod channel;
 pub mod compile;
+mod decimal_comma;
 pub mod diagnostic;
 pub mod document;
 pub mod engine;

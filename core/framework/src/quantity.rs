@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use crate::decimal_comma;
 use crate::unit::{Unit, UnitError};
 
 /// A finite number and its unit. It is written and read as one text: `"150 nm/min"`, `"-20 Cel"`, `"5e-3 K"`.
@@ -50,8 +51,35 @@ pub enum QuantityError {
         /// The number as written.
         number: String,
     },
+    /// A comma stands where a decimal point belongs.
+    DecimalComma {
+        /// What was found.
+        found: String,
+        /// The same with a point.
+        instead: String,
+    },
     /// The unit is not understood.
     Unit(UnitError),
+}
+
+impl QuantityError {
+    /// What is wrong, without the advice.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Unit(error) => error.reason(),
+            Self::DecimalComma { found, .. } => decimal_comma::reason(found),
+            other => other.to_string(),
+        }
+    }
+
+    /// What to write instead, in a sentence, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::Unit(error) => error.help(),
+            Self::DecimalComma { instead, .. } => Some(decimal_comma::help(instead)),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for QuantityError {
@@ -74,6 +102,10 @@ impl fmt::Display for QuantityError {
             Self::NotFinite { number } => {
                 write!(f, "a quantity is a finite number, found {number}")
             }
+            Self::DecimalComma { found, instead } => {
+                let (reason, help) = (decimal_comma::reason(found), decimal_comma::help(instead));
+                write!(f, "{reason}; {help}")
+            }
             Self::Unit(error) => error.fmt(f),
         }
     }
@@ -85,6 +117,23 @@ impl FromStr for Quantity {
     type Err = QuantityError;
 
     fn from_str(text: &str) -> Result<Self, QuantityError> {
+        Self::read(text).map_err(|error| match decimal_comma::with_point(text) {
+            Some(instead)
+                if matches!(
+                    Self::read(&instead),
+                    Ok(_) | Err(QuantityError::NoUnit { .. })
+                ) =>
+            {
+                let found = text.trim().to_owned();
+                QuantityError::DecimalComma { found, instead }
+            }
+            _ => error,
+        })
+    }
+}
+
+impl Quantity {
+    fn read(text: &str) -> Result<Self, QuantityError> {
         let text = text.trim();
         if text.is_empty() {
             return Err(QuantityError::Empty);

@@ -6,6 +6,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use crate::decimal_comma;
+
 mod columns;
 mod format;
 mod zone;
@@ -192,6 +194,31 @@ pub enum DurationError {
         /// The unit that came too late.
         unit: String,
     },
+    /// A comma stands where a decimal point belongs.
+    DecimalComma {
+        /// What was found.
+        found: String,
+        /// The same with a point.
+        instead: String,
+    },
+}
+
+impl DurationError {
+    /// What is wrong, without the advice.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::DecimalComma { found, .. } => decimal_comma::reason(found),
+            other => other.to_string(),
+        }
+    }
+
+    /// What to write instead, in a sentence, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::DecimalComma { instead, .. } => Some(decimal_comma::help(instead)),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for DurationError {
@@ -212,6 +239,10 @@ impl fmt::Display for DurationError {
             ),
             Self::UnknownUnit { unit } => write!(f, "\"{unit}\" is not a unit of time; {ALLOWED}"),
             Self::Negative => write!(f, "a duration here is 0 or more, found a negative one"),
+            Self::DecimalComma { found, instead } => {
+                let (reason, help) = (decimal_comma::reason(found), decimal_comma::help(instead));
+                write!(f, "{reason}; {help}")
+            }
             Self::TooLong => write!(f, "a duration is at most 106751 d (292 years)"),
             Self::TooFine => write!(f, "a duration is a whole number of nanoseconds"),
             Self::Order { unit } => {
@@ -230,6 +261,23 @@ impl FromStr for Duration {
     type Err = DurationError;
 
     fn from_str(text: &str) -> Result<Self, DurationError> {
+        Self::read(text).map_err(|error| match decimal_comma::with_point(text) {
+            Some(instead)
+                if matches!(
+                    Self::read(&instead),
+                    Ok(_) | Err(DurationError::NoUnit { .. })
+                ) =>
+            {
+                let found = excerpt(text.trim());
+                DurationError::DecimalComma { found, instead }
+            }
+            _ => error,
+        })
+    }
+}
+
+impl Duration {
+    fn read(text: &str) -> Result<Self, DurationError> {
         let mut rest = text.trim();
         if rest.is_empty() {
             return Err(DurationError::Empty);

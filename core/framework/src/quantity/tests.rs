@@ -57,6 +57,27 @@ fn what_is_no_quantity_is_refused_with_its_reason() {
 }
 
 #[test]
+fn a_decimal_comma_is_told_with_the_number_that_was_meant() {
+    let error = |text: &str| text.parse::<Quantity>().unwrap_err();
+    for (text, instead) in [
+        ("-82,5 Cel", "-82.5 Cel"),
+        ("0,25 um/min", "0.25 um/min"),
+        ("0,5K/h", "0.5K/h"),
+        ("0,25", "0.25"),
+    ] {
+        let error = error(text);
+        assert_eq!(error.reason(), format!("\"{text}\" has a decimal comma"));
+        let help = format!("a number has a decimal point: \"{instead}\"");
+        assert_eq!(error.help(), Some(help.clone()));
+        assert_eq!(error.to_string(), format!("{}; {help}", error.reason()));
+    }
+    for text in ["1,5 nn", "5 nm,6 nm", "1,2,3 nm", "nan"] {
+        let told = error(text).to_string();
+        assert!(!told.contains("comma"), "{text}: {told}");
+    }
+}
+
+#[test]
 fn json_holds_quantities_as_texts() {
     for text in [
         "150 nm/min",

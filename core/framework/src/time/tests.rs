@@ -38,6 +38,25 @@ fn durations_are_read_exactly() {
 }
 
 #[test]
+fn a_decimal_comma_is_told_with_the_duration_that_was_meant() {
+    for (text, instead) in [
+        ("2,5min", "2.5min"),
+        ("1h2,5min", "1h2.5min"),
+        ("0,5", "0.5"),
+    ] {
+        let expected =
+            format!("\"{text}\" has a decimal comma; a number has a decimal point: \"{instead}\"");
+        assert_eq!(error(text).to_string(), expected);
+    }
+    assert_eq!(
+        error("5min,10min"),
+        DurationError::NoNumber {
+            found: ",10min".to_owned()
+        }
+    );
+}
+
+#[test]
 fn what_is_no_duration_is_refused_with_its_reason() {
     assert_eq!(error(""), DurationError::Empty);
     assert_eq!(error("  "), DurationError::Empty);

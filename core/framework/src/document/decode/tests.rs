@@ -567,4 +567,17 @@ error[A018]: the number 5 needs a unit, e.g. "5 nm/min" ("5 1" if it has none)
   |         ^^^ not a quantity
 "#
     );
+    let report = mistakes("below = \"-82,5 Cel\"");
+    assert_eq!(
+        report,
+        r#"
+error[A018]: "-82,5 Cel" has a decimal comma
+ --> a.toml:7:9
+  |
+7 | below = "-82,5 Cel"
+  |         ^^^^^^^^^^^ not a quantity
+  |
+  = help: a number has a decimal point: "-82.5 Cel"
+"#
+    );
 }

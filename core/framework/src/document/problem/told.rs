@@ -159,9 +159,9 @@ impl Problem for DocumentProblem {
             Self::TooLargeExpanded { node, limit } => {
                 format!("with node \"{node}\" the expanded graph has more than {limit} values")
             }
-            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.reason(),
-            Self::Duration(error) => error.to_string(),
-            Self::Quantity(error) => error.to_string(),
+            Self::Unit(error) => error.reason(),
+            Self::Duration(error) => error.reason(),
+            Self::Quantity(error) => error.reason(),
             Self::NothingToRemove { role, name, .. } => {
                 format!("there is no inherited {role} \"{name}\" to remove")
             }
@@ -359,7 +359,9 @@ impl Problem for DocumentProblem {
                         .to_owned(),
                 )
             }
-            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.help(),
+            Self::Unit(error) => error.help(),
+            Self::Duration(error) => error.help(),
+            Self::Quantity(error) => error.help(),
             Self::NothingToRemove {
                 role,
                 name,
