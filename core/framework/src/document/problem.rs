@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::lacks::Lacks;
 use super::slip::Slip;
 use crate::diagnostic::{Names, Place};
-use crate::quantity::QuantityError;
+use crate::quantity::{Quantity, QuantityError};
 use crate::time::DurationError;
 use crate::unit::{Unit, UnitError};
 
@@ -192,6 +192,19 @@ pub enum DocumentProblem {
     Duration(DurationError),
     /// A text that is no quantity.
     Quantity(QuantityError),
+    /// A parameter that is given in a unit, within a text of its module that adds one.
+    UnitTwice {
+        /// The parameter.
+        parameter: String,
+        /// The module.
+        module: String,
+        /// What was given.
+        given: Quantity,
+        /// The text of the module.
+        text: String,
+        /// The unit in it.
+        unit: Unit,
+    },
     /// `nodes.NAME = false` or `outputs.NAME = false` without one of that name that is inherited.
     NothingToRemove {
         /// `node` or `output`.

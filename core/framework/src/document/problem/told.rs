@@ -79,7 +79,7 @@ impl Problem for DocumentProblem {
             Self::EmptyList { .. } => "A015",
             Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => "A016",
             Self::Unit(_) => "A017",
-            Self::Duration(_) | Self::Quantity(_) => "A018",
+            Self::Duration(_) | Self::Quantity(_) | Self::UnitTwice { .. } => "A018",
             Self::NothingToRemove { .. } => "A019",
             Self::SamplesWithoutClock { .. } => "A020",
             Self::OneColumn { .. } => "A021",
@@ -162,6 +162,14 @@ impl Problem for DocumentProblem {
             Self::Unit(error) => error.reason(),
             Self::Duration(error) => error.reason(),
             Self::Quantity(error) => error.reason(),
+            Self::UnitTwice {
+                parameter,
+                module,
+                text,
+                ..
+            } => {
+                format!("module \"{module}\" adds the unit to `{parameter}` itself, as \"{text}\"")
+            }
             Self::NothingToRemove { role, name, .. } => {
                 format!("there is no inherited {role} \"{name}\" to remove")
             }
@@ -241,6 +249,7 @@ impl Problem for DocumentProblem {
             Self::Duration(_) => "not a duration".to_owned(),
             Self::Quantity(QuantityError::Unit(_)) => "the unit is not known".to_owned(),
             Self::Quantity(_) => "not a quantity".to_owned(),
+            Self::UnitTwice { .. } => "has a unit already".to_owned(),
             Self::UnknownChannel { .. } => "not a channel".to_owned(),
             Self::RangeUnit { unit, .. } => format!("does not convert to {unit}"),
             Self::UnknownModule { .. } => "not a module".to_owned(),
@@ -362,6 +371,15 @@ impl Problem for DocumentProblem {
             Self::Unit(error) => error.help(),
             Self::Duration(error) => error.help(),
             Self::Quantity(error) => error.help(),
+            Self::UnitTwice {
+                parameter,
+                given,
+                unit,
+                ..
+            } => Some(match given.in_unit(unit) {
+                Some(number) => format!("give the number alone: {parameter} = {number}"),
+                None => format!("give a number alone, in {unit}"),
+            }),
             Self::NothingToRemove {
                 role,
                 name,
@@ -459,6 +477,7 @@ impl Problem for DocumentProblem {
             | Self::NoLength { .. }
             | Self::StepNotPositive
             | Self::UnknownPort { .. }
+            | Self::UnitTwice { .. }
             | Self::ModuleLoop { .. } => false,
         }
     }

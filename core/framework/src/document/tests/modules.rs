@@ -287,3 +287,34 @@ fn modules_that_multiply_are_stopped() {
     let codes: Vec<_> = diagnostics.iter().map(|found| found.code).collect();
     assert_eq!(codes, ["A016"]);
 }
+
+#[test]
+fn a_parameter_with_a_unit_that_its_module_adds_is_told_where_it_is_given() {
+    let graph = |limit: &str, wait: &str| {
+        format!(
+            "schema = 1\n[modules.m]\nrequired = [\"limit\", \"wait\"]\n\
+             nodes.a = {{ type = \"x\", below = \"{{limit}} nm/min\", memory = \"{{wait}}min\" }}\n\
+             [nodes.n]\nmodule = \"m\"\nlimit = {limit}\nwait = {wait}\n"
+        )
+    };
+    let told = rendered(&[("a.toml", &graph("\"0.15 um/min\"", "5"))]);
+    assert_eq!(
+        told,
+        r#"
+error[A018]: module "m" adds the unit to `limit` itself, as "{limit} nm/min"
+ --> a.toml:7:9
+  |
+7 | limit = "0.15 um/min"
+  |         ^^^^^^^^^^^^^ has a unit already
+  |
+  = note: node `n/a`
+  = help: give the number alone: limit = 150
+"#
+    );
+    let told = rendered(&[("a.toml", &graph("150", "\"5min\""))]);
+    assert!(told.contains("give the number alone: wait = 5\n"), "{told}");
+    let told = rendered(&[("a.toml", &graph("\"5 K\"", "5"))]);
+    assert!(told.contains("give a number alone, in nm/min\n"), "{told}");
+    let fine = read(&[("a.toml", &graph("150", "5"))]);
+    assert!(!fine.diagnostics.has_errors());
+}

@@ -6,6 +6,8 @@ use crate::document::declare::each::weight;
 use crate::document::declare::placeholder;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Value};
+use crate::quantity::Quantity;
+use crate::unit::Unit;
 
 impl Given {
     /// A value of the module with the parameters that it names.
@@ -15,7 +17,13 @@ impl Given {
         let data = match &value.data {
             Data::Text(text) => match self.whole(text) {
                 Some(given) => return given.clone(),
-                None => Data::Text(self.fill_text(text, value.place, diagnostics)),
+                None => match self.unit_twice(text) {
+                    Some((given, problem)) => {
+                        diagnostics.report(given.place, problem);
+                        return given.clone();
+                    }
+                    None => Data::Text(self.fill_text(text, value.place, diagnostics)),
+                },
             },
             Data::List(values) => Data::List(
                 values
@@ -60,6 +68,26 @@ impl Given {
             Data::Table(entries) => entries.iter().map(|(_, entry)| &entry.value).fold(1, add),
             _ => weight(value),
         }
+    }
+
+    /// The parameter that is given with a unit in a text that has one for it, where both together are no quantity.
+    fn unit_twice(&self, text: &str) -> Option<(&Value, DocumentProblem)> {
+        let (parameter, unit) = text.strip_prefix('{')?.split_once('}')?;
+        let given = self.parameters.get(parameter)?;
+        let written = given.as_text()?;
+        let unit = Unit::parse(unit).ok()?;
+        let quantity: Quantity = written.parse().ok()?;
+        let filled = placeholder::fill(text, &[(parameter, written)]);
+        filled.parse::<Quantity>().is_err().then(|| {
+            let problem = DocumentProblem::UnitTwice {
+                parameter: parameter.to_owned(),
+                module: self.module.clone(),
+                given: quantity,
+                text: text.to_owned(),
+                unit,
+            };
+            (given, problem)
+        })
     }
 
     fn whole(&self, text: &str) -> Option<&Value> {
