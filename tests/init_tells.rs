@@ -534,3 +534,40 @@ fn a_number_that_stands_for_no_value_is_no_position() {
         "{told}"
     );
 }
+
+#[test]
+fn humidity_explains_and_does_not_drift_with_a_focus_in_its_unit() {
+    let folder = Folder::new("tells-humidity");
+    let mut text = "time_s,tube_degF,hum_pct,speed [1/min],focus_steps\n".to_owned();
+    for (time, plate, z) in machine(3000) {
+        let (humid, speed) = (45.0 + (z / 9.0).sin(), 3000.0 + 100.0 * plate);
+        let _ = writeln!(
+            text,
+            "{time},{plate:.4},{humid:.3},{speed:.0},{:.2}",
+            9.0 * z
+        );
+    }
+    let (fine, told, graph) = init(&folder, "scope.tsv", &text.replace(',', "\t"));
+    assert!(fine, "{told}");
+    for expected in [
+        "hum_pct: input, in %; by its name, may explain the drift",
+        "speed [1/min]: input, in 1/min;",
+        "focus_steps: drifts, in 1; neither a temperature nor a length, so it is taken as what drifts",
+    ] {
+        assert!(told.contains(expected), "{expected}: {told}");
+    }
+    assert!(graph.contains("unit = \"1/min\""), "{graph}");
+    assert!(!graph.contains("the names do not say"), "{graph}");
+    let (fine, told) = said(&folder, &["check", "--strict", "scope.tsv.toml"]);
+    assert!(fine, "{told}");
+    let fit = [
+        "fit",
+        "scope.tsv.toml",
+        "--data",
+        "scope.tsv",
+        "-o",
+        "m.json",
+    ];
+    let (fine, told) = said(&folder, &fit);
+    assert!(fine, "{told}");
+}

@@ -5,7 +5,7 @@ use athermal::files::Description;
 use serde_json::{Value, json};
 
 use super::Told;
-use super::name::{POSITIONS, unit_in, words};
+use super::name::{POSITIONS, is_count, unit_in, words};
 
 /// What a column is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,8 @@ enum Guess {
     Temperature,
     Position,
     Drive,
+    /// The air or the pressure around it.
+    Ambient,
     Other,
     Unused,
 }
@@ -55,6 +57,9 @@ const DRIVES: [&str; 11] = [
     "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
     "rpm",
 ];
+const AMBIENT: [&str; 7] = ["hum", "rh", "%rh", "pressure", "baro", "barometer", "druck"];
+/// The same within a word: `Luftfeuchte`, `airhumidity`, `Luftdruck`.
+const WITHIN: [&str; 4] = ["humid", "feucht", "luftdruck", "airpressure"];
 
 impl Column {
     /// What was guessed, for people.
@@ -113,6 +118,18 @@ impl Column {
         Unit::parse(&self.unit).is_ok_and(|unit| unit.measures_same(&Unit::kelvin()))
     }
 
+    /// Whether it may measure the same as another. Of numbers without a dimension that is so in the same unit alone: shares, steps and
+    /// what no unit is known of are no one quantity.
+    fn is_same_quantity(&self, other: &Self) -> bool {
+        let units = Unit::parse(&self.unit)
+            .ok()
+            .zip(Unit::parse(&other.unit).ok());
+        units.is_some_and(|(own, others)| {
+            let is_same = self.unit == other.unit && self.unit_known == other.unit_known;
+            own.measures_same(&others) && (is_same || !own.measures_same(&Unit::one()))
+        })
+    }
+
     /// Leaves it out.
     pub fn leave_out(&mut self, why: impl Into<String>) {
         self.guess = Guess::Unused;
@@ -136,20 +153,28 @@ fn guess(name: &str, below: &str) -> Column {
     let parts = words(name);
     let by_name = unit_in(name);
     let below = Unit::in_words(below);
-    let unit = below.as_ref().or(by_name.as_ref());
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
     let has = |known: &[&str]| {
         lower
             .iter()
             .any(|word| known.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit())))
     };
+    let within = |parts: &[&str]| {
+        let contains = |word: &String| parts.iter().any(|part| word.contains(part));
+        lower.iter().any(contains)
+    };
+    let temp_named = has(&TEMPERATURES) || within(&["temp"]);
+    let is_angle = |unit: &Unit| Unit::parse("rad").is_ok_and(|angle| unit.measures_same(&angle));
+    // The degrees of a temperature are no angle.
+    let unit = below.as_ref().or(by_name.as_ref());
+    let unit = unit.filter(|unit| !(temp_named && is_angle(unit)));
     let measures = |what: &str| {
         Unit::parse(what)
             .ok()
             .zip(unit)
             .is_some_and(|(what, unit)| unit.measures_same(&what))
     };
-    let temp_named = has(&TEMPERATURES) || lower.iter().any(|word| word.contains("temp"));
+    let is_number = unit.is_none_or(is_count);
     let (guess, why) = if has(&SET_POINTS) {
         (
             Guess::Unused,
@@ -159,11 +184,15 @@ fn guess(name: &str, below: &str) -> Column {
         (Guess::Temperature, "by its unit")
     } else if measures("m") {
         (Guess::Position, "a length")
+    } else if measures("Pa") {
+        (Guess::Ambient, "a pressure")
     } else if temp_named {
         (Guess::Temperature, "by its name")
     } else if has(&DRIVES) {
         (Guess::Drive, "by its name")
-    } else if unit.is_none() && has(&POSITIONS) && !has(&FACTORS) {
+    } else if has(&AMBIENT) || within(&WITHIN) {
+        (Guess::Ambient, "by its name")
+    } else if is_number && has(&POSITIONS) && !has(&FACTORS) {
         (Guess::Position, "by its name")
     } else {
         (Guess::Other, "neither a temperature nor a length")
@@ -215,10 +244,17 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
         (Guess::Position, "")
     } else if has(columns, Guess::Other) {
         (Guess::Other, ", so it is taken as what drifts")
-    } else if has(columns, Guess::Drive) {
+    } else if has(columns, Guess::Drive)
+        && (has(columns, Guess::Temperature) || !has(columns, Guess::Ambient))
+    {
         (
             Guess::Temperature,
             "; no position is there, so it is taken as what drifts",
+        )
+    } else if has(columns, Guess::Ambient) {
+        (
+            Guess::Ambient,
+            "; nothing else could drift, so it is taken as what does",
         )
     } else {
         (Guess::Position, "")
@@ -233,7 +269,7 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
             Guess::Unused => Kind::Unused,
             _ if drifts => Kind::Drifting,
             Guess::Temperature => Kind::Temperature,
-            Guess::Drive | Guess::Other => Kind::Drive,
+            Guess::Drive | Guess::Ambient | Guess::Other => Kind::Drive,
             Guess::Position => Kind::Unused,
         };
         if drifts && told.drifting.is_empty() {
@@ -264,7 +300,7 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
         (true, false) => {
             left_out(&[Guess::Position]).map(|lost| ("nothing is left that drifts", lost))
         }
-        (false, true) => left_out(&[Guess::Temperature, Guess::Drive])
+        (false, true) => left_out(&[Guess::Temperature, Guess::Drive, Guess::Ambient])
             .map(|lost| ("nothing is left that could explain a drift", lost)),
         (true, true) => left_out(&[Guess::Temperature, Guess::Position]).map(|lost| {
             (
@@ -282,10 +318,10 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
             "nothing in it drifts: {} {}, and there is no position or other quantity to be explained; log a \
              position beside, or name the column that drifts with --drifts",
             causes.join(", "),
-            if causes.len() == 1 {
-                "is a temperature"
-            } else {
-                "are temperatures"
+            match (columns.iter().any(|column| column.kind == Kind::Drive), causes.len()) {
+                (true, _) => "may explain a drift",
+                (_, 1) => "is a temperature",
+                _ => "are temperatures",
             },
         )),
         (false, true) => Err(format!(
@@ -301,156 +337,42 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
 
 /// What drifts must be one quantity, since one node takes its slopes in one unit.
 fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
-    let unit = |column: &Column| Unit::parse(&column.unit).ok();
-    let mut drifting = columns
-        .iter_mut()
-        .filter(|column| column.kind == Kind::Drifting);
-    let Some((first, quantity)) = drifting
-        .next()
-        .and_then(|first| Some((first.name.clone(), unit(first)?)))
-    else {
+    let drifts = |column: &&Column| column.kind == Kind::Drifting;
+    // A share or a count is what drifts where nothing else is.
+    let is_share = |column: &Column| column.unit == "%" || column.unit_known && column.unit == "1";
+    let is_first = |column: &&Column| !told.drifting.is_empty() || !is_share(column);
+    let mut drifting = columns.iter().filter(drifts);
+    let first = drifting
+        .clone()
+        .find(is_first)
+        .or_else(|| drifting.next())
+        .cloned();
+    let Some(first) = first else {
         return Ok(());
     };
-    for column in drifting {
-        if unit(column).is_some_and(|unit| unit.measures_same(&quantity)) {
+    let drifting = columns
+        .iter_mut()
+        .filter(|column| column.kind == Kind::Drifting);
+    for column in drifting.filter(|column| !column.is_same_quantity(&first)) {
+        if told.drifting.is_empty() {
+            column.kind = Kind::Drive;
+            column.why = format!("another quantity than `{}`, may explain it", first.name);
             continue;
         }
-        if !told.drifting.is_empty() {
-            return Err(format!(
-                "`{first}` and `{}` are different quantities; write a graph for each",
-                column.name
-            ));
-        }
-        column.kind = Kind::Drive;
-        column.why = format!("another quantity than `{first}`, may explain it");
+        let told = |of: &Column| match of.unit_known {
+            true => format!("`{}` is in {}", of.name, of.unit),
+            false => format!("what unit `{}` is in, its name does not say", of.name),
+        };
+        return Err(format!(
+            "`{}` and `{}` are different quantities ({}; {}); write a graph for each",
+            first.name,
+            column.name,
+            told(&first),
+            told(column),
+        ));
     }
     Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kinds(header: &'static str) -> Result<Vec<(String, Kind, String)>, String> {
-        let described = Description::of_read("log", header.as_bytes(), None, 10).unwrap();
-        let mut columns = columns(&described, &["time_s".to_owned()]);
-        assign(&mut columns, &Told::default())?;
-        Ok(columns
-            .into_iter()
-            .map(|column| (column.name, column.kind, column.unit))
-            .collect())
-    }
-
-    #[test]
-    fn names_say_what_columns_are() {
-        for (header, expected) in [
-            (
-                "time_s,plate1_degC,X1_nm\n",
-                [(Kind::Temperature, "Cel"), (Kind::Drifting, "nm")],
-            ),
-            (
-                "time_s,t_wall_degC,heatflow_y_Wm2\n",
-                [(Kind::Temperature, "Cel"), (Kind::Drifting, "W/m2")],
-            ),
-            (
-                "time_s,lamp_drive_V,t_plate_degC\n",
-                [(Kind::Drive, "V"), (Kind::Drifting, "Cel")],
-            ),
-            (
-                "time_s,heater_voltage_V,t_outlet_air_V\n",
-                [(Kind::Drive, "V"), (Kind::Drifting, "V")],
-            ),
-            (
-                "time_s,spindle_load_pct,z_um\n",
-                [(Kind::Drive, "%"), (Kind::Drifting, "um")],
-            ),
-            (
-                "time_s,temp1,z\n",
-                [(Kind::Temperature, "Cel"), (Kind::Drifting, "um")],
-            ),
-        ] {
-            let found = kinds(header).unwrap();
-            assert_eq!(found.len(), 2);
-            for ((name, kind, unit), expected) in found.iter().zip(expected) {
-                assert_eq!((*kind, unit.as_str()), expected, "{name}");
-            }
-        }
-    }
-
-    #[test]
-    fn brackets_and_degree_signs_are_units_too() {
-        assert_eq!(guess("Temp Plate [°F]", "").unit, "[degF]");
-        assert_eq!(guess("Pos Z (µm)", "").unit, "um");
-        assert_eq!(guess("Probe Z [mm]", "").guess, Guess::Position);
-    }
-
-    #[test]
-    fn inches_and_units_behind_a_slash_are_read_where_nothing_else_can_be_meant() {
-        for (name, unit) in [
-            ("X_inch", "[in_i]"),
-            ("X_in", "[in_i]"),
-            ("Gap [in]", "[in_i]"),
-            ("X_mil", "[mil_i]"),
-            ("X_thou", "[mil_i]"),
-            ("X_micron", "um"),
-            ("X/mm", "mm"),
-            ("Probe 1/µm", "um"),
-            ("Plate/°C", "Cel"),
-            ("T_in", "Cel"),
-            ("power_in", "1"),
-            ("Z_nm/min", "um"),
-        ] {
-            assert_eq!(guess(name, "").unit, unit, "{name}");
-        }
-    }
-
-    #[test]
-    fn units_in_a_row_below_the_names_are_those_of_the_columns() {
-        let found = kinds("time_s;Plate;Z;Load;Gap_mm\n;°C;nm;%;µm\n0;1;2;3;4\n").unwrap();
-        let told = found.iter().map(|(_, kind, unit)| (*kind, &**unit));
-        assert_eq!(
-            told.collect::<Vec<_>>(),
-            [
-                (Kind::Temperature, "Cel"),
-                (Kind::Drifting, "nm"),
-                (Kind::Drive, "%"),
-                (Kind::Drifting, "um"),
-            ]
-        );
-    }
-
-    #[test]
-    fn a_unit_that_the_name_contradicts_is_told() {
-        let column = guess("Z_nm", "mm");
-        assert_eq!(column.unit, "mm");
-        assert_eq!(
-            column.why,
-            "a length, as the row below its name says, though the name says nm"
-        );
-    }
-
-    #[test]
-    fn a_log_of_temperatures_alone_is_told_that_nothing_drifts() {
-        let refused = kinds("time_s,t_machine_degF\n").unwrap_err();
-        assert!(refused.starts_with("nothing in it drifts: t_machine_degF is a temperature"));
-    }
-
-    #[test]
-    fn a_factor_of_an_axis_is_no_position_of_it() {
-        for factor in ["scale_x", "gain_x", "x_factor"] {
-            assert_eq!(guess(factor, "").guess, Guess::Other, "{factor}");
-        }
-        let found = kinds("time_s,plate_degC,X_um,scale_x\n").unwrap();
-        assert_eq!(found[1].1, Kind::Drifting);
-        assert_eq!(found[2].1, Kind::Drive);
-        // A scale may be a glass scale too: it drifts where nothing else could.
-        let found = kinds("time_s,plate_degC,scale_x\n").unwrap();
-        assert_eq!(found[1].1, Kind::Drifting);
-    }
-
-    #[test]
-    fn set_points_are_left_out() {
-        let found = kinds("time_s,z_mm,t_bed_degC,bed_target_degC\n").unwrap();
-        assert_eq!(found[2].1, Kind::Unused);
-    }
-}
+mod tests;

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use athermal::core::unit::Unit;
-
 use super::column::{Column, Kind};
+use super::name::unit_in_brackets;
 
 /// Columns of one kind and unit that make up a signal.
 #[derive(Debug, PartialEq, Eq)]
@@ -142,11 +141,15 @@ fn free(name: &str, taken: &BTreeSet<String>) -> String {
 /// A name for a channel whose column has one that no channel can have, without a unit in brackets at its end.
 fn channel_name(column: &str) -> String {
     let column = column.trim();
-    let bracketed = column.strip_suffix([']', ')']);
-    let bracketed = bracketed.and_then(|start| start.rsplit_once(['[', '(']));
-    let of_unit = bracketed.filter(|(_, unit)| Unit::in_name(unit.trim()).is_some());
+    let bracketed = |open, close| column.strip_suffix(close)?.rsplit_once(open);
+    let of_unit = [("[", "]"), ("(", ")")]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let (before, unit) = bracketed(open, close)?;
+            unit_in_brackets(open, unit).map(|_| before)
+        });
     let mut name = String::new();
-    for c in of_unit.map_or(column, |(before, _)| before).chars() {
+    for c in of_unit.unwrap_or(column).chars() {
         if c.is_alphanumeric() {
             name.push(c);
         } else if !name.is_empty() && !name.ends_with('-') {
@@ -197,6 +200,8 @@ mod tests {
             ("Z (µm) ", "Z"),
             ("Plate [1]", "Plate-1"),
             ("[°C]", "value"),
+            ("Speed [1/min]", "Speed"),
+            ("x [steps]", "x"),
         ] {
             assert_eq!(channel_name(column), channel);
         }

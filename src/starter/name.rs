@@ -23,18 +23,62 @@ pub fn words(name: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Whether a name ends in a unit, other than of time: `Z_nm`, `Z [nm]`, `Z/nm`.
+/// Whether a name ends in a unit, other than of time and of what may count its samples: `Z_nm`, `Z [nm]`, `Z/nm`.
 pub fn ends_in_unit(name: &str) -> bool {
     let words = words(name);
     let last = words.iter().enumerate().next_back();
-    last.and_then(unit_of_word).is_some() || inches(name).is_some()
+    let at_end = name.trim_end().ends_with([']', ')']);
+    let bracketed = at_end.then(|| in_brackets(name)).flatten();
+    let unit = bracketed.or_else(|| last.and_then(unit_of_word));
+    unit.or_else(|| inches(name))
+        .is_some_and(|unit| !(unit.measures_same(&Unit::second()) || is_count(&unit)))
 }
 
 /// The last unit in a name.
 pub(super) fn unit_in(name: &str) -> Option<Unit> {
     let words = words(name);
-    let unit = words.iter().enumerate().rev().find_map(unit_of_word);
-    unit.or_else(|| inches(name))
+    let last = || words.iter().enumerate().rev().find_map(unit_of_word);
+    in_brackets(name).or_else(last).or_else(|| inches(name))
+}
+
+/// Whether a unit is that of a number of steps or the like, which have none of their own.
+pub(super) fn is_count(unit: &Unit) -> bool {
+    unit.text() == "1"
+}
+
+/// Words in brackets that are units, and as often something else: a minimum, degrees of either kind, what is measured and what is set.
+const OTHERWISE: [&str; 5] = ["min", "deg", "PV", "MV", "N/A"];
+
+/// The unit in the last brackets of a name that hold one: `Speed [1/min]`, `Speed (mm/s)`.
+fn in_brackets(name: &str) -> Option<Unit> {
+    let groups = name.match_indices(['[', '(']).collect::<Vec<_>>();
+    groups.into_iter().rev().find_map(|(at, open)| {
+        let close = if open == "[" { ']' } else { ')' };
+        let rest = &name[at + 1..];
+        unit_in_brackets(open, &rest[..rest.find(close)?])
+    })
+}
+
+/// The unit that stands between brackets, which may number or name instead: `(a)`, `[1]`, `(T1)`, `(L/R)`.
+pub(super) fn unit_in_brackets(open: &str, text: &str) -> Option<Unit> {
+    let text = text.trim();
+    if OTHERWISE.contains(&text) {
+        return None;
+    }
+    let may_be_code = match text.split_once('/') {
+        Some((_, below)) => text.len() > 3 || ["s", "h", "m"].contains(&below),
+        None => open == "[" && !is_label(text),
+    };
+    let has_letters = text.contains(|c: char| c.is_alphabetic() || "%°'".contains(c));
+    let code = || (may_be_code && has_letters).then(|| Unit::in_words(text))?;
+    Unit::in_name(text).or_else(code)
+}
+
+/// Whether a text is letters and a number, and no length to a power: `T1`, not `mm2`.
+fn is_label(text: &str) -> bool {
+    let letters = text.trim_end_matches(|c: char| c.is_ascii_digit());
+    let measures_length = |unit: Unit| Unit::parse("m").is_ok_and(|m| unit.measures_same(&m));
+    letters.len() < text.len() && !Unit::in_name(letters).is_some_and(measures_length)
 }
 
 /// The unit that a word of a name says which is not the first, or that stands behind its slash.
@@ -42,10 +86,13 @@ fn unit_of_word((place, word): (usize, &&str)) -> Option<Unit> {
     let whole = (place > 0).then(|| Unit::in_name(word)).flatten();
     whole.or_else(|| {
         let (quantity, unit) = word.rsplit_once('/')?;
-        // A unit per another is no quantity in a unit.
-        Unit::in_name(quantity)
-            .is_none()
-            .then(|| Unit::in_name(unit))?
+        let is_named = Unit::in_name(quantity).is_some();
+        let is_per_time = ["s", "min", "h"].contains(&unit);
+        if is_per_time && place > 0 && (is_named || ["1", "l", "L"].contains(&quantity)) {
+            return Unit::parse(word).ok();
+        }
+        // Of what else is per another, one may be a quantity: `A/mm`.
+        (!is_named).then(|| Unit::in_name(unit))?
     })
 }
 

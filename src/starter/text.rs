@@ -166,7 +166,8 @@ impl Writer<'_> {
                 .iter()
                 .map(|name| toml_string(name))
                 .collect();
-            let known = self.columns[group.columns[0]].unit_known();
+            let mut columns = group.columns.iter();
+            let known = columns.all(|&index| self.columns[index].unit_known());
             let new = if members().any(|s| s.changes) {
                 "new "
             } else {

@@ -4,7 +4,7 @@ use super::Unit;
 use super::spelling::MICROINCH;
 
 /// Words, and the UCUM codes that they mean; the case counts for single letters, and where words differ in nothing else.
-const WORDS: [(&str, &str); 53] = [
+const WORDS: [(&str, &str); 102] = [
     ("degC", "Cel"),
     ("°C", "Cel"),
     ("celsius", "Cel"),
@@ -58,6 +58,55 @@ const WORDS: [(&str, &str); 53] = [
     ("hPa", "hPa"),
     ("kPa", "kPa"),
     ("mbar", "mbar"),
+    ("MHz", "MHz"),
+    ("GHz", "GHz"),
+    ("mHz", "mHz"),
+    ("uV", "uV"),
+    ("µV", "uV"),
+    ("μV", "uV"),
+    ("kV", "kV"),
+    ("uA", "uA"),
+    ("µA", "uA"),
+    ("μA", "uA"),
+    ("mW", "mW"),
+    ("MW", "MW"),
+    ("uW", "uW"),
+    ("µW", "uW"),
+    ("μW", "uW"),
+    ("uK", "uK"),
+    ("µK", "uK"),
+    ("μK", "uK"),
+    ("cm", "cm"),
+    ("km", "km"),
+    ("MPa", "MPa"),
+    ("mPa", "mPa"),
+    ("psi", "psi"),
+    ("kN", "kN"),
+    ("mN", "mN"),
+    ("kg", "kg"),
+    ("kJ", "kJ"),
+    ("Ohm", "Ohm"),
+    ("kOhm", "kOhm"),
+    ("mOhm", "mOhm"),
+    ("mrad", "mrad"),
+    ("urad", "urad"),
+    ("µrad", "urad"),
+    ("μrad", "urad"),
+    ("nrad", "nrad"),
+    ("arcsec", "arcsec"),
+    ("arcmin", "arcmin"),
+    ("lpm", "lpm"),
+    ("ustrain", "ustrain"),
+    ("microstrain", "ustrain"),
+    ("ppb", "[ppb]"),
+    ("steps", "1"),
+    ("counts", "1"),
+    ("ticks", "1"),
+    ("pulses", "1"),
+    ("increments", "1"),
+    ("pixel", "1"),
+    ("pixels", "1"),
+    ("px", "1"),
 ];
 
 impl Unit {
@@ -66,7 +115,9 @@ impl Unit {
     #[must_use]
     pub fn in_name(word: &str) -> Option<Self> {
         let in_any_case = |known: &str| {
-            known.len() > 1 && known.eq_ignore_ascii_case(word) && !["MK", "NM"].contains(&word)
+            known.len() > 1
+                && known.eq_ignore_ascii_case(word)
+                && !["MK", "NM", "MN", "mn"].contains(&word)
         };
         let exact = WORDS.iter().find(|(known, _)| *known == word);
         let (_, code) = exact.or_else(|| WORDS.iter().find(|(known, _)| in_any_case(known)))?;

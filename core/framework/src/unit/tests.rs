@@ -301,3 +301,27 @@ fn a_name_may_say_torque_and_revolutions() {
     }
     assert!(Unit::in_name("NM").is_none(), "a torque or a length");
 }
+
+#[test]
+fn a_name_may_say_units_with_prefixes_and_counts() {
+    for (word, code) in [
+        ("MHz", "MHz"),
+        ("mhz", "MHz"),
+        ("mHz", "mHz"),
+        ("\u{b5}V", "uV"),
+        ("MPA", "MPa"),
+        ("mPa", "mPa"),
+        ("MW", "MW"),
+        ("mw", "mW"),
+        ("arcsec", "''"),
+        ("urad", "urad"),
+        ("kN", "kN"),
+        ("steps", "1"),
+        ("Counts", "1"),
+    ] {
+        assert_eq!(Unit::in_name(word), Some(unit(code)), "{word}");
+    }
+    for word in ["MN", "mn", "N", "rad", "deg", "step", "min"] {
+        assert!(Unit::in_name(word).is_none(), "{word}");
+    }
+}
