@@ -92,3 +92,12 @@ fn a_log_in_utf_16_is_read_and_one_without_its_mark_is_no_text() {
         "is not text; save the recording as CSV or JSON lines in UTF-8",
     );
 }
+
+#[test]
+fn a_sign_that_is_no_minus_is_named() {
+    let minus = log(700, 10).replace('-', "\u{2212}");
+    let told = "it has 322 numbers with the sign U+2212 for a minus, such as";
+    says("minus", &minus, told);
+    let commas = minus.replace(',', ";").replace('.', ",");
+    says("minus-comma", commas, told);
+}

@@ -106,7 +106,23 @@ const NO_VALUES: [&str; 23] = [
     "1.#qnan",
 ];
 
+/// Signs that word processors and web pages put in the place of a minus: hyphens, dashes and U+2212.
+const MINUS_SIGNS: [char; 8] = [
+    '\u{2212}', '\u{2010}', '\u{2011}', '\u{2012}', '\u{2013}', '\u{2014}', '\u{fe63}', '\u{ff0d}',
+];
+
 impl Unreadable {
+    /// The sign before a number that is meant for a minus.
+    fn minus_sign(&self) -> Option<char> {
+        let sign = self.found.trim_start().chars().next()?;
+        let number = self.found.trim().strip_prefix(MINUS_SIGNS)?;
+        let is_number = number.starts_with(|c: char| c.is_ascii_digit())
+            && number
+                .chars()
+                .all(|c| c.is_ascii_digit() || ".,eE+-".contains(c));
+        is_number.then_some(sign)
+    }
+
     /// Whether it is what stands for no value.
     fn is_none(&self) -> bool {
         NO_VALUES.contains(&&*self.found.to_lowercase())
@@ -261,7 +277,9 @@ impl Survey {
             let first = series.first_unreadable.as_ref();
             let mark = first.and_then(|first| first.mark);
             let has_none = first.is_some_and(Unreadable::is_none);
-            let thousands = first.and_then(|first| thousands_mark(&first.found));
+            let minus = first.and_then(Unreadable::minus_sign);
+            let thousands = first.filter(|_| minus.is_none());
+            let thousands = thousands.and_then(|first| thousands_mark(&first.found));
             if column.name.contains(['{', '}']) {
                 column.leave_out(
                     "in a graph, braces in the name of a column stand for something else; rename it".to_owned(),
@@ -276,6 +294,13 @@ impl Survey {
                          all numbers of a file with one mark{}",
                         if thousands.is_some() { " and none between thousands" } else { "" }
                     ),
+                    None if let Some(sign) = minus => {
+                        let n = counted(series.unreadable, "number");
+                        format!(
+                            "it has {n} with the sign U+{:04X} for a minus, such as {example}; write the `-` of a keyboard instead",
+                            u32::from(sign)
+                        )
+                    }
                     None if let Some(mark) = thousands => {
                         let n = counted(series.unreadable, "number");
                         format!("it has {n} with {mark} between thousands, such as {example}; write numbers without it")
@@ -308,6 +333,10 @@ impl Survey {
                         format!("{many}, which is no number: --lenient takes them as missing")
                     }
                     Some(mark) => format!("{many}: write numbers without {mark} between thousands"),
+                    None if let Some(sign) = minus => format!(
+                        "{many}, where a minus is the sign U+{:04X}: write the `-` of a keyboard instead",
+                        u32::from(sign)
+                    ),
                     None => format!("{many}: mend the log, or read it with --lenient"),
                 });
             }
