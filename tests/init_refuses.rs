@@ -101,3 +101,16 @@ fn a_sign_that_is_no_minus_is_named() {
     let commas = minus.replace(',', ";").replace('.', ",");
     says("minus-comma", commas, told);
 }
+
+#[test]
+fn a_graph_in_the_place_of_a_log_is_told_to_be_what_init_writes() {
+    let scratch = Scratch::new("init-refuses-graph");
+    let graph = scratch.file("graph.toml", "schema = 1\n");
+    let finished = athermal(&[&"init", &graph]).ended(2);
+    finished.tells(&["this is a graph, which init writes, and holds no data; give it a log"]);
+    assert!(
+        !finished.told.contains("before this option"),
+        "{}",
+        finished.told
+    );
+}

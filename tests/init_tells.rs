@@ -538,12 +538,12 @@ fn a_number_that_stands_for_no_value_is_no_position() {
 #[test]
 fn humidity_explains_and_does_not_drift_with_a_focus_in_its_unit() {
     let folder = Folder::new("tells-humidity");
-    let mut text = "time_s,tube_degF,hum_pct,speed [1/min],focus_steps\n".to_owned();
+    let mut text = "time_s,tube_degF,hum_pct,speed [1/min],focus_steps,\n".to_owned();
     for (time, plate, z) in machine(3000) {
         let (humid, speed) = (45.0 + (z / 9.0).sin(), 3000.0 + 100.0 * plate);
         let _ = writeln!(
             text,
-            "{time},{plate:.4},{humid:.3},{speed:.0},{:.2}",
+            "{time},{plate:.4},{humid:.3},{speed:.0},{:.2},",
             9.0 * z
         );
     }
@@ -553,6 +553,8 @@ fn humidity_explains_and_does_not_drift_with_a_focus_in_its_unit() {
         "hum_pct: input, in %; by its name, may explain the drift",
         "speed [1/min]: input, in 1/min;",
         "focus_steps: drifts, in 1; neither a temperature nor a length, so it is taken as what drifts",
+        "the 6th column, which has no name: left out, it has 0 values",
+        "--data OTHER.tsv",
     ] {
         assert!(told.contains(expected), "{expected}: {told}");
     }

@@ -38,9 +38,13 @@ pub struct Data {
 
 /// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
 pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| {
+    no_graph("this is a graph and holds no data; name graphs before this option")
+}
+
+/// Reads the path of a recording; a graph is refused with these words.
+pub fn no_graph(told: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| {
         let is_graph = path.extension().is_some_and(|ending| ending == "toml");
-        let told = "this is a graph and holds no data; name graphs before this option";
         if is_graph { Err(told) } else { Ok(path) }
     })
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
-use super::data::recording;
+use super::data::{Data, no_graph};
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
@@ -28,7 +28,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, print};
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log
-    #[arg(value_parser = recording())]
+    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and -o to say where its graph goes"))]
     data: PathBuf,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
@@ -118,7 +118,9 @@ impl Init {
         ];
         let fit: Vec<&str> = fit.into_iter().filter(|part| !part.is_empty()).collect();
         let fit = command(&fit);
-        let evaluate = command(&[&program, "evaluate model.json --data OTHER.csv"]);
+        let unseen = quoted(&Data::of(vec![self.data.clone()]).unseen());
+        let evaluate = format!("evaluate model.json --data {unseen}");
+        let evaluate = command(&[&program, &evaluate]);
         format!(
             "wrote {graph}; look it over, then fit it, and test it on another log:\n{fit}\n{evaluate}"
         )

@@ -25,6 +25,8 @@ pub enum Kind {
 pub struct Column {
     /// Its name in the log.
     pub name: String,
+    /// Which of the log's columns it is, from 1.
+    place: usize,
     /// Its unit, as UCUM writes it.
     pub unit: String,
     /// What it is for.
@@ -69,17 +71,32 @@ impl Column {
             Kind::Temperature => "temperature",
             Kind::Drifting => "drifts",
             Kind::Drive => "input",
-            Kind::Unused => return Some(format!("{}: left out, {}", self.name, self.why)),
+            Kind::Unused => return Some(format!("{}: left out, {}", self.called(), self.why)),
         };
         let unit = if self.unit_known { "" } else { " (a guess)" };
         let warnings = self.warnings.iter().map(|warning| format!("; {warning}"));
         Some(format!(
             "{}: {what}, in {}{unit}; {}{}",
-            self.name,
+            self.called(),
             self.unit,
             self.why,
             warnings.collect::<String>()
         ))
+    }
+
+    /// Its name, or which it is if it has none.
+    fn called(&self) -> String {
+        if !self.name.is_empty() {
+            return self.name.clone();
+        }
+        let ending = match (self.place % 10, self.place % 100) {
+            (1..=3, 11..=13) => "th",
+            (1, _) => "st",
+            (2, _) => "nd",
+            (3, _) => "rd",
+            _ => "th",
+        };
+        format!("the {}{ending} column, which has no name", self.place)
     }
 
     /// What was guessed, for programs.
@@ -141,10 +158,13 @@ impl Column {
 /// The columns of a log other than its time, with a first guess of what each is.
 #[must_use]
 pub fn columns(described: &Description, time: &[String]) -> Vec<Column> {
-    let columns = described.columns.iter();
+    let columns = described.columns.iter().enumerate();
     columns
-        .filter(|name| !time.contains(name))
-        .map(|name| guess(name, described.unit(name)))
+        .filter(|(_, name)| !time.contains(name))
+        .map(|(index, name)| Column {
+            place: index + 1,
+            ..guess(name, described.unit(name))
+        })
         .collect()
 }
 
@@ -204,6 +224,7 @@ fn guess(name: &str, below: &str) -> Column {
     };
     Column {
         name: name.to_owned(),
+        place: 1,
         unit: unit.map_or(fallback, Unit::text).to_owned(),
         kind: Kind::Unused,
         why: match (&below, &by_name) {

@@ -280,7 +280,9 @@ impl Survey {
             let minus = first.and_then(Unreadable::minus_sign);
             let thousands = first.filter(|_| minus.is_none());
             let thousands = thousands.and_then(|first| thousands_mark(&first.found));
-            if column.name.contains(['{', '}']) {
+            if column.name.is_empty() && values > 0 {
+                column.leave_out("a graph knows columns by their names; give it one");
+            } else if column.name.contains(['{', '}']) {
                 column.leave_out(
                     "in a graph, braces in the name of a column stand for something else; rename it".to_owned(),
                 );
