@@ -110,7 +110,7 @@ impl FromStr for FaultSpec {
             part: part.to_owned(),
             reason: reason.to_owned(),
         };
-        let mut parts = text.split(',').map(str::trim);
+        let mut parts = parts(text).into_iter();
         let first = parts.next().unwrap_or_default();
         let (channel, kind) = first.split_once('=').ok_or_else(|| {
             wrong(
@@ -149,6 +149,21 @@ impl FromStr for FaultSpec {
         }
         Ok(spec)
     }
+}
+
+/// The parts between commas; one between digits is meant for a decimal point, and parts nothing.
+fn parts(text: &str) -> Vec<&str> {
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let (mut parts, mut start) = (Vec::new(), 0);
+    for (at, _) in text.match_indices(',') {
+        let after = text[at + 1..].chars().next();
+        if !(is_digit(text[..at].chars().next_back()) && is_digit(after)) {
+            parts.push(text[start..at].trim());
+            start = at + 1;
+        }
+    }
+    parts.push(text[start..].trim());
+    parts
 }
 
 #[cfg(test)]
@@ -235,6 +250,18 @@ mod tests {
             ("supply=noise", "a `noise` of `supply` needs a size in V"),
         ] {
             assert_eq!(resolved(text).unwrap_err().to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn a_decimal_comma_in_a_size_or_a_time_is_told_to_be_one() {
+        for (text, instead) in [
+            ("t=drift,size=0,5 K/h,for=1h", "0.5 K/h"),
+            ("t=drift,for=1,5h", "1.5h"),
+        ] {
+            let told = text.parse::<FaultSpec>().unwrap_err().to_string();
+            let expected = format!("a number has a decimal point: \"{instead}\"");
+            assert!(told.contains(&expected), "{told}");
         }
     }
 }
