@@ -9,7 +9,7 @@ use athermal::core::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
-use athermal::diagnosis::{guarded, of_truths};
+use athermal::diagnosis::{health_reasons, of_truths};
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -142,20 +142,17 @@ impl Recording for FaultWatch<'_> {
 impl Looks {
     /// Looks at the channels of this plan.
     pub fn at(plan: &Plan) -> Self {
-        let (no_leaps, no_standstill) = (
-            guarded(plan, &["max_rate"]),
-            guarded(plan, &["stuck_after", "noise_below"]),
-        );
+        let watched = health_reasons(plan);
         let channels = plan.sources.iter().zip(leap::finders(plan));
         let channels = channels.zip(of_truths(plan)).enumerate();
         let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
             let rests = source.optional;
-            // A node takes such samples out.
-            let stuck = !rests && !no_standstill.contains(&slot);
+            // Such a node takes out what is stuck.
+            let stuck = !rests && !watched.contains_key(&slot);
             Looked {
                 source: source.clone(),
                 of_truth,
-                leaps: leaps.filter(|_| !no_leaps.contains(&slot)),
+                leaps,
                 stuck: stuck.then(Default::default),
                 silent: (!rests).then(Default::default),
             }
@@ -389,9 +386,10 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
         Purpose::Scores | Purpose::Run => "Predictions from that mean nothing",
     };
     let (low, high) = leaps.usual;
-    if (low..=high).contains(&leaps.first.to) {
+    let usual = low..=high;
+    if usual.contains(&leaps.first.from) && usual.contains(&leaps.first.to) {
         return format!(
-            "did the sensor fail? {then}: a `health` node takes such samples out by its `max_rate`"
+            "did the sensor fail? {then}: no `range` tells such samples from others, so leave these rows out"
         );
     }
     format!(

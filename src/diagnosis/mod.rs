@@ -29,7 +29,7 @@ pub(crate) use plot::{
 };
 pub use rest::Untold;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use athermal_core::compile::{Plan, PlannedNode};
 use athermal_core::fit::FitError;
@@ -211,17 +211,6 @@ pub fn health_reasons(plan: &Plan) -> BTreeMap<usize, usize> {
         }
     }
     reasons
-}
-
-/// The measured channels that a `health` node watches over which is given one of some parameters.
-#[must_use]
-pub fn guarded(plan: &Plan, by: &[&str]) -> BTreeSet<usize> {
-    let all = plan.nodes.iter().filter(|node| node.kind.name == "health");
-    let guards = all.filter(|node| {
-        let given = node.spec.parameters();
-        by.iter().any(|key| !given[*key].is_null())
-    });
-    guards.flat_map(|node| inputs(plan, node)).collect()
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.

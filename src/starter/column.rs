@@ -135,6 +135,35 @@ impl Column {
         Unit::parse(&self.unit).is_ok_and(|unit| unit.measures_same(&Unit::kelvin()))
     }
 
+    /// How little its name and unit speak for a position: lengths come before what is called one, that before what is neither, and
+    /// what mostly drives or flows only before shares.
+    fn hardly_drifts(&self) -> u8 {
+        let unit = Unit::parse(&self.unit).ok();
+        let measures = |what: &str| {
+            let what = Unit::parse(what).ok();
+            let both = what.zip(unit.as_ref());
+            both.is_some_and(|(what, unit)| unit.measures_same(&what))
+        };
+        let is_position = |word: &&str| {
+            let word = word.split('/').next().unwrap_or_default().to_lowercase();
+            POSITIONS.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit()))
+        };
+        if measures("m") {
+            0
+        } else if words(&self.name).iter().any(is_position) {
+            1
+        } else if self.unit == "%" {
+            4
+        } else if ["V", "A", "W", "s", "Hz", "m3/s", "m/s"]
+            .into_iter()
+            .any(measures)
+        {
+            3
+        } else {
+            2
+        }
+    }
+
     /// Whether it may measure the same as another. Of numbers without a dimension that is so in the same unit alone: shares, steps and
     /// what no unit is known of are no one quantity.
     fn is_same_quantity(&self, other: &Self) -> bool {
@@ -186,8 +215,15 @@ fn guess(name: &str, below: &str) -> Column {
     let temp_named = has(&TEMPERATURES) || within(&["temp"]);
     let is_angle = |unit: &Unit| Unit::parse("rad").is_ok_and(|angle| unit.measures_same(&angle));
     // The degrees of a temperature are no angle.
-    let unit = below.as_ref().or(by_name.as_ref());
+    let is_of_temperature = |unit: &&Unit| {
+        let mut known = ["K", "K/s", "V", "A", "Ohm"].into_iter();
+        known.any(|known| Unit::parse(known).is_ok_and(|known| unit.measures_same(&known)))
+    };
+    let by_name_alone = by_name.as_ref();
+    let by_name_alone = by_name_alone.filter(|unit| !temp_named || is_of_temperature(unit));
+    let unit = below.as_ref().or(by_name_alone);
     let unit = unit.filter(|unit| !(temp_named && is_angle(unit)));
+    let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));
     let measures = |what: &str| {
         Unit::parse(what)
             .ok()
@@ -202,6 +238,8 @@ fn guess(name: &str, below: &str) -> Column {
         )
     } else if measures("K") {
         (Guess::Temperature, "by its unit")
+    } else if measures("m") && is_no_position {
+        (Guess::Drive, "a way, or a length per something")
     } else if measures("m") {
         (Guess::Position, "a length")
     } else if measures("Pa") {
@@ -359,16 +397,12 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
 /// What drifts must be one quantity, since one node takes its slopes in one unit.
 fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
     let drifts = |column: &&Column| column.kind == Kind::Drifting;
-    // A share or a count is what drifts where nothing else is.
-    let is_share = |column: &Column| column.unit == "%" || column.unit_known && column.unit == "1";
-    let is_first = |column: &&Column| !told.drifting.is_empty() || !is_share(column);
     let mut drifting = columns.iter().filter(drifts);
-    let first = drifting
-        .clone()
-        .find(is_first)
-        .or_else(|| drifting.next())
-        .cloned();
-    let Some(first) = first else {
+    let first = match told.drifting.is_empty() {
+        true => drifting.min_by_key(|column| column.hardly_drifts()),
+        false => drifting.next(),
+    };
+    let Some(first) = first.cloned() else {
         return Ok(());
     };
     let drifting = columns

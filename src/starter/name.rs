@@ -67,6 +67,8 @@ pub(super) fn unit_in_brackets(open: &str, text: &str) -> Option<Unit> {
     }
     let may_be_code = match text.split_once('/') {
         Some((_, below)) => text.len() > 3 || ["s", "h", "m"].contains(&below),
+        // A single letter as often says which of several it is, such as the left one.
+        None if text.chars().count() == 1 => open == "[" && text == "N",
         None => open == "[" && !is_label(text),
     };
     let has_letters = text.contains(|c: char| c.is_alphabetic() || "%°'".contains(c));

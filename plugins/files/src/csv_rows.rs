@@ -6,7 +6,7 @@ use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 use crate::cell::{self, is_number, trim};
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
-use crate::glued::names_behind;
+use crate::glued::{bare_time, names_behind};
 use crate::header::{self, Head};
 use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
@@ -247,7 +247,8 @@ impl CsvRows {
         let is_above = self.above.contains(&columns::name(self.column(0)));
         if let Some(last) = (0..cells).rev().find(|&at| is_value(at)) {
             let is_behind = !is_above && ledger.is_lenient();
-            return Ok(is_above || is_behind && self.takes_names_behind(cells, last, ledger)?);
+            let names = self.current(cells).split_off(last + 1);
+            return Ok(is_above || is_behind && self.takes_names_behind(names, ledger)?);
         }
         let mut names = self.current(cells);
         if self.is_comment() {
@@ -257,7 +258,8 @@ impl CsvRows {
         let columns = Columns::of(layout, &names);
         let lacking = columns.lacking(layout);
         if !lacking.is_empty() && is_above || !columns.are_named(layout) {
-            return Ok(is_above);
+            let may_be_glued = !is_above && ledger.is_lenient();
+            return Ok(is_above || may_be_glued && self.takes_names_behind(names, ledger)?);
         }
         if !lacking.is_empty() && !self.lines.is_complete() {
             ledger.report.truncated = Some(self.place());
@@ -307,16 +309,15 @@ impl CsvRows {
     /// known before, it is not known where rows from here on have what.
     fn takes_names_behind(
         &mut self,
-        cells: usize,
-        last: usize,
+        mut names: Vec<String>,
         ledger: &mut Ledger,
     ) -> Result<bool, FileError> {
         if let Some(names) = self.names_behind() {
             self.take_names_behind(names, ledger)?;
             return Ok(true);
         }
-        let names = self.current(cells).split_off(last + 1);
         let moved = self.layout.as_ref().is_some_and(|layout| {
+            bare_time(&mut names, layout.time.columns.names(), self.delimiter);
             let columns = Columns::of(layout, &names);
             columns.are_named(layout) && !columns.agree_with(&self.columns)
         });

@@ -19,6 +19,7 @@ pub(crate) fn names_behind(line: &[u8], delimiter: u8, known: &[String]) -> Opti
     if known.len().saturating_mul(line.len()) > COMPARED {
         return None;
     }
+    let has_unnamed = known.iter().any(String::is_empty);
     let mut sorted = known.to_vec();
     sorted.sort_unstable();
     for name in named() {
@@ -30,6 +31,13 @@ pub(crate) fn names_behind(line: &[u8], delimiter: u8, known: &[String]) -> Opti
                 continue;
             }
             let names = names_in(&line[at..], delimiter);
+            if has_unnamed {
+                // Where a column without a name stands, only the order that is known tells.
+                if names.iter().filter(|name| !name.is_empty()).eq(named()) {
+                    return Some(known.to_vec());
+                }
+                continue;
+            }
             let mut found = names.clone();
             found.sort_unstable();
             if found == sorted {
@@ -38,6 +46,21 @@ pub(crate) fn names_behind(line: &[u8], delimiter: u8, known: &[String]) -> Opti
         }
     }
     None
+}
+
+/// Takes the beginning of a row from before the name of the time, which is the first of these.
+pub(crate) fn bare_time(names: &mut [String], time: &[String], delimiter: u8) {
+    let Some(first) = names.first_mut() else {
+        return;
+    };
+    let glued = time.iter().find(|time| {
+        let before = first.strip_suffix(time.as_str());
+        before
+            .is_some_and(|before| !before.is_empty() && ends_in_value(before.as_bytes(), delimiter))
+    });
+    if let Some(time) = glued {
+        first.clone_from(time);
+    }
 }
 
 /// Whether what stands before names is of a row: its last cell, or what there is of it, is no part of a name.
@@ -85,6 +108,10 @@ mod tests {
             assert_eq!(found(line), expected, "{line}");
         }
         assert_eq!(found("20,1a,time,b\n").unwrap(), "a time b");
+        let index = ["", "time", "a"].map(str::to_owned);
+        let found_beside = |line: &str| names_behind(line.as_bytes(), b',', &index);
+        assert_eq!(found_beside("1,5,1,time,a\n").unwrap(), index);
+        assert_eq!(found_beside("1,5,1,a,time\n"), None);
         for line in [
             "",
             "time,b,a\n",

@@ -89,6 +89,10 @@ fn inches_and_units_behind_a_slash_are_read_where_nothing_else_can_be_meant() {
         ("Temp (PV)", "Cel"),
         ("Temp [deg]", "Cel"),
         ("Temp [°]", "Cel"),
+        ("Temp [L]", "Cel"),
+        ("Temp [N]", "Cel"),
+        ("Z [R]", "um"),
+        ("T_m", "Cel"),
     ] {
         assert_eq!(guess(name, "").unit, unit, "{name}");
     }
@@ -154,7 +158,17 @@ fn numbers_of_different_kinds_do_not_drift_together() {
         ("time_s,a_degC,load_pct,focus\n", [Drive, Drifting]),
         ("time_s,a_degC,focus,load_pct\n", [Drifting, Drive]),
         ("time_s,a_degC,focus,tilt\n", [Drifting, Drifting]),
-        ("time_s,a_degC,f_counts,g\n", [Drive, Drifting]),
+        ("time_s,a_degC,f_counts,g\n", [Drifting, Drive]),
+        ("time_s,a_degC,supply_V,focus_steps\n", [Drive, Drifting]),
+        ("time_s,a_degC,encoder_counts,motor_A\n", [Drifting, Drive]),
+        ("time_s,a_degC,flow_lpm,x_arcsec\n", [Drive, Drifting]),
+        (
+            "time_s,a_degC,Drehzahl [1/min],tilt_arcsec\n",
+            [Drive, Drifting],
+        ),
+        ("time_s,a_degC,I/mA,spot x/px\n", [Drive, Drifting]),
+        ("time_s,a_degC,z [mm],f [mm/rev]\n", [Drifting, Drive]),
+        ("time_s,a_degC,odometer_km,z_um\n", [Drive, Drifting]),
         ("time_s,a_degC,p_hPa,focus\n", [Drive, Drifting]),
         ("time_s,a_degC,x [steps],y_mm\n", [Drive, Drifting]),
     ] {

@@ -89,16 +89,30 @@ impl FromStr for Zone {
             false => ZONES.get(text).ok(),
         };
         let zone = zone.ok_or_else(|| UnknownZone {
-            nearest: offset_meant(text).or_else(|| nearest_to(text)),
+            nearest: offset_meant(text).or_else(|| nearest_to(text).filter(|_| !is_offset(text))),
         })?;
         let name = text.to_owned();
         Ok(Self { name, zone })
     }
 }
 
-/// The offset that was meant: `+01:00` by `UTC+1`, `GMT+0100` or `+1`.
+/// Whether a text is an offset behind a name, however that is written.
+fn is_offset(text: &str) -> bool {
+    let upper = text.trim().to_uppercase();
+    ["UTC", "GMT"].iter().any(|name| {
+        let offset = upper.strip_prefix(name).map(str::trim_start);
+        offset.is_some_and(|offset| offset.starts_with(['+', '-', '\u{2212}']))
+    })
+}
+
+/// The offset that was meant: `+01:00` by `UTC+1`, `GMT+0100` or `+1`, and `+00:00` by `Z`.
 fn offset_meant(text: &str) -> Option<String> {
     let upper = text.trim().to_uppercase();
+    if upper == "Z" {
+        return Some("+00:00".to_owned());
+    }
+    let half = upper.strip_suffix(".5").or(upper.strip_suffix(",5"));
+    let upper = half.map_or_else(|| upper.clone(), |hours| format!("{hours}:30"));
     let named = ["UTC", "GMT"]
         .iter()
         .find_map(|name| upper.strip_prefix(name));
@@ -251,6 +265,8 @@ mod tests {
             ("GMT+0100", "+01:00"),
             ("UTC\u{2212}3", "-03:00"),
             ("+1", "+01:00"),
+            ("UTC+5,5", "+05:30"),
+            ("Z", "+00:00"),
         ] {
             let told = text.parse::<Zone>().unwrap_err().to_string();
             let expected = format!("did you mean \"{meant}\"? Write one of");

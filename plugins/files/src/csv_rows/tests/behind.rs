@@ -46,6 +46,17 @@ fn other_names_behind_the_beginning_of_a_row_let_no_row_be_taken_until_a_line_of
 }
 
 #[test]
+fn the_time_glued_to_a_value_names_columns_too_and_one_without_a_name_stays_where_it_is() {
+    for behind in ["20,1t,b,c", "20t,b,c", "20,1,2t,b,c"] {
+        let text = format!("t,a,b\n0,1,2.5\n{behind}\n10,20,30\nt,b,a\n1,,3\n");
+        let (read, _) = read_with(&text, lenient());
+        assert_eq!(read, TWO_ROWS, "no value is taken for another: {text}");
+    }
+    let text = ",t,a,b\n0,0,1,2.5\n1,5,1,t,a,b\n2,1,,3\n";
+    assert_eq!(read_with(text, lenient()).0, "0 [1.0, 2.5]; 1 [NaN, 3.0]");
+}
+
+#[test]
 fn a_row_that_is_too_long_and_ends_in_a_name_is_no_header() {
     let text = "t,a,b,axis\n0,1,2.5,a\n1,2,3,4,a\n2,3,4,5,b\n1,3,,t\n";
     let (rows, reader) = read_with(text, lenient());
