@@ -105,6 +105,24 @@ fn a_graph_that_changes_again_in_the_shadow_takes_over_as_it_is_last() {
 }
 
 #[test]
+fn a_graph_that_goes_while_it_is_in_the_shadow_does_not_take_over() {
+    let scratch = desk("gone-in-shadow");
+    let graph = scratch.path("graph.toml");
+    let mut live = Live::going_on(&graph, &SHADOW, 0);
+    let first = live.revision();
+    scratch.file("graph.toml", over("30s"));
+    live.stays(&first);
+    std::fs::remove_file(&graph).unwrap();
+    live.stays(&first);
+    live.stays(&first);
+    assert_eq!(past_the_shadow(&mut live), [first]);
+    let told = live.told();
+    let gone = "graph.toml is gone: as it was in the shadow until now, it does not take over";
+    assert_told(&told, &["is no longer there", gone]);
+    assert!(!told.contains("took over"), "{told}");
+}
+
+#[test]
 fn a_mistake_that_comes_into_the_file_takes_out_of_the_shadow_what_was_there() {
     let scratch = desk("broken");
     let graph = scratch.path("graph.toml");

@@ -14,7 +14,7 @@ use athermal::{Duration, Instant, Model};
 use clap::Args;
 
 use super::ran;
-use super::watched::Watched;
+use super::watched::{Watched, Went};
 use crate::command::model::{self, check_fitted, few, tell_unfitted};
 use crate::figures::length;
 use crate::terminal::{Failure, Terminal};
@@ -308,6 +308,12 @@ impl<'a> Course<'a> {
         if !watched.changed() {
             if let Some(went) = watched.went() {
                 told::went(self.terminal, &went);
+                if matches!(went, Went::Away(_)) && self.staged.take().is_some() {
+                    control.discard();
+                    let words = "is gone: as it was in the shadow until now, it does not take over";
+                    self.terminal
+                        .warning(told::not_taken_over(&watched.path, "changed", words));
+                }
             }
             return;
         }
