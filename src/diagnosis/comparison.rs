@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use athermal_core::compile::Plan;
 use athermal_core::quantity::Quantity;
-use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much};
+use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much, if_few};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
 
@@ -74,8 +74,7 @@ impl Column {
     #[must_use]
     pub fn persistence_on_few(&self) -> Option<usize> {
         self.baseline_persistence?;
-        let few = hide_much(self.n - self.persistence_n, self.n);
-        few.then_some(self.persistence_n)
+        if_few(self.persistence_n, self.n)
     }
 }
 

@@ -5,7 +5,7 @@ use athermal::files::Description;
 use serde_json::{Value, json};
 
 use super::Told;
-use super::name::{POSITIONS, is_count, unit_in, words};
+use super::name::{POSITIONS, is_count, measures, unit_in, words};
 
 /// What a column is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,11 +139,7 @@ impl Column {
     /// what mostly drives or flows only before shares.
     fn hardly_drifts(&self) -> u8 {
         let unit = Unit::parse(&self.unit).ok();
-        let measures = |what: &str| {
-            let what = Unit::parse(what).ok();
-            let both = what.zip(unit.as_ref());
-            both.is_some_and(|(what, unit)| unit.measures_same(&what))
-        };
+        let measures = |what: &str| unit.as_ref().is_some_and(|unit| measures(unit, what));
         let is_position = |word: &&str| {
             let word = word.split('/').next().unwrap_or_default().to_lowercase();
             POSITIONS.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit()))
@@ -213,23 +209,17 @@ fn guess(name: &str, below: &str) -> Column {
         lower.iter().any(contains)
     };
     let temp_named = has(&TEMPERATURES) || within(&["temp"]);
-    let is_angle = |unit: &Unit| Unit::parse("rad").is_ok_and(|angle| unit.measures_same(&angle));
     // The degrees of a temperature are no angle.
     let is_of_temperature = |unit: &&Unit| {
         let mut known = ["K", "K/s", "V", "A", "Ohm"].into_iter();
-        known.any(|known| Unit::parse(known).is_ok_and(|known| unit.measures_same(&known)))
+        known.any(|known| measures(unit, known))
     };
     let by_name_alone = by_name.as_ref();
     let by_name_alone = by_name_alone.filter(|unit| !temp_named || is_of_temperature(unit));
     let unit = below.as_ref().or(by_name_alone);
-    let unit = unit.filter(|unit| !(temp_named && is_angle(unit)));
+    let unit = unit.filter(|unit| !(temp_named && measures(unit, "rad")));
     let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));
-    let measures = |what: &str| {
-        Unit::parse(what)
-            .ok()
-            .zip(unit)
-            .is_some_and(|(what, unit)| unit.measures_same(&what))
-    };
+    let measures = |what: &str| unit.is_some_and(|unit| measures(unit, what));
     let is_number = unit.is_none_or(is_count);
     let (guess, why) = if has(&SET_POINTS) {
         (

@@ -41,6 +41,11 @@ pub(super) fn unit_in(name: &str) -> Option<Unit> {
     in_brackets(name).or_else(last).or_else(|| inches(name))
 }
 
+/// Whether a unit measures the same as another, which is given by its code.
+pub(super) fn measures(unit: &Unit, what: &str) -> bool {
+    Unit::parse(what).is_ok_and(|what| unit.measures_same(&what))
+}
+
 /// Whether a unit is that of a number of steps or the like, which have none of their own.
 pub(super) fn is_count(unit: &Unit) -> bool {
     unit.text() == "1"
@@ -79,8 +84,8 @@ pub(super) fn unit_in_brackets(open: &str, text: &str) -> Option<Unit> {
 /// Whether a text is letters and a number, and no length to a power: `T1`, not `mm2`.
 fn is_label(text: &str) -> bool {
     let letters = text.trim_end_matches(|c: char| c.is_ascii_digit());
-    let measures_length = |unit: Unit| Unit::parse("m").is_ok_and(|m| unit.measures_same(&m));
-    letters.len() < text.len() && !Unit::in_name(letters).is_some_and(measures_length)
+    let is_length = Unit::in_name(letters).is_some_and(|unit| measures(&unit, "m"));
+    letters.len() < text.len() && !is_length
 }
 
 /// The unit that a word of a name says which is not the first, or that stands behind its slash.

@@ -308,11 +308,9 @@ impl<'a> Course<'a> {
         if !watched.changed() {
             if let Some(went) = watched.went() {
                 told::went(self.terminal, &went);
-                if matches!(went, Went::Away(_)) && self.staged.take().is_some() {
-                    control.discard();
-                    let words = "is gone: as it was in the shadow until now, it does not take over";
-                    self.terminal
-                        .warning(told::not_taken_over(&watched.path, "changed", words));
+                if matches!(went, Went::Away(_)) && self.staged.is_some() {
+                    let path = watched.path.clone();
+                    self.withdraw(control, &path, "is gone");
                 }
             }
             return;
@@ -327,11 +325,7 @@ impl<'a> Course<'a> {
                 self.staged = loaded.ok().zip(Some(path));
                 return;
             }
-            self.staged = None;
-            control.discard();
-            let words = "has changed: as it was in the shadow until now, it does not take over";
-            self.terminal
-                .warning(told::not_taken_over(&path, "changed", words));
+            self.withdraw(control, &path, "has changed");
             if revision.is_some() && revision == ran::revision(&self.running) {
                 let words = format_args!("{} is what runs again", path.display());
                 self.terminal.note(words);
@@ -362,6 +356,15 @@ impl<'a> Course<'a> {
         } else if let Err(error) = self.stage(control, model, path, now) {
             self.refuse(control, &error);
         }
+    }
+
+    /// Lets go of what is in the shadow, since its file is no more what it was.
+    fn withdraw(&mut self, control: &mut Control, path: &Path, why: &str) {
+        self.staged = None;
+        control.discard();
+        let words = format_args!("{why}: as it was in the shadow until now, it does not take over");
+        self.terminal
+            .warning(told::not_taken_over(path, "changed", words));
     }
 
     /// Tells why the watched file, as it has become, does not take over, and lets go of it.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub use crate::engine::Mode;
 pub use evidence::Lack;
 pub use interval::IntervalScore;
-pub use table::{RESTRICTS, Score, Scores, hide_much};
+pub use table::{RESTRICTS, Score, Scores, hide_much, if_few};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
 pub use unscored::Unscored;
 pub(crate) use watch::{Prediction, Watch};

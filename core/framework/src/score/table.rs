@@ -96,6 +96,12 @@ pub fn hide_much(left_out: usize, there: usize) -> bool {
     20 * left_out > there
 }
 
+/// How many of some instants a figure is of, where these are so few that it [says](hide_much) little of the others.
+#[must_use]
+pub fn if_few(there: usize, of: usize) -> Option<usize> {
+    hide_much(of - there, of).then_some(there)
+}
+
 impl Score {
     /// Whether it leaves so much out that it may [hide](hide_much) what happened there.
     #[must_use]
@@ -107,8 +113,7 @@ impl Score {
     #[must_use]
     pub fn persistence_on_few(&self) -> Option<usize> {
         self.baseline_persistence?;
-        let few = hide_much(self.n - self.persistence_n, self.n);
-        few.then_some(self.persistence_n)
+        if_few(self.persistence_n, self.n)
     }
 
     /// Whether the prediction is worse than predicting zero.

@@ -1,7 +1,7 @@
 //! Decides what can be wrong with a test before it is run, and how it is said.
 
 use crate::compile::CompileProblem;
-use crate::diagnostic::{Place, Problem, listed, nearest};
+use crate::diagnostic::{Place, Problem, names, nearest};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
 use crate::unit::Unit;
@@ -77,13 +77,6 @@ pub enum TrialProblem {
     ChannelTwice { channel: String },
     /// A bare number where a unit is needed.
     BareSample { number: f64, unit: Unit },
-}
-
-fn quoted<T: AsRef<str>>(names: &[T]) -> String {
-    if names.is_empty() {
-        return "nothing".to_owned();
-    }
-    listed(names.iter().map(|name| format!("`{}`", name.as_ref())), 12)
 }
 
 /// How a file does without the tests that it inherits.
@@ -168,7 +161,7 @@ impl Problem for TrialProblem {
                 machine, channels, ..
             } => format!(
                 "the machine `{machine}` does not measure {}",
-                quoted(channels)
+                names(channels)
             ),
             Self::Units {
                 key,
@@ -258,7 +251,7 @@ impl Problem for TrialProblem {
             Self::UnknownMachine { machine, known } => {
                 match nearest(machine, known.iter().copied()) {
                     Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("there are {}", quoted(known)),
+                    None => format!("there are {}", names(known)),
                 }
             }
             Self::MachineTwice { .. } => {
@@ -273,7 +266,7 @@ impl Problem for TrialProblem {
                 let way_out = "a signal may call channels `optional`";
                 match inherited_by {
                     Some(file) => format!("{way_out}; {}", without_inherited(file)),
-                    None => format!("it measures {}; {way_out}", quoted(has)),
+                    None => format!("it measures {}; {way_out}", names(has)),
                 }
             }
             Self::Units { expected, .. } => format!("write it in {expected}"),
@@ -295,7 +288,7 @@ impl Problem for TrialProblem {
                 "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`".to_owned()
             }
             Self::Range { .. } | Self::Fault(_) | Self::Schedule(_) => return None,
-            Self::NotMeasured { known, .. } => format!("measured are {}", quoted(known)),
+            Self::NotMeasured { known, .. } => format!("measured are {}", names(known)),
             Self::ChannelTwice { .. } => "let each channel stand once".to_owned(),
             Self::BareSample { .. } => "only `nan`, for no value, stands without a unit".to_owned(),
         })

@@ -4,14 +4,7 @@ use std::cmp::Ordering;
 
 use super::CompileProblem;
 use crate::compile::provenance::smallest_lag;
-use crate::diagnostic::{Names, Problem, Severity, listed, nearest};
-
-fn names(known: impl IntoIterator<Item: AsRef<str>>) -> String {
-    let quoted = known.into_iter().map(|name| format!("`{}`", name.as_ref()));
-    Some(listed(quoted, 12))
-        .filter(|names| !names.is_empty())
-        .unwrap_or_else(|| "nothing".to_owned())
-}
+use crate::diagnostic::{Names, Problem, Severity, names, nearest};
 
 /// A way through the graph; the middle of a long one is left out.
 fn names_in_order(path: &[String]) -> String {
