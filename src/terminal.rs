@@ -15,8 +15,8 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
 
-use crate::figures::{count, counted};
 use crate::message::Message;
+use athermal_analysis::figures::{count, counted};
 
 /// Options that every command takes.
 #[derive(Debug, Args)]

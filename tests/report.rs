@@ -350,15 +350,11 @@ fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
         "autocorrelation-Z2",
         "loss",
     ] {
-        for ending in ["svg", "png"] {
-            assert!(
-                pictures.contains(&format!("{name}.{ending}")),
-                "{name}.{ending}: {pictures:?}"
-            );
-        }
+        assert!(
+            pictures.contains(&format!("{name}.svg")),
+            "{name}: {pictures:?}"
+        );
     }
-    let png = std::fs::read(plots.join("drift-Z1.png")).unwrap();
-    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 10_000);
 }
 
 #[test]

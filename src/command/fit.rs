@@ -21,10 +21,10 @@ use super::faults::{self, FaultWatch, Faulty, Purpose};
 use super::model;
 use super::numbers;
 use super::threads::Threads;
-use crate::figures::{count, counted, number, paragraph, seconds, table};
 use crate::invocation::{next, program, quoted};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{count, counted, number, paragraph, seconds, table};
 
 /// Fit a graph on recorded data
 ///

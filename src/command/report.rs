@@ -41,7 +41,7 @@ pub struct Report {
     /// Where the page goes; `-` is standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// A folder for every picture as files of its own, SVG and PNG
+    /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
@@ -155,8 +155,6 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
     let names = file_names(plots.iter().map(|plot| plot.name.as_str()));
     for (plot, name) in plots.iter().zip(names) {
         write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
-        #[cfg(feature = "png")]
-        write_aside(&folder.join(format!("{name}.png")), &plot.png)?;
     }
     terminal.note(format_args!(
         "wrote {} pictures to {}",

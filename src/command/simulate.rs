@@ -20,8 +20,8 @@ use super::aside::{check_apart, not_written};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
-use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
+use athermal_analysis::figures::counted;
 
 /// Write the recording of a simulated machine, or list the machines
 ///

@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 use super::suite::Suite;
 use super::work::{Ran, Status};
-use crate::figures::count;
-use crate::markup::escaped;
 use crate::terminal::{Answer, Failure};
+use athermal_analysis::figures::count;
+use athermal_analysis::markup::escaped;
 
 /// The line of a test and, unless it passed, the figures that say why.
 pub(super) fn lines(suite: &Suite, ran: &Ran) -> String {
