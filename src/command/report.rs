@@ -23,8 +23,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 /// Show what a model is worth on recorded data, as one page
 ///
 /// Tells a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
-/// With `-o` it writes a self-contained HTML page that also has scores, the published figures for a machine of the same kind,
-/// drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
+/// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
 /// `--format json` the same facts go to standard output.
 #[derive(Debug, Args)]
 #[command(

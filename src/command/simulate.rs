@@ -269,7 +269,7 @@ impl Watched {
         Ok(Self {
             simulation,
             // Days are counted in thousandths, since how many rows there will be is the machine's business.
-            progress: terminal.progress_to("simulating", "", Some((days * 1000.0) as u64)),
+            progress: terminal.progress_to("simulating", (days * 1000.0) as u64),
         })
     }
 }

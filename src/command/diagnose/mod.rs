@@ -94,7 +94,7 @@ impl Diagnose {
         };
         let mut bar = None;
         let mut progress = |done: u64, total: u64| {
-            bar.get_or_insert_with(|| terminal.progress_to("fitting", "fits", Some(total)))
+            bar.get_or_insert_with(|| terminal.progress_to("fitting", total))
                 .tell(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
