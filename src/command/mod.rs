@@ -1,4 +1,4 @@
-//! Decides which commands there are; each says in a file of its own what it does.
+//! The commands, each in a file of its own.
 
 mod aside;
 mod beyond;
@@ -10,7 +10,7 @@ mod data;
 mod demo;
 mod diagnose;
 mod diff;
-mod doubtful;
+mod doubts;
 mod evaluate;
 mod explain;
 mod faults;
@@ -36,7 +36,7 @@ use clap::Subcommand;
 
 use crate::terminal::{Answer, Failure, Terminal};
 
-/// What the program can do; what each command says of itself stands at its arguments.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Demo(demo::Demo),
@@ -61,7 +61,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Whether programs are told as much as people beside the result, which is rows.
+    /// Whether reports beside the result are events for programs: the result is rows.
     #[must_use]
     pub fn tells_programs(&self) -> bool {
         matches!(self, Self::Run(_))

@@ -1,4 +1,4 @@
-//! Decides what is told of the estimators of a model: what each coefficient is called, and which unit it has.
+//! The fitted estimators of a model: the name and unit of each coefficient.
 
 use athermal::Model;
 use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
@@ -7,18 +7,18 @@ use athermal::core::unit::Unit;
 use athermal_numerics::Fading;
 use serde::Serialize;
 
-/// The longest difference equation of which the modes are told, in steps.
+/// The longest difference equation of which modes are shown, in steps.
 const LONGEST: i64 = 100;
 
 /// A fitted estimator.
 #[derive(Debug, Serialize)]
-pub(super) struct Told {
+pub(super) struct Estimator {
     pub(super) node: String,
     #[serde(rename = "type")]
     pub(super) kind: &'static str,
     pub(super) truth: String,
     pub(super) unit: String,
-    /// None of a kind that tells nothing of them.
+    /// None of a kind without coefficients.
     #[serde(flatten)]
     pub(super) found: Option<Found>,
 }
@@ -70,16 +70,16 @@ pub(super) struct Multiplied {
 }
 
 /// Every fitted estimator of a model, in the order of the plan.
-pub(super) fn told(model: &Model) -> Vec<Told> {
+pub(super) fn estimators(model: &Model) -> Vec<Estimator> {
     let nodes = model.plan.nodes.iter();
-    let told = nodes.filter_map(|node| {
+    let estimators = nodes.filter_map(|node| {
         let predictor = model.fitted.get(&node.instance())?;
-        told_of(&model.plan, node, &**predictor)
+        estimator_of(&model.plan, node, &**predictor)
     });
-    told.collect()
+    estimators.collect()
 }
 
-fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option<Told> {
+fn estimator_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option<Estimator> {
     let PlannedRole::Estimator {
         regressors, truth, ..
     } = &node.role
@@ -95,7 +95,7 @@ fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option
         recur(&mut found, &used, truth.ahead.as_ns());
         Names(&used).found(found)
     });
-    Some(Told {
+    Some(Estimator {
         node: node.instance(),
         kind: node.kind.name,
         truth: channel.name.clone(),
@@ -104,7 +104,7 @@ fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option
     })
 }
 
-/// Tells how a sum comes to rest that has past truths among its regressors: fed with its own predictions, it is a difference
+/// Adds the modes of a sum that has past truths among its regressors: fed with its own predictions, it is a difference
 /// equation, whose step is the shortest time from such a truth to the one that is predicted.
 fn recur(found: &mut Coefficients, used: &[&Regressor], ahead_ns: i64) {
     let mut lagged: Vec<(i64, f64)> = Vec::new();
