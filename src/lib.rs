@@ -17,7 +17,9 @@
 
 pub use athermal_core as core;
 pub use athermal_core::engine::{Engine, EngineError};
-pub use athermal_core::model::{Model, ModelError};
+pub use athermal_run as run;
+pub use athermal_run::model::{Model, ModelError};
+pub use athermal_trial as trial;
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
@@ -35,6 +37,7 @@ mod markup;
 mod message;
 mod program;
 pub mod report;
+pub mod schema;
 mod starter;
 mod terminal;
 

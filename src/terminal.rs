@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
-use athermal::core::fault::FaultError;
-use athermal::core::fit::FitError;
-use athermal::core::live::RunError;
+use athermal::trial::fault::FaultError;
+use athermal::run::fit::FitError;
+use athermal::run::live::RunError;
 use athermal::files::FileError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};

@@ -9,9 +9,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, fit};
+use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::kinds;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use athermal::{Duration, Instant, Model};
 use workbench::graphs;
 

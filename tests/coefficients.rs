@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use athermal::core::node::Of;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{Finished, Scratch, athermal, fitted, numbers, plan, regression, secs};
 

@@ -9,9 +9,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{RoleName, kinds};
-use athermal::core::score::trace;
+use athermal::run::score::trace;
 use athermal::diagnosis::comparison::{Comparison, Contender, compare};
 use athermal::files::{Dataset, Options};
 use serde_json::Value;

@@ -7,7 +7,7 @@ mod workbench;
 use std::path::Path;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
+use athermal::run::fit::{FitOptions, fit};
 use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
 use workbench::{Read, data};

@@ -12,9 +12,9 @@ mod workbench;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
-use athermal::core::score::{ScoreOptions, score};
+use athermal::run::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use workbench::{Scratch, data, graph};
 

@@ -8,9 +8,9 @@ mod workbench;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Figure, Predictor, TrainingError, TrainingReport};
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs};
 

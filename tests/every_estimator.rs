@@ -8,7 +8,7 @@ mod workbench;
 use std::fmt::Write;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, FitReport, Outcome, fit};
+use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
 use athermal::files::{Dataset, Options};
 use workbench::{Scratch, athermal};

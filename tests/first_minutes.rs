@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::machine::{Setup, Simulated, machine, machines};
-use athermal::core::score::{ScoreOptions, score};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::trial::machine::{Setup, Simulated, machine, machines};
+use athermal::run::score::{ScoreOptions, score};
 use workbench::Folder;
 
 impl Folder {

@@ -6,9 +6,9 @@ mod workbench;
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::TrainingReport;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{own_oracle, plan, regression, secs};
 

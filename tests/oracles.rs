@@ -8,8 +8,8 @@ mod workbench;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 use athermal::{Engine, Instant};
 use workbench::{coefficients, fitted, oracle, plan, regression, slot};
 

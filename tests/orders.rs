@@ -7,8 +7,8 @@ mod workbench;
 use std::ffi::OsStr;
 
 use athermal::Instant;
-use athermal::core::fit::{FitOptions, FitProgress, fit};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, FitProgress, fit};
+use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{Scratch, athermal, athermal_on, numbers, own_oracle, plan};
 

@@ -9,10 +9,10 @@ use std::sync::Arc;
 use athermal::Engine;
 use athermal::core::channel::ABSENT;
 use athermal::core::compile::PlannedRole;
-use athermal::core::fit::{FitOptions, fit};
+use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use workbench::{Bench, linear, plan, secs, slot};
 
 const AXES: [&str; 3] = ["X", "Y", "Z"];

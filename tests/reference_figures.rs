@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::score::{Score, ScoreOptions, score};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::score::{Score, ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use workbench::{data, graph};
 

@@ -4,12 +4,12 @@
 
 mod workbench;
 
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{
     Estimator, InputPort, Predictor, Regressors, Runs, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use athermal::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,7 @@ mod workbench;
 
 use athermal as _;
 use athermal::core::node::kinds;
-use athermal::core::schema::graph_schema;
+use athermal::schema::graph_schema;
 use serde_json::Value;
 use workbench::{athermal, graph};
 

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use athermal::Instant;
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::{Event, Recording, RecordingError, Rows};
 use workbench::plan;
 
 /// Temperatures that wander, once a second, and a drift that follows two of them.

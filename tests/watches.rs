@@ -7,8 +7,8 @@ mod workbench;
 use std::path::Path;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Table};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
 use athermal::files::{Dataset, Options};
 use workbench::{Scratch, data, graph};
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fnv1a;
-use athermal::core::model::DataCard;
+use athermal::run::model::DataCard;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};

@@ -4,8 +4,8 @@ use std::cell::RefCell;
 
 use athermal::Instant;
 use athermal::core::compile::{Plan, SourceChannel};
-use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::run::live::Feed;
+use athermal::run::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};

@@ -5,7 +5,7 @@ use std::path::Path;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::{Diagnostics, Sources, listed};
-use athermal::core::model::ModelError;
+use athermal::run::model::ModelError;
 use athermal::core::quantity::Quantity;
 
 use crate::terminal::{Failure, Terminal};

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
-use athermal::core::fault::FaultSpec;
-use athermal::core::machine::{
+use athermal::trial::fault::FaultSpec;
+use athermal::trial::machine::{
     ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
     machine, machines,
 };

@@ -7,10 +7,10 @@
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording};
-use athermal_core::score::trace;
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::trace;
 use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
 use serde::Serialize;

@@ -8,7 +8,7 @@ mod workbench;
 
 use std::path::Path;
 
-use athermal::core::machine::{Row, Schedule, Setup, Simulated, Simulation};
+use athermal::trial::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use athermal::core::prng::Prng;
 use looped::{Looped, output};
 use workbench::{Scratch, athermal, graph, simulated};

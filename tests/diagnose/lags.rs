@@ -1,7 +1,7 @@
 //! When features tell something of a truth and of what predictions leave of it, and when they only seem to.
 
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use athermal::diagnosis::{lag, observe};
 
 use super::{TWO_SENSORS, linear, model, secs, wandering};

@@ -12,11 +12,11 @@ mod workbench;
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, fit};
+use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
-use athermal::core::recording::{Event, Table};
-use athermal::core::score::trace;
+use athermal::run::recording::{Event, Table};
+use athermal::run::score::trace;
 use athermal::diagnosis::{
     Options, day, diagnose, observe, regressor, residual, response, sensor, window,
 };

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Recording, Table};
-use athermal::core::score::{ScoreOptions, score};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Recording, Table};
+use athermal::run::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use athermal::{Engine, Instant};
 

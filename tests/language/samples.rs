@@ -1,6 +1,6 @@
 //! What counts as a sample: finite, within the range of its signal, of a channel that the data have.
 
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use athermal::files::{Dataset, Options};
 
 use super::SAMPLES;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use athermal::core::engine::Engine;
-use athermal::core::live::{LiveOptions, Notice, pair};
+use athermal::run::live::{LiveOptions, Notice, pair};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
 use athermal::{Instant, Model};

@@ -2,11 +2,11 @@
 //! put out lasts.
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitError, FitOptions};
-use athermal::core::live::{
+use athermal::run::fit::{FitError, FitOptions};
+use athermal::run::live::{
     Frame, Refit, RunError, Samples, Sink, SinkError, Source, SourceError, StageError, run,
 };
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::run::recording::{Event, Recording, RecordingError, Rows};
 
 use super::course::live;
 use super::model::{model, s};

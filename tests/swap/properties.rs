@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use athermal::Model;
 use athermal::core::engine::{Carry, NodeCarry};
-use athermal::core::live::{Control, Feed, LiveOptions, Notice, StageError, Stepper, pair};
+use athermal::run::live::{Control, Feed, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::core::prng::Prng;
 
 use super::model::{Happening, bits, columns, d, model, run};

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use athermal::core::live::{LiveOptions, Notice, pair};
+use athermal::run::live::{LiveOptions, Notice, pair};
 use athermal::core::prng::Prng;
 
 use super::course::rows;

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use athermal::core::engine::{Carry, RestoreError};
-use athermal::core::live::{LiveOptions, pair};
+use athermal::run::live::{LiveOptions, pair};
 use athermal::core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
 };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use athermal::core::{self, machine::Setup};
+use athermal::trial::machine::Setup;
 
 use super::Scratch;
 

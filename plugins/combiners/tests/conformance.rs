@@ -5,7 +5,7 @@ use athermal_combiners::{
     StateGate, Trimmed,
 };
 use athermal_core::conformance;
-use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
+use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
 
 conformance!(Mean, Case::new(""));
 

@@ -1,6 +1,6 @@
 //! The estimator with products of past drift and temperatures.
 
-use athermal_core::model::{number, numbers};
+use athermal_run::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, Figures, InputPort, Mistake, Of, Predictor, Regressor,
     Regressors, SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,

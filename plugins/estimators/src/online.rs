@@ -1,6 +1,6 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
-use athermal_core::model::{number, number_or_none, numbers};
+use athermal_run::model::{number, number_or_none, numbers};
 use athermal_core::node::{
     Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };

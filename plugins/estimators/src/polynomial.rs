@@ -1,6 +1,6 @@
 //! The estimator with squares and products of features.
 
-use athermal_core::model::{number, numbers};
+use athermal_run::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,

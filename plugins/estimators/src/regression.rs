@@ -1,6 +1,6 @@
 //! What the linear estimators share: how rows become a fitted model and a report; which regressors there are is theirs.
 
-use athermal_core::model::{number, numbers};
+use athermal_run::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, LinearForm, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer,
     TrainingError, TrainingReport, TrainingSetup,

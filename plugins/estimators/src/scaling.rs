@@ -1,7 +1,7 @@
 //! Decides how a fitted model brings regressors to a common scale, and what makes no scale.
 
 use athermal_core::diagnostic::count;
-use athermal_core::model::{number, numbers};
+use athermal_run::model::{number, numbers};
 use athermal_core::node::{Mistake, TrainingReport};
 use serde::{Deserialize, Serialize};
 

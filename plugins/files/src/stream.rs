@@ -1,7 +1,7 @@
 //! Files as source and sink of a run: rows in, rows out; what a row looks like is decided by reader and writer.
 
-use athermal_core::live::{Frame, Samples, Sink, SinkError, Source, SourceError};
-use athermal_core::recording::Event;
+use athermal_run::live::{Frame, Samples, Sink, SinkError, Source, SourceError};
+use athermal_run::recording::Event;
 use athermal_core::time::Instant;
 
 use crate::{Reader, Row, Writer};

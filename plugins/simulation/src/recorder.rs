@@ -1,6 +1,6 @@
 //! How the true state of a machine becomes rows. Decides sampling instants, noise, resolution and true drift, not the state.
 
-use athermal_core::machine::{Channel, Row, SECOND_NS, Simulation};
+use athermal_trial::machine::{Channel, Row, SECOND_NS, Simulation};
 use athermal_core::prng::Prng;
 
 /// Seconds between rows: every temperature is sampled in each.

@@ -3,8 +3,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal_core::fault::{Fault, FaultKind, Faults};
-use athermal_core::machine::{
+use athermal_trial::fault::{Fault, FaultKind, Faults};
+use athermal_trial::machine::{
     self, Faulty, Machine, Row, SECOND_NS, Schedule, Setup, SetupError, Simulation,
 };
 use athermal_simulation::{MACHINES, write_table};

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal_core::machine::{self, Machine, Row, SECOND_NS, Setup};
+use athermal_trial::machine::{self, Machine, Row, SECOND_NS, Setup};
 use athermal_simulation as _;
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {

@@ -1,6 +1,6 @@
 //! What a comparison is told as; what is compared stands above.
 
-use athermal::core::score::Mode;
+use athermal::run::score::Mode;
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison};
 
 use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};

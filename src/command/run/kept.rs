@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
-use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
-use athermal::core::recording::Event;
+use athermal::run::live::{Samples, Sink, SinkError, Source, SourceError};
+use athermal::run::recording::Event;
 use athermal::files::Reader;
 use athermal::{Engine, Instant, Model};
 use serde_json::json;
@@ -300,7 +300,7 @@ impl Source for Rest<'_> {
 
 #[cfg(test)]
 mod tests {
-    use athermal::core::live::Frame;
+    use athermal::run::live::Frame;
 
     use super::*;
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
-use athermal::core::live::{Control, Feed, StageError, Staged};
+use athermal::run::live::{Control, Feed, StageError, Staged};
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};

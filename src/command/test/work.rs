@@ -7,9 +7,9 @@ use std::sync::{OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Recording;
-use athermal::core::trial::{self, DataSet, Finding, On};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Recording;
+use athermal::trial::{self, DataSet, Finding, On};
 use athermal::files::{Dataset, Options};
 
 use super::suite::Suite;

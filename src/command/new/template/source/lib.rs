@@ -6,8 +6,8 @@
 use std::io::BufRead;
 
 use athermal_core::compile::Plan;
-use athermal_core::live::{Samples, Source, SourceError};
-use athermal_core::recording::Event;
+use athermal_run::live::{Samples, Source, SourceError};
+use athermal_run::recording::Event;
 use athermal_core::time::Instant;
 
 /// Lines from whatever has lines: standard input, a serial port, a socket.
