@@ -1,8 +1,6 @@
-//! Decides the JSON Schema of graph files, and how durations, units and quantities describe themselves in it; what they mean is decided with them.
+//! How durations, units and quantities describe themselves in the JSON Schema of graph files.
 
-mod graph;
 
-pub use graph::graph_schema;
 
 use std::borrow::Cow;
 
