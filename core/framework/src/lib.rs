@@ -112,7 +112,9 @@ pub mod node;
 pub mod prng;
 
 // The vocabulary that a graph is written in; authors of nodes need one crate.
-pub use athermal_graph::{channel, diagnostic, document, quantity, time, unit};
+pub use athermal_graph::{
+    channel, diagnostic, document, number, number_or_none, numbers, quantity, time, unit,
+};
 
 #[doc(hidden)]
 pub use inventory;

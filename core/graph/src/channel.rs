@@ -10,7 +10,7 @@ pub const ABSENT: f64 = f64::NAN;
 
 /// What a node gives: what is infinite is no value.
 #[inline]
-pub(crate) fn unless_infinite(value: f64) -> f64 {
+pub fn unless_infinite(value: f64) -> f64 {
     if value.is_infinite() { ABSENT } else { value }
 }
 
@@ -67,8 +67,10 @@ impl Channel {
 /// Between which values something lay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremes {
-    pub(crate) lowest: f64,
-    pub(crate) highest: f64,
+    /// The lowest value.
+    pub lowest: f64,
+    /// The highest value.
+    pub highest: f64,
 }
 
 /// How far apart values are, as a share of their size, that only rounding tells apart.

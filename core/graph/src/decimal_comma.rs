@@ -1,7 +1,7 @@
 //! Decides whether a text that cannot be read has a comma where a point belongs, and what is told of it; not what the text stands for.
 
 /// The text with a point in the place of its one comma between digits.
-pub(crate) fn with_point(text: &str) -> Option<String> {
+pub fn with_point(text: &str) -> Option<String> {
     let (before, after) = text.trim().split_once(',')?;
     let is_number = before.ends_with(|c: char| c.is_ascii_digit())
         && after.starts_with(|c: char| c.is_ascii_digit());
@@ -9,12 +9,12 @@ pub(crate) fn with_point(text: &str) -> Option<String> {
 }
 
 /// What is wrong with such a text.
-pub(crate) fn reason(found: &str) -> String {
+pub fn reason(found: &str) -> String {
     format!("\"{found}\" has a decimal comma")
 }
 
 /// What to write instead.
-pub(crate) fn help(with_point: &str) -> String {
+pub fn help(with_point: &str) -> String {
     let digits = |text: &str| text.chars().take_while(char::is_ascii_digit).count();
     let (whole, fraction) = with_point.rsplit_once('.').unwrap_or((with_point, ""));
     let is_zero = whole.trim_start_matches(['+', '-']).starts_with('0');

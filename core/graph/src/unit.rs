@@ -233,7 +233,7 @@ impl Unit {
     }
 
     /// The unit of the same quantity in which a second, a metre or a kelvin is 1, and no scale has a zero of its own.
-    pub(crate) fn base(&self) -> Unit {
+    pub fn base(&self) -> Unit {
         let [metre, second, gram, radian, kelvin, coulomb, candela] = self.dimension;
         let named = [
             ("m", metre),
@@ -268,7 +268,7 @@ impl Unit {
     }
 
     /// A text that two units share exactly when they mean the same, up to the last digits of a factor.
-    pub(crate) fn meaning(&self) -> String {
+    pub fn meaning(&self) -> String {
         let base = self.base();
         let scale = self
             .point

@@ -11,7 +11,7 @@ use crate::diagnostic::Names;
 
 /// The channels of a port, each with its slot.
 #[derive(Debug, Default, Clone)]
-pub(crate) struct PortChannels {
+pub struct PortChannels {
     slots: IndexMap<String, usize>,
     /// Their names, once somebody refers to one that there is not: a graph may do so thousands of times.
     known: OnceCell<Arc<Names>>,

@@ -174,7 +174,7 @@ impl Vote {
     }
 
     /// How many truths came, and how many of them it goes by.
-    pub(crate) fn evidence(&self) -> Option<(u64, Evidence)> {
+    pub fn evidence(&self) -> Option<(u64, Evidence)> {
         Some((self.told, self.combine.evidence()?))
     }
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::model::number::Exact;
-use crate::model::numbers;
+use crate::number::Exact;
+use crate::numbers;
 
 /// What a fit found, by name.
 pub type Figures = BTreeMap<String, Figure>;

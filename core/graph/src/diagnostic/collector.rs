@@ -152,14 +152,14 @@ impl Diagnostics {
     }
 
     /// Notes a problem unless another has been told at its place, from which it may follow.
-    pub(crate) fn report_unless_told(&mut self, place: Place, problem: impl Problem) {
+    pub fn report_unless_told(&mut self, place: Place, problem: impl Problem) {
         if !self.is_told(problem.code(), place) {
             self.report(place, problem);
         }
     }
 
     /// Whether an error of another code, or the same one of no member, stands at a place.
-    pub(crate) fn is_told(&self, code: &str, place: Place) -> bool {
+    pub fn is_told(&self, code: &str, place: Place) -> bool {
         let there = self.known.get(&Some(place)).into_iter().flatten();
         let mut errors = there.filter(|known| known.is_error);
         errors.any(|known| known.code != code || known.is_of_none)
@@ -190,12 +190,12 @@ impl Diagnostics {
     }
 
     /// Sets the context of the [`Diagnostics::report`]s that follow, and gives the one before.
-    pub(crate) fn scope(&mut self, context: Option<String>) -> Option<String> {
+    pub fn scope(&mut self, context: Option<String>) -> Option<String> {
         std::mem::replace(&mut self.scope, context)
     }
 
     /// An empty collector for the same files.
-    pub(crate) fn aside(&self) -> Self {
+    pub fn aside(&self) -> Self {
         Self {
             open: self.open,
             gaps: Arc::clone(&self.gaps),
@@ -209,19 +209,19 @@ impl Diagnostics {
     }
 
     /// Takes over those that are wanted of what another collector found; what is known here already is counted with it.
-    pub(crate) fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
+    pub fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
         for diagnostic in other.found.into_iter().filter(wanted) {
             self.take(diagnostic);
         }
     }
 
     /// Number of errors as they were found: one that is found again, of another member or instance, counts again.
-    pub(crate) fn reported(&self) -> usize {
+    pub fn reported(&self) -> usize {
         self.reported
     }
 
     /// Notes where parts of files could not be read: at `places`, or anywhere. What may only follow from that is not told.
-    pub(crate) fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
+    pub fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
         self.open |= anywhere;
         if !places.is_empty() {
             let gaps = Arc::make_mut(&mut self.gaps);
@@ -230,7 +230,7 @@ impl Diagnostics {
     }
 
     /// Whether something that could not be read may be missing at a place.
-    pub(crate) fn is_open(&self, place: Place) -> bool {
+    pub fn is_open(&self, place: Place) -> bool {
         self.open || self.gaps.hold(place)
     }
 

@@ -36,7 +36,7 @@ pub fn listed(all: impl IntoIterator<Item = impl Display>, most: usize) -> Strin
 }
 
 /// Names of a graph in a sentence, the first twelve of many: `` `a`, `b` ``; `nothing` where there is none.
-pub(crate) fn names(known: impl IntoIterator<Item: AsRef<str>>) -> String {
+pub fn names(known: impl IntoIterator<Item: AsRef<str>>) -> String {
     let quoted = known.into_iter().map(|name| format!("`{}`", name.as_ref()));
     let names = listed(quoted, 12);
     if names.is_empty() {

@@ -13,7 +13,7 @@ mod render;
 
 pub use codes::{CODES, Code, explain};
 pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
-pub(crate) use counted::names;
+pub use counted::names;
 pub use counted::{count, counted, listed};
 pub use digits::digits;
 pub use names::Names;

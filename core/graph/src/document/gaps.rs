@@ -8,7 +8,7 @@ use crate::diagnostic::{Place, SourceId};
 
 /// What may be missing in a file, since a mistake in its form has been told.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Gaps {
+pub struct Gaps {
     /// Anything may be missing: names, and keys of all that has one.
     pub(super) anywhere: bool,
     /// Where keys may be missing.

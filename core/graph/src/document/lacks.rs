@@ -71,7 +71,7 @@ impl Lacks {
     }
 
     /// What a value that is found in the place of a list of tables lacks.
-    pub(crate) fn for_tables(found: &Data) -> Option<Self> {
+    pub fn for_tables(found: &Data) -> Option<Self> {
         matches!(found, Data::Table(_)).then(|| Self::Brackets {
             around: "{ … }".to_owned(),
         })

@@ -19,17 +19,17 @@ mod tree;
 
 pub use declare::declare;
 #[cfg(feature = "testkit")]
-pub(crate) use declare::is_name;
-pub(crate) use declare::{TIME_UNITS, is_misspelt, known_keys};
+pub use declare::is_name;
+pub use declare::{TIME_UNITS, is_misspelt, known_keys};
 pub use decode::{Decoded, decode};
-pub(crate) use decode::{LeftOut, Wanted, decode_part, decode_rest};
+pub use decode::{LeftOut, Wanted, decode_part, decode_rest};
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
 };
 pub use json::JsonError;
 pub use lacks::Lacks;
 pub use problem::DocumentProblem;
-pub(crate) use read::unreadable;
+pub use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};
 pub use slip::Slip;
 pub use tree::{Data, Entry, Table, Value};

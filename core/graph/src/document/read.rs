@@ -427,7 +427,7 @@ fn not_read(
 }
 
 /// Why a file cannot be read, in words.
-pub(crate) fn unreadable(error: &io::Error) -> String {
+pub fn unreadable(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),

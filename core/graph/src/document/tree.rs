@@ -36,7 +36,7 @@ pub enum Data {
 
 impl Data {
     /// Whether it is a number of either sort.
-    pub(crate) fn is_number(&self) -> bool {
+    pub fn is_number(&self) -> bool {
         matches!(self, Self::Integer(_) | Self::Float(_))
     }
 }

@@ -15,7 +15,7 @@ pub use interval::IntervalScore;
 pub use table::{RESTRICTS, Score, Scores, hide_much, if_few};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
 pub use unscored::Unscored;
-pub(crate) use watch::{Prediction, Watch};
+pub use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};

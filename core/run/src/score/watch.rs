@@ -12,7 +12,7 @@ use crate::time::{Duration, Instant};
 
 /// Everything scored of one plan.
 #[derive(Debug)]
-pub(crate) struct Watch {
+pub struct Watch {
     pub(crate) truths: Vec<Truth>,
     pub(super) tallies: Vec<Tally>,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Truth {
 
 /// A predicted channel.
 #[derive(Debug)]
-pub(crate) struct Prediction {
+pub struct Prediction {
     pub(crate) slot: usize,
     pub(crate) node: usize,
     pub(crate) ahead: Duration,

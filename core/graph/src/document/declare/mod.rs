@@ -18,10 +18,10 @@ use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
 #[cfg(feature = "testkit")]
-pub(crate) use names::is_name;
+pub use names::is_name;
 use reading::text;
-pub(crate) use reading::{is_misspelt, known_keys};
-pub(crate) use time_base::UNITS as TIME_UNITS;
+pub use reading::{is_misspelt, known_keys};
+pub use time_base::UNITS as TIME_UNITS;
 
 const SECTIONS: [&str; 15] = [
     "schema",

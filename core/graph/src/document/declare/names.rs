@@ -67,7 +67,7 @@ pub(super) fn name_rule(
 }
 
 /// Whether something may be called so.
-pub(crate) fn is_name(name: &str, digit_first: bool) -> bool {
+pub fn is_name(name: &str, digit_first: bool) -> bool {
     let mut characters = name.chars();
     let first = characters.next();
     first.is_some_and(|c| c.is_alphabetic() || digit_first && c.is_ascii_digit())

@@ -8,7 +8,7 @@ use crate::quantity::{Quantity, QuantityError};
 use crate::time::Duration;
 
 /// Reports every key of `table` that is not `known`.
-pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
+pub fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
     for (key, entry) in table.iter().filter(|(key, _)| !known.contains(key)) {
         let known = known.iter().map(|key| (*key).to_owned()).collect();
         diagnostics.report(
@@ -23,7 +23,7 @@ pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics:
 }
 
 /// Whether a key that is missing is there under a name that [`known_keys`] tells to be none.
-pub(crate) fn is_misspelt(table: &Table, key: &str, known: &[&str]) -> bool {
+pub fn is_misspelt(table: &Table, key: &str, known: &[&str]) -> bool {
     !table.contains(key) && meant(table, key, known).is_some()
 }
 

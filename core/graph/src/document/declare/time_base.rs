@@ -14,7 +14,8 @@ const SECOND: Duration = Duration::from_ns(1_000_000_000);
 /// What `unit` may be, beside the units of time.
 const SAMPLE: &str = "sample";
 const RFC_3339: &str = "rfc3339";
-pub(crate) const UNITS: [&str; 11] = [
+/// What `unit` of `[time]` may be.
+pub const UNITS: [&str; 11] = [
     "ns", "us", "\u{b5}s", "\u{3bc}s", "ms", "s", "min", "h", "d", SAMPLE, RFC_3339,
 ];
 

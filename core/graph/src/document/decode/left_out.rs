@@ -27,27 +27,27 @@ impl<T> Decoded<T> {
     }
 
     /// The same of a reference.
-    pub(crate) fn as_whole(&self) -> Option<&T> {
+    pub fn as_whole(&self) -> Option<&T> {
         self.is_whole().then_some(&self.value)
     }
 
     /// The value with defaults and stand-ins for what was left out, once for each choice that may stand where one could not be read.
-    pub(crate) fn readings(&self) -> impl Iterator<Item = &T> {
+    pub fn readings(&self) -> impl Iterator<Item = &T> {
         std::iter::once(&self.value).chain(&self.others)
     }
 
     /// The first of these, and whether what it has under a key is what stands there.
-    pub(crate) fn sure(&self) -> (&T, impl Fn(&str) -> bool) {
+    pub fn sure(&self) -> (&T, impl Fn(&str) -> bool) {
         (&self.value, |key: &str| !self.left_out.explains(key))
     }
 
     /// What was left out.
-    pub(crate) fn left_out(&self) -> &LeftOut {
+    pub fn left_out(&self) -> &LeftOut {
         &self.left_out
     }
 
     /// The same with other values.
-    pub(crate) fn map<U>(self, of: impl Fn(T) -> U) -> Decoded<U> {
+    pub fn map<U>(self, of: impl Fn(T) -> U) -> Decoded<U> {
         let others = self.others.into_iter().map(&of).collect();
         Decoded::of(of(self.value), others, self.left_out)
     }
@@ -75,7 +75,7 @@ impl LeftOut {
 
     /// Whether what is said of the value at `path`, such as `solver.alpha`, may only follow from what was left out: from
     /// the value itself, or from one above or below it.
-    pub(crate) fn explains(&self, path: &str) -> bool {
+    pub fn explains(&self, path: &str) -> bool {
         let on_the_way =
             |left_out: &Vec<String>| path.split('.').zip(left_out).all(|(a, b)| a == b);
         self.0.iter().any(on_the_way)

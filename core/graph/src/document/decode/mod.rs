@@ -32,7 +32,7 @@ pub fn decode<T: DeserializeOwned>(
 }
 
 /// As [`decode`], with what could be read beside mistakes.
-pub(crate) fn decode_part<T: DeserializeOwned>(
+pub fn decode_part<T: DeserializeOwned>(
     value: &Value,
     what: &str,
     diagnostics: &mut Diagnostics,
@@ -41,11 +41,11 @@ pub(crate) fn decode_part<T: DeserializeOwned>(
 }
 
 /// What to write under a key of the table that is decoded, where the table's owner knows it.
-pub(crate) type Advice<'a> = &'a dyn Fn(Wanted<'_>) -> Option<String>;
+pub type Advice<'a> = &'a dyn Fn(Wanted<'_>) -> Option<String>;
 
 /// What advice is wanted on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Wanted<'a> {
+pub enum Wanted<'a> {
     /// A key that is missing.
     Key(&'a str),
     /// A key under which something else stands in the place of a table.
@@ -56,7 +56,7 @@ pub(crate) enum Wanted<'a> {
 
 /// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one, with what to write where one of
 /// its own is missing or no table, and with what could be read beside mistakes.
-pub(crate) fn decode_rest<T: DeserializeOwned>(
+pub fn decode_rest<T: DeserializeOwned>(
     value: &Value,
     what: &str,
     elsewhere: &[&str],
