@@ -17,11 +17,11 @@
 
 pub use athermal_core as core;
 pub use athermal_core::engine::{Engine, EngineError};
+pub use athermal_core::time::{Duration, Instant};
+pub use athermal_files as files;
 pub use athermal_run as run;
 pub use athermal_run::model::{Model, ModelError};
 pub use athermal_trial as trial;
-pub use athermal_core::time::{Duration, Instant};
-pub use athermal_files as files;
 
 #[macro_use]
 mod output;

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
-use athermal::trial::fault::FaultError;
+use athermal::files::FileError;
 use athermal::run::fit::FitError;
 use athermal::run::live::RunError;
-use athermal::files::FileError;
+use athermal::trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;

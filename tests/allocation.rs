@@ -9,8 +9,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::kinds;
+use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::Table;
 use athermal::{Duration, Instant, Model};
 use workbench::graphs;

@@ -9,11 +9,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use athermal::Model;
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{RoleName, kinds};
-use athermal::run::score::trace;
 use athermal::diagnosis::comparison::{Comparison, Contender, compare};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::score::trace;
 use serde_json::Value;
 use workbench::{Scratch, athermal, data, graph, graphs, simulated};
 

@@ -7,9 +7,9 @@ mod workbench;
 use std::path::Path;
 
 use athermal::Model;
-use athermal::run::fit::{FitOptions, fit};
 use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
+use athermal::run::fit::{FitOptions, fit};
 use workbench::{Read, data};
 
 fn facts(graph: &str, data: &Path) -> Facts {

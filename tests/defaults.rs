@@ -12,10 +12,10 @@ mod workbench;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
-use athermal::run::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::score::{ScoreOptions, score};
 use workbench::{Scratch, data, graph};
 
 /// Baselines themselves, and what goes by states whose limits have no default.

@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
+use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Recording, Table};
-use athermal::files::{Dataset, Options};
 use athermal::{Engine, Model};
 use workbench::{Scratch, athermal, athermal_fed, graph, simulated};
 

@@ -8,8 +8,8 @@ mod workbench;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Figure, Predictor, TrainingError, TrainingReport};
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs};

@@ -8,9 +8,9 @@ mod workbench;
 use std::fmt::Write;
 
 use athermal::Model;
-use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 use workbench::{Scratch, athermal};
 
 /// They choose among products of features, and do not say which of them are alike.

@@ -9,8 +9,8 @@ use std::process::Command;
 
 use athermal::Model;
 use athermal::run::fit::{FitOptions, fit};
-use athermal::trial::machine::{Setup, Simulated, machine, machines};
 use athermal::run::score::{ScoreOptions, score};
+use athermal::trial::machine::{Setup, Simulated, machine, machines};
 use workbench::Folder;
 
 impl Folder {

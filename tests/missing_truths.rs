@@ -6,8 +6,8 @@ mod workbench;
 
 use std::sync::Arc;
 
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::TrainingReport;
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 use serde_json::Value;
 use workbench::{own_oracle, plan, regression, secs};

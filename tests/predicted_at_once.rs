@@ -9,9 +9,9 @@ use std::sync::Arc;
 use athermal::Engine;
 use athermal::core::channel::ABSENT;
 use athermal::core::compile::PlannedRole;
-use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
+use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::Table;
 use workbench::{Bench, linear, plan, secs, slot};
 

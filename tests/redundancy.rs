@@ -10,9 +10,9 @@ use std::sync::{Arc, OnceLock};
 
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fitted;
+use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Table};
-use athermal::files::{Dataset, Options};
 use athermal::{Engine, Model};
 use workbench::{data, graph, slot};
 

@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
+use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::score::{Score, ScoreOptions, score};
-use athermal::files::{Dataset, Options};
 use workbench::{data, graph};
 
 /// A figure may be worse than the reference by this share, and better by any.

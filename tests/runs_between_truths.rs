@@ -4,11 +4,11 @@
 
 mod workbench;
 
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{
     Estimator, InputPort, Predictor, Regressors, Runs, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 use athermal::{Duration, Instant};
 use schemars::JsonSchema;

@@ -10,11 +10,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::compile::{Plan, Wanted};
-use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
+use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::Table;
 use athermal::run::score::{Score, ScoreOptions, score};
-use athermal::files::{Dataset, Options};
 use athermal::{Engine, Instant};
 use workbench::{Bench, Read, Scratch, athermal, data, plan, problems, secs, slot};
 

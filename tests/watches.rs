@@ -7,9 +7,9 @@ mod workbench;
 use std::path::Path;
 
 use athermal::Model;
+use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Table};
-use athermal::files::{Dataset, Options};
 use workbench::{Scratch, data, graph};
 
 /// When the machine begins to drift otherwise, in s.

@@ -12,8 +12,8 @@ use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Disk, declare, load_text};
 use athermal::run::fit::{FitOptions, fit};
-use athermal::trial::machine::{Machine, Row, Setup, Simulation};
 use athermal::run::recording::Table;
+use athermal::trial::machine::{Machine, Row, Setup, Simulation};
 use athermal::{Instant, Model};
 
 /// One tick: temperatures, then six positions, NaN where there is none.

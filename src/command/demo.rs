@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::run::fit::FitOptions;
-use athermal::trial::machine::{Setup, Simulated, machine};
 use athermal::run::score::{Score, ScoreOptions, Scores, score};
+use athermal::trial::machine::{Setup, Simulated, machine};
 use clap::Args;
 use serde_json::json;
 

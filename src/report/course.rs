@@ -7,12 +7,12 @@ use std::sync::Arc;
 use athermal_control::Stability;
 use athermal_core::compile::{Entry, Plan, PlannedRole};
 use athermal_core::engine::{Engine, EngineError};
-use athermal_run::model::{Model, Period};
 use athermal_core::quantity::Quantity;
-use athermal_run::recording::{Event, Recording};
-use athermal_run::score::{PredictionTrace, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
+use athermal_run::model::{Model, Period};
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::{PredictionTrace, Trace, TruthTrace};
 use serde::{Serialize, Serializer};
 
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};

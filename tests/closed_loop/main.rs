@@ -8,8 +8,8 @@ mod workbench;
 
 use std::path::Path;
 
-use athermal::trial::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use athermal::core::prng::Prng;
+use athermal::trial::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use looped::{Looped, output};
 use workbench::{Scratch, athermal, graph, simulated};
 

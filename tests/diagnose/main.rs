@@ -12,15 +12,15 @@ mod workbench;
 
 use std::sync::Arc;
 
-use athermal::run::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
-use athermal::run::recording::{Event, Table};
-use athermal::run::score::trace;
 use athermal::diagnosis::{
     Options, day, diagnose, observe, regressor, residual, response, sensor, window,
 };
 use athermal::files::Dataset;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
+use athermal::run::score::trace;
 use athermal::{Duration, Instant, Model};
 use workbench::{Scratch, graph, linear, secs, simulated};
 

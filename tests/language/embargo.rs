@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
+use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Recording, Table};
 use athermal::run::score::{ScoreOptions, score};
-use athermal::files::{Dataset, Options};
 use athermal::{Engine, Instant};
 
 use super::workbench::{Bench, data, linear, plan, slot};

@@ -7,15 +7,15 @@ use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Memory, declare, load_text};
 use athermal::core::engine::Fitted;
-use athermal::run::fit::{FitOptions, FitProgress, FitReport, fit};
-use athermal::run::model::Model;
 use athermal::core::node::{
     Encoder, Estimator, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs,
     Predictor, Regressors, Tick, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal::run::recording::{Event, Table};
 use athermal::core::time::Duration;
 use athermal::core::unit::Unit;
+use athermal::run::fit::{FitOptions, FitProgress, FitReport, fit};
+use athermal::run::model::Model;
+use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use athermal::run::fit::{FitOptions, FitProgress, Outcome, fit};
 use athermal::core::node::Figure;
+use athermal::run::fit::{FitOptions, FitProgress, Outcome, fit};
 use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 

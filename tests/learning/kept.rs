@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use athermal::core::engine::Engine;
-use athermal::run::live::{LiveOptions, Notice, pair};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
+use athermal::run::live::{LiveOptions, Notice, pair};
 use athermal::{Instant, Model};
 
 use crate::workbench::{Scratch, secs};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::engine::{Engine, Fitted};
-use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::core::prng::Prng;
+use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 
 use crate::workbench::{plan, secs};

@@ -1,8 +1,8 @@
 //! The course of a replacement: a sensor out and a voter in, a shadow that refuses or admits, the way back.
 
 use athermal::core::engine::Carry;
-use athermal::run::live::{Control, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::core::prng::Prng;
+use athermal::run::live::{Control, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::{Instant, Model};
 
 use super::model::{d, model, s};

@@ -4,8 +4,8 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::run::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::core::node::Predictor;
+use athermal::run::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 
 /// The numbers of a table, line by line, without its header.

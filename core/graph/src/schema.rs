@@ -1,7 +1,5 @@
 //! How durations, units and quantities describe themselves in the JSON Schema of graph files.
 
-
-
 use std::borrow::Cow;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};

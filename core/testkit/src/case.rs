@@ -38,7 +38,7 @@ pub struct Case {
 
 /// What a port is fed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Given {
+pub struct Given {
     pub(super) port: String,
     pub(super) channels: usize,
     pub(super) unit: String,

@@ -13,7 +13,7 @@ pub(super) struct Course {
 }
 
 /// What a slot was given at a tick; none where the node did not run.
-pub(super) type Given = Option<(f64, Instant)>;
+pub type Given = Option<(f64, Instant)>;
 
 impl Course {
     /// Writes down what the engine's last tick gave.

@@ -80,9 +80,8 @@ pub mod __private {
 }
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, prng, quantity, time, unit};
+use athermal_core::{channel, compile, diagnostic, document, engine, node, prng, time, unit};
 use athermal_run::{fit, model, recording};
-use athermal_trial::machine;
 
 inventory::collect!(Examined);
 

@@ -4,10 +4,10 @@ use std::fmt;
 
 use super::tried::{PANICS, tried};
 use crate::document::is_name;
-use crate::machine::{
+use crate::unit::Unit;
+use athermal_trial::machine::{
     Channel, LONGEST_DAYS, Machine, Row, Schedule, Setup, SetupError, Simulation, machines,
 };
-use crate::unit::Unit;
 
 /// How many days of a machine are looked at.
 const DAYS: f64 = 0.5;

@@ -9,16 +9,16 @@ use athermal_core::compile::{Plan, Wanted, compile_part};
 use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_core::document::{Memory, declare, load_text};
 use athermal_core::engine::{Engine, EngineError, Fitted};
-use athermal_run::fit::{FitOptions, Outcome, fit};
-use athermal_run::live::{LiveOptions, StageError, pair};
-use athermal_run::model::Model;
 use athermal_core::node::{
     Encoder, Estimator, Feature, InputPort, Inputs, Learns, Mistake, Operator, OutputPort, Outputs,
     Predictor, Reach, Regressors, Runs, Tick, Trained, Trainer, TrainingError, TrainingReport,
     TrainingSetup, TruthLags,
 };
-use athermal_run::recording::Table;
 use athermal_core::time::{Duration, Instant};
+use athermal_run::fit::{FitOptions, Outcome, fit};
+use athermal_run::live::{LiveOptions, StageError, pair};
+use athermal_run::model::Model;
+use athermal_run::recording::Table;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

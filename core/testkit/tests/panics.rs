@@ -4,11 +4,11 @@
 
 use std::process::Command;
 
-use athermal_run::model::Model;
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
 };
 use athermal_core::time::Instant;
+use athermal_run::model::Model;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

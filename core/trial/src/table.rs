@@ -13,7 +13,7 @@ use crate::time::Duration;
 #[derive(Debug, JsonSchema)]
 #[schemars(rename = "Test", deny_unknown_fields)]
 #[allow(dead_code)] // the shape of the whole, for the schema; its parts are decoded one by one
-pub(crate) struct TestTable {
+pub struct TestTable {
     /// What the test shows, as a sentence.
     name: String,
     /// The data that estimators are fitted on. Without it, what needs a fit gives nothing.

@@ -1,10 +1,10 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
-use athermal_run::model::{number, number_or_none, numbers};
 use athermal_core::node::{
     Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };
 use athermal_core::time::Instant;
+use athermal_core::{number, number_or_none, numbers};
 use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
 

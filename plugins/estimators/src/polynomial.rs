@@ -1,11 +1,11 @@
 //! The estimator with squares and products of features.
 
-use athermal_run::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
+use athermal_core::{number, numbers};
 use athermal_numerics::Standardizer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

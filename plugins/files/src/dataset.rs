@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
-use athermal_run::recording::{self, RecordingError, Rows};
 use athermal_core::time::{Duration, Instant};
+use athermal_run::recording::{self, RecordingError, Rows};
 
 use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, Row, TimeColumn, TimeForm};
 

@@ -1,8 +1,8 @@
 //! Files as source and sink of a run: rows in, rows out; what a row looks like is decided by reader and writer.
 
+use athermal_core::time::Instant;
 use athermal_run::live::{Frame, Samples, Sink, SinkError, Source, SourceError};
 use athermal_run::recording::Event;
-use athermal_core::time::Instant;
 
 use crate::{Reader, Row, Writer};
 

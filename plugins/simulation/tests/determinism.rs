@@ -3,11 +3,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+use athermal_simulation::{MACHINES, write_table};
 use athermal_trial::fault::{Fault, FaultKind, Faults};
 use athermal_trial::machine::{
     self, Faulty, Machine, Row, SECOND_NS, Schedule, Setup, SetupError, Simulation,
 };
-use athermal_simulation::{MACHINES, write_table};
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
     machine::machine(name).ok().map(|known| known.machine)

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal_trial::machine::{self, Machine, Row, SECOND_NS, Setup};
 use athermal_simulation as _;
+use athermal_trial::machine::{self, Machine, Row, SECOND_NS, Setup};
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
     machine::machine(name).ok().map(|known| known.machine)

@@ -87,7 +87,12 @@ pub(super) fn manifest(wishes: &[Wish], checkout: &Checkout, registry: bool) -> 
         ("athermal-testkit", "core/testkit"),
         ("athermal-numerics", "core/numerics"),
     ]
-    .map(|(name, folder)| format!("{name} = {{ path = {} }}\n", in_toml(&checkout.folder().join(folder))))
+    .map(|(name, folder)| {
+        format!(
+            "{name} = {{ path = {} }}\n",
+            in_toml(&checkout.folder().join(folder))
+        )
+    })
     .concat();
     let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
     let patch = format!(

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use athermal::trial::machine::machines;
 use athermal::core::node::kinds;
+use athermal::trial::machine::machines;
 use clap::Args;
 use serde_json::json;
 

@@ -150,7 +150,12 @@ pub fn files(names: &Names, role: Role, athermal: &Athermal<'_>) -> Vec<(String,
             return (path, text);
         }
         let mut words = vec![("VERSION", athermal.version)];
-        words.extend(athermal.crates.iter().map(|(word, folder)| (*word, folder.as_str())));
+        words.extend(
+            athermal
+                .crates
+                .iter()
+                .map(|(word, folder)| (*word, folder.as_str())),
+        );
         words.push(("ATHERMAL", &athermal.folder));
         (path, put(&text, &words))
     });
@@ -315,7 +320,8 @@ mod tests {
         for role in ROLES {
             for (path, text) in files(&names, role, &athermal) {
                 for left in [
-                    "my_node", "my-node", "MyNode", "CORE", "RUN", "TRIAL", "TESTKIT", "VERSION", "ATHERMAL",
+                    "my_node", "my-node", "MyNode", "CORE", "RUN", "TRIAL", "TESTKIT", "VERSION",
+                    "ATHERMAL",
                 ] {
                     assert!(!path.contains(left), "{left} in {path}");
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");

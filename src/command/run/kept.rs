@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
+use athermal::files::Reader;
 use athermal::run::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::run::recording::Event;
-use athermal::files::Reader;
 use athermal::{Engine, Instant, Model};
 use serde_json::json;
 

@@ -3,9 +3,9 @@
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
+use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 use athermal::run::live::{Feed, Samples, Source, SourceError};
 use athermal::run::recording::Event;
-use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 
 use serde_json::json;
 

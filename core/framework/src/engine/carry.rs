@@ -75,7 +75,7 @@ pub enum Carry {
 
 impl Heritage {
     /// All of a plan, in itself.
-    pub(crate) fn all(plan: &Plan) -> Self {
+    pub fn all(plan: &Plan) -> Self {
         Self {
             nodes: vec![Begin::AsItWas; plan.nodes.len()],
             slots: vec![true; plan.channels.len()],

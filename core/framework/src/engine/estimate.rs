@@ -329,7 +329,7 @@ impl Estimate {
 
     /// Asks for the prediction from any values.
     #[cfg(feature = "testkit")]
-    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+    pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);
         if let Some(learning) = &self.learning {

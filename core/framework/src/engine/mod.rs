@@ -45,8 +45,8 @@ pub use carry::Heritage;
 pub use gather::Gathered;
 pub use history::{Cursor, History};
 #[cfg(feature = "testkit")]
-pub(crate) use idle::Answer;
-pub(crate) use slots::{Given, Slots};
+pub use idle::Answer;
+pub use slots::{Given, Slots};
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};

@@ -135,7 +135,7 @@ impl Vote {
 
     /// The answer to any votes.
     #[cfg(feature = "testkit")]
-    pub(crate) fn answer(&self, votes: &[f64]) -> Answer {
+    pub fn answer(&self, votes: &[f64]) -> Answer {
         let mut weights = vec![f64::NAN; votes.len()];
         self.combine.weights(Votes(votes), &mut weights);
         Answer {

@@ -6,8 +6,8 @@ use crate::time::Instant;
 
 /// What a pass over a recording met.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Passed {
-    pub(crate) ticks: u64,
+pub struct Passed {
+    pub ticks: u64,
     pub(crate) segments: u64,
     pub(crate) period: Option<(Instant, Instant)>,
 }
@@ -15,7 +15,7 @@ pub(crate) struct Passed {
 /// Steps an engine through a recording. `look` is told of each tick that has been stepped, and of each segment break.
 ///
 /// A tick that the engine refuses is counted by it and passed over.
-pub(crate) fn drive(
+pub fn drive(
     engine: &mut Engine,
     recording: &dyn Recording,
     mut look: impl FnMut(&Engine, Event),

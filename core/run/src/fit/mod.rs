@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub use progress::FitProgress;
 pub use report::{Dropped, EstimatorFit, FitError, FitReport, Outcome};
 
-pub(crate) use drive::drive;
+pub use drive::drive;
 
 use crate::compile::Plan;
 use crate::engine::Fitted;

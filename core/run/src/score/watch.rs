@@ -13,33 +13,40 @@ use crate::time::{Duration, Instant};
 /// Everything scored of one plan.
 #[derive(Debug)]
 pub struct Watch {
-    pub(crate) truths: Vec<Truth>,
+    /// The truths that are predicted.
+    pub truths: Vec<Truth>,
     pub(super) tallies: Vec<Tally>,
 }
 
 /// A truth and all predictions of it.
 #[derive(Debug)]
-pub(crate) struct Truth {
+pub struct Truth {
     pub(crate) slot: usize,
     /// The slot of its standard error, where its node gives one.
     error_slot: Option<usize>,
-    pub(crate) values: Vec<f64>,
+    /// Its values, in the order of time.
+    pub values: Vec<f64>,
     pub(crate) errors: Vec<f64>,
     /// When the last one of the segment was measured, and how long after the one before each was.
     last: Option<Instant>,
     between: Vec<Duration>,
-    pub(crate) predictions: Vec<Prediction>,
-    pub(crate) persistences: BTreeMap<Duration, Persistence>,
+    /// What predicts it.
+    pub predictions: Vec<Prediction>,
+    /// Persistence for each horizon.
+    pub persistences: BTreeMap<Duration, Persistence>,
 }
 
 /// A predicted channel.
 #[derive(Debug)]
 pub struct Prediction {
-    pub(crate) slot: usize,
+    /// Its slot.
+    pub slot: usize,
     pub(crate) node: usize,
-    pub(crate) ahead: Duration,
+    /// Its horizon.
+    pub ahead: Duration,
     pairing: Pairing,
-    pub(crate) values: Vec<f64>,
+    /// What was predicted for each value of the truth; NaN where nothing was.
+    pub values: Vec<f64>,
     /// At how many ticks it was there.
     pub(super) given: u64,
     /// Where its intervals come from, if it has any.
@@ -51,7 +58,7 @@ pub struct Prediction {
 /// The newest truth that a prediction of one horizon may read in a mode: in one step that at the smallest lag that sees
 /// nothing of the answer.
 #[derive(Debug)]
-pub(crate) struct Persistence {
+pub struct Persistence {
     lag: Duration,
     ahead: Duration,
     mode: Mode,
@@ -60,11 +67,13 @@ pub(crate) struct Persistence {
     history: History,
     cursor: Cursor,
     pairing: Pairing,
-    pub(crate) values: Vec<f64>,
+    /// The persisted value for each value of the truth; NaN where there is none.
+    pub values: Vec<f64>,
 }
 
 impl Watch {
-    pub(crate) fn new(plan: &Plan, mode: Mode) -> Self {
+    /// Watches all that a plan predicts.
+    pub fn new(plan: &Plan, mode: Mode) -> Self {
         let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
             let (Some(of), Some(node)) = (channel.predicts, channel.node) else {
@@ -107,7 +116,7 @@ impl Watch {
     }
 
     /// Looks at what a tick did.
-    pub(crate) fn look(&mut self, engine: &Engine, event: Event) {
+    pub fn look(&mut self, engine: &Engine, event: Event) {
         for truth in &mut self.truths {
             match event {
                 Event::Row(now) => truth.look(engine, now),

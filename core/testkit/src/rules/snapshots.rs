@@ -51,7 +51,7 @@ struct Foreign {
     numbers: Vec<f64>,
 }
 
-crate::state!(Foreign, "testkit/1");
+athermal_core::state!(Foreign, "testkit/1");
 
 /// The name of a state, as it stands in a snapshot.
 #[derive(Deserialize)]

@@ -4,8 +4,8 @@ use athermal_core::node::{
     Encoder, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Predictor, Tick,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_testkit::{Case, Rule};
 use athermal_core::unit::Unit;
+use athermal_testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -115,7 +115,7 @@ fn share_of(inputs: &Inputs) -> Vec<OutputPort> {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Largest {
     uses: Vec<String>,
-    #[serde(with = "athermal_core::")]
+    #[serde(with = "athermal_core::number")]
     largest: f64,
 }
 

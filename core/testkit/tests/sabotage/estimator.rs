@@ -6,8 +6,8 @@ use athermal_core::node::{
     Estimator, InputPort, Learner, LinearForm, Mistake, Predictor, Regressors, Restored, State,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_testkit::{Case, Rule};
 use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -9,9 +9,9 @@ use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
 };
-use athermal_testkit::{Bench, Case, Rule};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
+use athermal_testkit::{Bench, Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! A combiner that goes by how long ago something was, and forgets that a break is no time.
 
 use athermal_core::node::{Combine, Combiner, InputPort, Votes};
-use athermal_testkit::{Case, Rule};
 use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

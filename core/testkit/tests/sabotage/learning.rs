@@ -4,8 +4,8 @@ use athermal_core::node::{
     Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored, State,
     Trained, TrainedRange, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_testkit::{Case, Rule, broken};
 use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule, broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

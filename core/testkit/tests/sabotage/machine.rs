@@ -2,11 +2,11 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use athermal_core::prng::Prng;
+use athermal_testkit::{assert_every_machine_conforms, broken_machine};
 use athermal_trial::machine::{
     Channel, Machine, Row, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
-use athermal_core::prng::Prng;
-use athermal_testkit::{assert_every_machine_conforms, broken_machine};
 
 /// A plate that follows what it is set to, and an axis that grows with it.
 struct Plate(Fault);

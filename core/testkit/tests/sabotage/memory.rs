@@ -6,8 +6,8 @@ use athermal_core::node::{
     Combine, Combiner, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach,
     Restored, State, Tick, Votes,
 };
-use athermal_testkit::{Case, Rule};
 use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

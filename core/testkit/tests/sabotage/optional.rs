@@ -110,9 +110,7 @@ fn a_port_that_no_case_connects_is_connected() {
 
 #[test]
 fn a_case_that_connects_a_port_is_enough() {
-    let broken = athermal_testkit::broken::<Offset>(&[
-        with("none"),
-        with("none").input("offset", 2, "nm"),
-    ]);
+    let broken =
+        athermal_testkit::broken::<Offset>(&[with("none"), with("none").input("offset", 2, "nm")]);
     assert_eq!(broken, []);
 }

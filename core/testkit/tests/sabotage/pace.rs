@@ -4,8 +4,8 @@ use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
 };
-use athermal_testkit::{Case, Rule};
 use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,8 +3,8 @@
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
 };
-use athermal_testkit::Case;
 use athermal_core::unit::Unit;
+use athermal_testkit::Case;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
