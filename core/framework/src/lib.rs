@@ -81,7 +81,7 @@
 //! | the same, learned from a truth: an encoder | [`node::Feature`] with [`node::Encoder`] |
 //! | a prediction, fitted on history | [`node::Estimator`] |
 //! | one prediction of several | [`node::Combiner`] |
-//! | where samples come from | [`live::Source`] |
+//! | where samples come from | [`recording::Source`] |
 //! | where outputs go | [`live::Sink`] |
 //! | a simulated machine | [`machine::Machine`] |
 //!
@@ -112,9 +112,7 @@ pub mod node;
 pub mod prng;
 
 // The vocabulary that a graph is written in; authors of nodes need one crate.
-pub use athermal_graph::{
-    channel, diagnostic, document, number, number_or_none, numbers, quantity, time, unit,
-};
+pub use athermal_graph::{channel, diagnostic, document, quantity, time, unit};
 
 #[doc(hidden)]
 pub use inventory;

@@ -6,7 +6,6 @@
 //! |---|---|
 //! | [`diagnostic`] | how a mistake in a file is reported: code, place, reason, a way out |
 //! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
-//! | [`number`], [`numbers`], [`number_or_none`] | numbers in JSON that read back to the last bit, infinite ones and NaN among them |
 //! | [`document`] | a file, with what it extends, as a tree with places, expanded into declarations |
 //!
 //! A reader begins with [`document::load`](document), and follows one table of the file into the declaration that it becomes.
@@ -15,9 +14,6 @@ pub mod channel;
 mod decimal_comma;
 pub mod diagnostic;
 pub mod document;
-pub mod number;
-pub mod number_or_none;
-pub mod numbers;
 pub mod quantity;
 mod schema;
 pub mod time;

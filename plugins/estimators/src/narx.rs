@@ -5,8 +5,8 @@ use athermal_core::node::{
     Regressors, SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
     TruthLags,
 };
+use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
-use athermal_core::{number, numbers};
 use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,8 @@
 use athermal_core::node::{
     Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };
+use athermal_core::node::{number, number_or_none, numbers};
 use athermal_core::time::Instant;
-use athermal_core::{number, number_or_none, numbers};
 use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
 

@@ -4,8 +4,8 @@ use athermal_core::node::{
     Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
+use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
-use athermal_core::{number, numbers};
 use athermal_numerics::Standardizer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

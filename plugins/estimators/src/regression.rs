@@ -4,7 +4,7 @@ use athermal_core::node::{
     Coefficients, LinearForm, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer,
     TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_core::{number, numbers};
+use athermal_core::node::{number, numbers};
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, PredictionVariance, Sgd,
     SgdOptions, Standardization,

@@ -2,7 +2,7 @@
 
 use athermal_core::diagnostic::count;
 use athermal_core::node::{Mistake, TrainingReport};
-use athermal_core::{number, numbers};
+use athermal_core::node::{number, numbers};
 use serde::{Deserialize, Serialize};
 
 /// What each regressor varies about and how far, as a model file has it.

@@ -1,10 +1,10 @@
 //! One prediction of several, by weights that a fit has found.
 
+use athermal_core::node::numbers;
 use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, InputPort, Mistake, Of, Predictor, Regressors, Term,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_core::numbers;
 use athermal_numerics::{Gram, GramBlocks, NumericsError, non_negative_least_squares};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
 use athermal::files::Reader;
-use athermal::run::live::{Samples, Sink, SinkError, Source, SourceError};
-use athermal::run::recording::Event;
+use athermal::run::live::{Sink, SinkError};
+use athermal::run::recording::{Event, Samples, Source, SourceError};
 use athermal::{Engine, Instant, Model};
 use serde_json::json;
 
 use super::ran::Ran;
 use super::standing::Standing;
 use crate::command::aside::{not_written, whole_aside};
-use crate::figures::{count, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal, outside};
+use athermal_analysis::figures::{count, instant, length, seconds};
 
 /// How long a run that is killed may have learned in vain.
 const KEEP_EVERY: Duration = Duration::from_secs(60);

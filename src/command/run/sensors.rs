@@ -4,17 +4,17 @@
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
-use athermal::run::live::{Feed, Samples, Source, SourceError};
-use athermal::run::recording::Event;
+use athermal::run::live::Feed;
+use athermal::run::recording::{Event, Samples, Source, SourceError};
 
 use serde_json::json;
 
 use super::rejected::Ranged;
 use crate::command::faults::{self, Looks, Purpose, of_standstill, places};
 use crate::command::model::few;
-use crate::figures::{count, instant, number, seconds, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{count, instant, number, seconds, time};
 
 /// So long, in s, a sensor is silent before that is told.
 const SILENT_S: f64 = 600.0;

@@ -3,8 +3,8 @@
 
 use athermal_core::compile::{PlannedNode, PlannedRole, TrainingLimits};
 use athermal_core::engine::{Engine, Pairing};
+use athermal_core::node::number_or_none;
 use athermal_core::node::{Of, Predictor};
-use athermal_core::number_or_none;
 use athermal_core::time::Instant;
 use athermal_numerics::{Collinearity, GramBlocks};
 use athermal_run::fit::FitError;
