@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use athermal::core::compile::Wanted;
-use athermal::core::score::{Lack, Score, ScoreOptions, score};
 use athermal::report;
+use athermal::run::score::{Lack, Score, ScoreOptions, score};
 use clap::Args;
 use serde_json::json;
 

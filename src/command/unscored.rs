@@ -1,6 +1,6 @@
 //! Warnings about predictions of which nothing is scored.
 
-use athermal::core::score::Unscored;
+use athermal::run::score::Unscored;
 
 use super::model::few;
 use crate::terminal::Terminal;

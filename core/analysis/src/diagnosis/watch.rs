@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 
 use athermal_core::compile::{Plan, SourceChannel};
-use athermal_core::live::Feed;
-use athermal_core::recording::{Event, Recording, RecordingError, Rows};
 use athermal_core::time::Instant;
+use athermal_run::live::Feed;
+use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -120,7 +120,7 @@ fn ends(leaps: &Leaps, stuck: &Standstill) -> bool {
 }
 
 impl Recording for FaultWatch<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let rows = self.recording.open(plan)?;
         let mut state = self.state.borrow_mut();
         if let State::Read(_) = *state {
@@ -277,16 +277,16 @@ impl WatchedChannel {
 }
 
 struct Looking<'a> {
-    rows: Box<dyn Rows + 'a>,
+    rows: Box<dyn Source + 'a>,
     state: &'a RefCell<State>,
 }
 
-impl Rows for Looking<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
-        let event = self.rows.next(values)?;
+impl Source for Looking<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = self.rows.next(samples)?;
         if let State::Read(looks) = &mut *self.state.borrow_mut() {
             match event {
-                Some(Event::Row(now)) => looks.row(now, values),
+                Some(Event::Row(now)) => looks.row(now, &samples.values),
                 Some(Event::Segment) => looks.interrupt(),
                 None => {}
             }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use athermal_core::score::{Score, Scores};
+use athermal_run::score::{Score, Scores};
 
 use crate::figures::{count, counted, number, or_dash, paragraph, stated, table};
 
