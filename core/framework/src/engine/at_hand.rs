@@ -23,7 +23,7 @@ enum When {
 impl<'a> AtHand<'a> {
     /// None yet, of a plan at an instant.
     #[inline]
-    pub(super) fn at(plan: &'a Plan, now: Instant) -> Self {
+    pub(crate) fn at(plan: &'a Plan, now: Instant) -> Self {
         Self {
             plan,
             when: When::Tick(now),
@@ -38,7 +38,7 @@ impl<'a> AtHand<'a> {
     }
 
     /// None yet, of a plan whose nodes are made or take their states back.
-    pub(super) fn at_start(plan: &'a Plan) -> Self {
+    pub(crate) fn at_start(plan: &'a Plan) -> Self {
         Self {
             plan,
             when: When::Start,
@@ -48,7 +48,7 @@ impl<'a> AtHand<'a> {
 
     /// From here on it is this one.
     #[inline]
-    pub(super) fn is(&mut self, node: usize) {
+    pub(crate) fn is(&mut self, node: usize) {
         self.node = node;
     }
 }

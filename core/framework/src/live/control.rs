@@ -12,7 +12,7 @@ use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
 use super::{LiveOptions, StageError, Stepper};
 use crate::compile::Plan;
-use crate::engine::{Engine, Heritage, NodeCarry};
+use crate::engine::{Engine, NodeCarry, StateTransfer};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
 
@@ -195,9 +195,10 @@ impl Control {
         });
         let carry = match &self.replica {
             Some(replica) => {
-                let heritage = Heritage::between(&replica.engine, &seated.engine, carry_learned);
+                let transfer =
+                    StateTransfer::between(&replica.engine, &seated.engine, carry_learned);
                 let state = replica.engine.state();
-                seated.engine.adopt(&state, &heritage, warmed)
+                seated.engine.adopt(&state, &transfer, warmed)
             }
             None => cold(&seated.engine, warmed),
         };

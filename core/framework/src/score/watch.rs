@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::evidence::Tally;
 use super::interval::Intervals;
 use crate::compile::{Plan, TruthLink, persistence_lag};
-use crate::engine::mode::{Step, times};
+use crate::engine::learning::{Step, times};
 use crate::engine::{Cursor, Engine, History, Mode, Pairing};
 use crate::recording::Event;
 use crate::time::{Duration, Instant};

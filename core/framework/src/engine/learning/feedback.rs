@@ -3,10 +3,11 @@
 
 use std::collections::VecDeque;
 
+use super::mode::Mode;
 use super::mode::{Step, times};
 use super::pairing::Pairing;
-use super::{Mode, Slots};
 use crate::compile::{Entry, TruthLink};
+use crate::engine::tick::Slots;
 use crate::time::{Duration, Instant};
 
 /// How many of the newest innovations that a prediction rests on count in its deviation.

@@ -3,16 +3,16 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::at_hand::AtHand;
 use super::estimate::{Estimate, fit_of};
-use super::learning::Learning;
 use super::vote::{Vote, Wires};
-use super::{EngineError, Fitted};
 use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
+use crate::engine::at_hand::AtHand;
+use crate::engine::learning::GatedLearner;
+use crate::engine::{EngineError, Fitted};
 use crate::node::{Inputs, Operator, Role};
 
 /// What runs a node, with all that a tick needs of its plan.
-pub(super) enum Running {
+pub(crate) enum NodeRunner {
     Operator {
         operator: Box<dyn Operator>,
         gathers: Box<[usize]>,
@@ -30,9 +30,9 @@ pub(super) enum Running {
     Vote(Box<Vote>),
 }
 
-impl Running {
+impl NodeRunner {
     /// How many regressors it reads as an estimator.
-    pub(super) fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         match self {
             Self::Estimate {
                 estimate: Some(estimate),
@@ -43,7 +43,7 @@ impl Running {
     }
 
     /// What goes on learning, of an estimator that does.
-    pub(super) fn learning(&mut self) -> Option<&mut Learning> {
+    pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
         match self {
             Self::Estimate { estimate, .. } => estimate.as_mut()?.learning(),
             _ => None,
@@ -51,12 +51,12 @@ impl Running {
     }
 
     /// Whether what it knows stays true whatever becomes of what it reads.
-    pub(super) fn outlives_changes(&self) -> bool {
+    pub(crate) fn outlives_changes(&self) -> bool {
         matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
     }
 
     /// The slot of the truth that it is told after all outputs.
-    pub(super) fn truth(&self) -> Option<usize> {
+    pub(crate) fn truth(&self) -> Option<usize> {
         match self {
             Self::Operator { .. } => None,
             Self::Estimate { estimate, .. } => {
@@ -72,7 +72,7 @@ impl Running {
 ///
 /// # Errors
 /// When something fitted does not belong to the plan.
-pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, EngineError> {
+pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
     let widths: Vec<_> = plan
         .gathers
         .iter()
@@ -108,7 +108,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                     }
                     _ => spec.build(inputs, wanted),
                 };
-                Running::Operator {
+                NodeRunner::Operator {
                     operator,
                     gathers: gathers.clone().into(),
                     every_tick: *every_tick,
@@ -128,7 +128,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                 let given = fitted.get(&node.instance());
                 used += usize::from(given.is_some());
                 let predictor = given.cloned().or_else(|| node.fixed().map(Arc::from));
-                Running::Estimate {
+                NodeRunner::Estimate {
                     estimate: predictor
                         .map(|p| Estimate::new(node, p, &widths))
                         .transpose()
@@ -167,7 +167,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                     beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
                 };
                 let vote = Vote::new(spec, wires, widths[*voters], *truth);
-                Running::Vote(Box::new(vote))
+                NodeRunner::Vote(Box::new(vote))
             }
             _ => unreachable!("a plan gives each node the role of its specification"),
         });

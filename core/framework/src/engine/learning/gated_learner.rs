@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use super::Mode;
-use super::gather::Gathered;
+use super::embargo::{DueTruth, Embargo};
+use super::mode::Mode;
 use super::mode::Step;
-use super::state::NodeState;
-use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
+use crate::engine::state::NodeState;
+use crate::engine::tick::Gathered;
 use crate::node::{Learner, LearningGate, LinearForm, Offered, Predictor, Restored};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
 #[derive(Debug)]
-pub(crate) struct Learning {
+pub(crate) struct GatedLearner {
     learner: Box<dyn Learner>,
-    withheld: Withheld,
+    withheld: Embargo,
     gate: Gate,
     freeze: Option<usize>,
     mode: Mode,
@@ -34,9 +34,9 @@ pub(crate) struct Learning {
 pub(crate) enum Became {
     /// It was learned from.
     Learned = 0,
-    /// Learning was frozen on command.
+    /// GatedLearner was frozen on command.
     FrozenOnCommand = 1,
-    /// Learning was frozen by a channel.
+    /// GatedLearner was frozen by a channel.
     FrozenByChannel = 2,
     /// It missed its prediction by too much.
     Outlier = 3,
@@ -48,7 +48,7 @@ pub(crate) enum Became {
     Incomplete = 6,
 }
 
-impl Learning {
+impl GatedLearner {
     /// Goes on from a fit; none for a predictor that stays as it was fitted.
     pub(crate) fn new(
         predictor: &Arc<dyn Predictor>,
@@ -64,7 +64,7 @@ impl Learning {
             learner,
             changed: false,
             // With each row stands whether learning was frozen at the run.
-            withheld: Withheld::new(truth, width + 1),
+            withheld: Embargo::new(truth, width + 1),
             freeze: planned.freeze,
             gate: Gate {
                 predictor: Arc::clone(predictor),
@@ -258,8 +258,8 @@ struct Gate {
 
 impl Gate {
     /// Lets a learner learn from a pair, unless something speaks against it.
-    fn offer(&mut self, learner: &mut dyn Learner, released: Released<'_>, frozen: f64) -> Became {
-        let Released {
+    fn offer(&mut self, learner: &mut dyn Learner, released: DueTruth<'_>, frozen: f64) -> Became {
+        let DueTruth {
             row,
             truth,
             arrived,
