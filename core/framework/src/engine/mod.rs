@@ -3,7 +3,7 @@
 //! Three rooms: [`tick`] computes, [`learning`] hands truths over when they may be known, [`state`] is what goes on in
 //! another engine. Sources and sinks are not known here.
 
-mod at_hand;
+mod at_work;
 mod error;
 #[cfg(feature = "testkit")]
 mod idle;
@@ -21,7 +21,7 @@ pub use sample_range::SampleRange;
 pub use state::{Carry, EngineState, Fnv1a, NodeCarry, RestoreError, fnv_1a, revision};
 pub use tick::{Cursor, History};
 
-pub(crate) use at_hand::{AtHand, FitAtHand};
+pub(crate) use at_work::{When, naming, naming_one};
 #[cfg(feature = "testkit")]
 pub(crate) use idle::Answer;
 pub(crate) use state::StateTransfer;
@@ -162,31 +162,32 @@ impl Engine {
             frozen,
             ..
         } = self;
-        let mut turn = TickContext {
-            now: time,
-            slots,
-            gathered,
-            row,
-            frozen: *frozen,
-            at_hand: AtHand::at(plan, time),
-        };
-        for work in work {
-            match work {
-                Work::Step(Step::Gather(gather)) => {
-                    turn.gathered[*gather].read(turn.slots, histories, time);
+        naming(plan, When::Tick(time), |at_work| {
+            let mut context = TickContext {
+                now: time,
+                slots,
+                gathered,
+                row,
+                frozen: *frozen,
+                at_work,
+            };
+            for work in work {
+                match work {
+                    Work::Step(Step::Gather(gather)) => {
+                        context.gathered[*gather].read(context.slots, histories, time);
+                    }
+                    Work::Step(Step::Run(node)) => {
+                        context.at_work.is(*node);
+                        context.run(&mut nodes[*node]);
+                    }
+                    Work::Step(Step::Capture(node)) => {
+                        context.at_work.is(*node);
+                        context.capture(&mut nodes[*node]);
+                    }
+                    Work::Bank(bank) => bank.run(&mut context, nodes),
                 }
-                Work::Step(Step::Run(node)) => {
-                    turn.at_hand.is(*node);
-                    turn.of(&mut nodes[*node]);
-                }
-                Work::Step(Step::Capture(node)) => {
-                    turn.at_hand.is(*node);
-                    turn.capture(&mut nodes[*node]);
-                }
-                Work::Bank(bank) => bank.run(&mut turn, nodes),
             }
-        }
-        drop(turn);
+        });
         self.remember(time);
         self.outputs.put_out(&self.slots, time);
         Ok(self.outputs.values())
@@ -269,23 +270,23 @@ impl Engine {
         if self.last == Instant::MIN {
             return;
         }
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        for (nth, node) in self.nodes.iter_mut().enumerate() {
-            at_hand.is(nth);
-            match node {
-                NodeRunner::Operator { operator, .. } => operator.segment(),
-                NodeRunner::Estimate { estimate, .. } => {
-                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
-                        learning.segment(self.last, &self.gathered, !self.frozen);
+        naming(&self.plan, When::Tick(self.last), |at_work| {
+            for (nth, node) in self.nodes.iter_mut().enumerate() {
+                at_work.is(nth);
+                match node {
+                    NodeRunner::Operator { operator, .. } => operator.segment(),
+                    NodeRunner::Estimate { estimate, .. } => {
+                        if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                            learning.segment(self.last, &self.gathered, !self.frozen);
+                        }
+                        if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                            feedback.segment();
+                        }
                     }
-                    if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
-                        feedback.segment();
-                    }
+                    NodeRunner::Vote(vote) => vote.segment(self.last),
                 }
-                NodeRunner::Vote(vote) => vote.segment(self.last),
             }
-        }
-        drop(at_hand);
+        });
         self.slots.clear();
         self.gathered.iter_mut().for_each(Gathered::clear);
         self.histories.iter_mut().flatten().for_each(History::clear);
@@ -390,12 +391,11 @@ impl Engine {
 
     /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
     pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        at_hand.is(node);
-        match &self.nodes[node] {
-            NodeRunner::Vote(vote) => vote.evidence(),
-            NodeRunner::Operator { .. } | NodeRunner::Estimate { .. } => None,
-        }
+        let NodeRunner::Vote(vote) = &self.nodes[node] else {
+            return None;
+        };
+        let when = When::Tick(self.last);
+        naming_one(&self.plan, node, when, || vote.evidence())
     }
 
     fn take_in(&mut self, time: Instant, samples: &[f64]) {

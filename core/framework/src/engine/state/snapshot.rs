@@ -7,11 +7,10 @@ use super::engine_state::{NodeState, SlotState};
 use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
-use crate::engine::AtHand;
 use crate::engine::tick::Estimate;
 use crate::engine::tick::Given;
 use crate::engine::tick::NodeRunner;
-use crate::engine::{Engine, EngineState, RestoreError};
+use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
 use crate::node::Restored;
 
 impl Engine {
@@ -131,28 +130,22 @@ impl Engine {
     }
 
     fn node_states(&self) -> BTreeMap<String, NodeState> {
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        let states =
-            self.plan
-                .nodes
-                .iter()
-                .zip(&self.nodes)
-                .enumerate()
-                .map(|(index, (node, running))| {
-                    at_hand.is(index);
-                    let state = match running {
-                        NodeRunner::Operator { operator, .. } => {
-                            NodeState::pack(operator.snapshot())
-                        }
-                        NodeRunner::Estimate { estimate, .. } => estimate
-                            .as_ref()
-                            .map(Estimate::snapshot)
-                            .unwrap_or_default(),
-                        NodeRunner::Vote(vote) => vote.snapshot(),
-                    };
-                    (node.instance(), state)
-                });
-        states.collect()
+        naming(&self.plan, When::Tick(self.last), |at_work| {
+            let nodes = self.plan.nodes.iter().zip(&self.nodes).enumerate();
+            let states = nodes.map(|(index, (node, runner))| {
+                at_work.is(index);
+                let state = match runner {
+                    NodeRunner::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
+                    NodeRunner::Estimate { estimate, .. } => estimate
+                        .as_ref()
+                        .map(Estimate::snapshot)
+                        .unwrap_or_default(),
+                    NodeRunner::Vote(vote) => vote.snapshot(),
+                };
+                (node.instance(), state)
+            });
+            states.collect()
+        })
     }
 
     /// Goes on from a state of this or another graph, as far as the transfer says.
@@ -174,12 +167,11 @@ impl Engine {
         };
         let mut carried = Vec::with_capacity(plan.nodes.len());
         let mut refusing = vec![false; plan.nodes.len()];
-        let mut at_hand = AtHand::at_start(&plan);
         for (index, (node, running)) in plan.nodes.iter().zip(&mut self.nodes).enumerate() {
-            at_hand.is(index);
             let was = state.nodes.get(&node.instance());
+            let mut restored = || naming_one(&plan, index, When::Start, || restored(running, was));
             let outcome = match &transfer.nodes[index] {
-                Begin::AsItWas => match restored(running, was) {
+                Begin::AsItWas => match restored() {
                     Restored::Accepted => Carry::Carried,
                     Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason } => {
@@ -187,7 +179,7 @@ impl Engine {
                         afresh(reason)
                     }
                 },
-                Begin::Offered { reason } => match restored(running, was) {
+                Begin::Offered { reason } => match restored() {
                     Restored::Accepted => Carry::Adopted {
                         reason: reason.clone(),
                     },
@@ -201,7 +193,6 @@ impl Engine {
                 outcome,
             });
         }
-        drop(at_hand);
         self.adopt_slots(state, transfer, &refusing);
         if refusing.contains(&true) {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.

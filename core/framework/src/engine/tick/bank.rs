@@ -166,18 +166,18 @@ impl Bank {
     }
 
     /// Lets those of its estimators that learn do so, and predicts those that run at a tick.
-    pub(crate) fn run(&mut self, turn: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
-        self.learn(turn, nodes);
-        if !self.predict(turn, nodes) {
+    pub(crate) fn run(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
+        self.learn(context, nodes);
+        if !self.predict(context, nodes) {
             for member in self.members.iter().filter(|of| !of.whole) {
-                turn.at_hand.is(member.node);
-                turn.of(&mut nodes[member.node]);
+                context.at_work.is(member.node);
+                context.run(&mut nodes[member.node]);
             }
         }
     }
 
     #[inline]
-    fn learn(&mut self, turn: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
+    fn learn(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
         let learning = self.members.iter_mut().enumerate();
         for (nth, member) in learning.filter(|(_, of)| of.learns) {
             if let NodeRunner::Estimate {
@@ -186,8 +186,8 @@ impl Bank {
             } = &mut nodes[member.node]
                 && let Some(learning) = estimate.learning()
             {
-                turn.at_hand.is(member.node);
-                turn.learn(learning, member.slot);
+                context.at_work.is(member.node);
+                context.learn(learning, member.slot);
                 if learning.has_changed()
                     && let Some(form) = estimate.form()
                 {
@@ -202,8 +202,8 @@ impl Bank {
 
     /// Predicts those all of whose regressors are known to be there; false where there are others.
     #[inline]
-    fn predict(&mut self, turn: &mut TickContext<'_>, nodes: &mut [NodeRunner]) -> bool {
-        let (gathered, now) = (&*turn.gathered, turn.now);
+    fn predict(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) -> bool {
+        let (gathered, now) = (&*context.gathered, context.now);
         let shared = match &self.shared {
             None => Some((&[][..], Instant::MAX)),
             Some(part) => part.in_place(gathered),
@@ -228,12 +228,12 @@ impl Bank {
             if member.learns
                 && let Some(learning) = nodes[member.node].learning()
             {
-                turn.at_hand.is(member.node);
-                learning.ran([at_once, others], now, gathered, !turn.frozen);
+                context.at_work.is(member.node);
+                learning.ran([at_once, others], now, gathered, !context.frozen);
             }
             let prediction = member.constant + sums.sum(&member.coefficients, others);
             let (value, stamp) = given(prediction, stamp.min(oldest), now);
-            turn.slots.set(member.slot, value, stamp);
+            context.slots.set(member.slot, value, stamp);
         }
         all
     }

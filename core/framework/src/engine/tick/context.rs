@@ -8,7 +8,7 @@ use super::runner::NodeRunner;
 use super::slots::Slots;
 use super::vote::Vote;
 use crate::channel::unless_infinite;
-use crate::engine::at_hand::AtHand;
+use crate::engine::at_work::AtWork;
 use crate::engine::learning::GatedLearner;
 use crate::node::{Operator, Outputs, Tick};
 use crate::time::Instant;
@@ -22,12 +22,12 @@ pub(crate) struct TickContext<'a> {
     pub(crate) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
     pub(crate) frozen: bool,
-    pub(crate) at_hand: AtHand<'a>,
+    pub(crate) at_work: &'a mut AtWork,
 }
 
 impl TickContext<'_> {
     #[inline]
-    pub(crate) fn of(&mut self, running: &mut NodeRunner) {
+    pub(crate) fn run(&mut self, running: &mut NodeRunner) {
         match running {
             NodeRunner::Operator {
                 operator,

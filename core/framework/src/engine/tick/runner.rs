@@ -1,15 +1,16 @@
 //! Decides what runs each node of a plan, given what was fitted.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::estimate::{Estimate, fit_of};
 use super::vote::{Vote, Wires};
 use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
-use crate::engine::at_hand::AtHand;
+use crate::engine::at_work::{When, naming};
 use crate::engine::learning::GatedLearner;
 use crate::engine::{EngineError, Fitted};
-use crate::node::{Inputs, Operator, Role};
+use crate::node::{Inputs, Operator, Predictor, Role};
 
 /// What runs a node, with all that a tick needs of its plan.
 pub(crate) enum NodeRunner {
@@ -73,113 +74,108 @@ impl NodeRunner {
 /// # Errors
 /// When something fitted does not belong to the plan.
 pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
-    let widths: Vec<_> = plan
-        .gathers
+    let learning = plan
+        .nodes
         .iter()
-        .map(|gather| gather.entries.len())
-        .collect();
-    let mut nodes = Vec::with_capacity(plan.nodes.len());
-    let mut used = 0;
-    let mut at_hand = AtHand::at_start(plan);
-    for (nth, node) in plan.nodes.iter().enumerate() {
-        at_hand.is(nth);
-        nodes.push(match (&node.role, node.spec.role()) {
-            (
-                PlannedRole::Feature {
-                    inputs,
-                    gathers,
-                    wanted,
-                    every_tick,
-                    closes_loops,
-                    fit,
-                },
-                Role::Feature(spec),
-            ) => {
-                let given = fitted.get(&node.instance());
-                let operator = match (fit, given) {
-                    (Some(fit), Some(given)) => {
-                        used += 1;
-                        let fit = fit_of(node, &fit.regressors, given)?;
-                        let inputs = Inputs {
-                            fit: Some(fit),
-                            ..inputs.clone()
-                        };
-                        spec.build(&inputs, wanted)
+        .filter(|of| of.role.learns_from().is_some());
+    let learning: HashSet<String> = learning.map(PlannedNode::instance).collect();
+    if let Some(node) = fitted.keys().find(|name| !learning.contains(*name)) {
+        return Err(EngineError::NotAnEstimator { node: node.clone() });
+    }
+    let gathers = plan.gathers.iter();
+    let widths: Vec<_> = gathers.map(|gather| gather.entries.len()).collect();
+    naming(plan, When::Start, |at_work| {
+        let nodes = plan.nodes.iter().enumerate();
+        nodes
+            .map(|(nth, node)| {
+                at_work.is(nth);
+                runner(node, fitted.get(&node.instance()), &widths)
+            })
+            .collect()
+    })
+}
+
+/// A node with what it was fitted to, where it was; `widths` are those of the gathers.
+fn runner(
+    node: &PlannedNode,
+    fit: Option<&Arc<dyn Predictor>>,
+    widths: &[usize],
+) -> Result<NodeRunner, EngineError> {
+    Ok(match (&node.role, node.spec.role()) {
+        (
+            PlannedRole::Feature {
+                inputs,
+                gathers,
+                wanted,
+                every_tick,
+                closes_loops,
+                fit: planned,
+            },
+            Role::Feature(spec),
+        ) => {
+            let operator = match planned.as_ref().zip(fit) {
+                Some((planned, fit)) => {
+                    let inputs = Inputs {
+                        fit: Some(fit_of(node, &planned.regressors, fit)?),
+                        ..inputs.clone()
+                    };
+                    spec.build(&inputs, wanted)
+                }
+                None => spec.build(inputs, wanted),
+            };
+            NodeRunner::Operator {
+                operator,
+                gathers: gathers.clone().into(),
+                every_tick: *every_tick,
+                closes_loops: *closes_loops,
+                slots: node.slots.clone(),
+            }
+        }
+        (
+            PlannedRole::Estimator {
+                gathers,
+                every_tick,
+                deviation,
+                ..
+            },
+            Role::Estimator(_),
+        ) => {
+            let predictor = fit.cloned().or_else(|| node.fixed().map(Arc::from));
+            let estimate = predictor.map(|predictor| Estimate::new(node, predictor, widths));
+            NodeRunner::Estimate {
+                estimate: estimate.transpose().map_err(|error| match error {
+                    EngineError::DoesNotLearn { node: instance } if fit.is_none() => {
+                        EngineError::NoLearner {
+                            node: instance,
+                            author: node.kind.author(),
+                        }
                     }
-                    _ => spec.build(inputs, wanted),
-                };
-                NodeRunner::Operator {
-                    operator,
-                    gathers: gathers.clone().into(),
-                    every_tick: *every_tick,
-                    closes_loops: *closes_loops,
-                    slots: node.slots.clone(),
-                }
+                    error => error,
+                })?,
+                trigger: gathers.first().copied().filter(|_| !every_tick),
+                slot: node.slots.start,
+                deviation: *deviation,
             }
-            (
-                PlannedRole::Estimator {
-                    gathers,
-                    every_tick,
-                    deviation,
-                    ..
-                },
-                Role::Estimator(_),
-            ) => {
-                let given = fitted.get(&node.instance());
-                used += usize::from(given.is_some());
-                let predictor = given.cloned().or_else(|| node.fixed().map(Arc::from));
-                NodeRunner::Estimate {
-                    estimate: predictor
-                        .map(|p| Estimate::new(node, p, &widths))
-                        .transpose()
-                        .map_err(|error| match error {
-                            EngineError::DoesNotLearn { node: instance } if given.is_none() => {
-                                EngineError::NoLearner {
-                                    node: instance,
-                                    author: node.kind.author(),
-                                }
-                            }
-                            error => error,
-                        })?,
-                    trigger: if *every_tick {
-                        None
-                    } else {
-                        gathers.first().copied()
-                    },
-                    slot: node.slots.start,
-                    deviation: *deviation,
-                }
-            }
-            (
-                PlannedRole::Combiner {
-                    voters,
-                    state,
-                    truth,
-                    beside,
-                    ..
-                },
-                Role::Combiner(spec),
-            ) => {
-                let wires = Wires {
-                    voters: *voters,
-                    state: *state,
-                    slot: node.slots.start,
-                    beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
-                };
-                let vote = Vote::new(spec, wires, widths[*voters], *truth);
-                NodeRunner::Vote(Box::new(vote))
-            }
-            _ => unreachable!("a plan gives each node the role of its specification"),
-        });
-    }
-    if used < fitted.len() {
-        let known = |name: &&String| {
-            let is =
-                |node: &PlannedNode| node.role.learns_from().is_some() && node.instance() == **name;
-            !plan.nodes.iter().any(is)
-        };
-        let node = fitted.keys().find(known).cloned().unwrap_or_default();
-        return Err(EngineError::NotAnEstimator { node });
-    }
-    Ok(nodes)
+        }
+        (
+            PlannedRole::Combiner {
+                voters,
+                state,
+                truth,
+                beside,
+                ..
+            },
+            Role::Combiner(spec),
+        ) => {
+            let wires = Wires {
+                voters: *voters,
+                state: *state,
+                slot: node.slots.start,
+                beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
+            };
+            let vote = Vote::new(spec, wires, widths[*voters], *truth);
+            NodeRunner::Vote(Box::new(vote))
+        }
+        _ => unreachable!("a plan gives each node the role of its specification"),
+    })
 }
