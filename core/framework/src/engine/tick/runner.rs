@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::estimate::{Estimate, fit_of};
 use super::vote::{Vote, Wires};
-use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
+use crate::compile::{AuxPorts, Plan, PlannedNode, PlannedRole};
 use crate::engine::at_work::{When, naming};
 use crate::engine::learning::GatedLearner;
 use crate::engine::{EngineError, Fitted};
@@ -26,7 +26,7 @@ pub(crate) enum NodeRunner {
         trigger: Option<usize>,
         slot: usize,
         /// The slot of the standard deviation, where somebody reads it.
-        deviation: Option<usize>,
+        std_dev: Option<usize>,
     },
     Vote(Box<Vote>),
 }
@@ -135,7 +135,7 @@ fn runner(
             PlannedRole::Estimator {
                 gathers,
                 every_tick,
-                deviation,
+                std_dev,
                 ..
             },
             Role::Estimator(_),
@@ -154,7 +154,7 @@ fn runner(
                 })?,
                 trigger: gathers.first().copied().filter(|_| !every_tick),
                 slot: node.slots.start,
-                deviation: *deviation,
+                std_dev: *std_dev,
             }
         }
         (
@@ -171,7 +171,7 @@ fn runner(
                 voters: *voters,
                 state: *state,
                 slot: node.slots.start,
-                beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
+                beside: (*beside != AuxPorts::default()).then(|| Box::new(*beside)),
             };
             let vote = Vote::new(spec, wires, widths[*voters], *truth);
             NodeRunner::Vote(Box::new(vote))
