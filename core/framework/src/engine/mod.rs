@@ -7,7 +7,7 @@ mod at_work;
 mod error;
 #[cfg(feature = "testkit")]
 mod idle;
-pub(crate) mod learning;
+mod learning;
 mod sample_range;
 mod state;
 mod tick;
@@ -15,16 +15,19 @@ mod tick;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
+pub use at_work::{When, naming_one};
 pub use error::EngineError;
-pub use learning::{Mode, Pair, Pairing};
+pub use learning::{Mode, Pair, Pairing, StepLength, times};
 pub use sample_range::SampleRange;
-pub use state::{Carry, EngineState, Fnv1a, NodeCarry, RestoreError, fnv_1a, revision};
+pub use state::{
+    Carry, EngineState, Fnv1a, NodeCarry, RestoreError, StateTransfer, fnv_1a, revision,
+};
 pub use tick::{Cursor, History};
 
-pub(crate) use at_work::{When, naming, naming_one};
 #[cfg(feature = "testkit")]
-pub(crate) use idle::Answer;
-pub(crate) use state::StateTransfer;
+pub use idle::Answer;
+
+pub(crate) use at_work::naming;
 pub(crate) use tick::{Gathered, Given};
 
 use crate::channel::Extremes;
@@ -201,7 +204,7 @@ impl Engine {
     }
 
     /// Whether a tick at this instant would be taken.
-    pub(crate) fn takes(&self, time: Instant) -> bool {
+    pub fn takes(&self, time: Instant) -> bool {
         time > self.last
     }
 
@@ -239,7 +242,7 @@ impl Engine {
 
     /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
     /// where no past truth changes what it predicts in the mode of the engine.
-    pub(crate) fn step_of(&self, node: usize) -> Option<Option<Duration>> {
+    pub fn step_of(&self, node: usize) -> Option<Option<Duration>> {
         match self.nodes.get(node) {
             Some(NodeRunner::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
             _ => None,
@@ -390,7 +393,7 @@ impl Engine {
     }
 
     /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
-    pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+    pub fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
         let NodeRunner::Vote(vote) = &self.nodes[node] else {
             return None;
         };

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use super::mode::Mode;
-use super::mode::{Step, times};
+use super::mode::{StepLength, times};
 use super::pairing::Pairing;
 use crate::compile::{Entry, TruthLink};
 use crate::engine::tick::Slots;
@@ -18,7 +18,7 @@ const MOST_BROUGHT: usize = 256;
 pub(crate) struct Feedback {
     link: TruthLink,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     past: Vec<Past>,
     /// Each run with what was predicted, after it.
     pairing: Pairing,
@@ -81,7 +81,7 @@ impl Feedback {
         Some(Self {
             link: *link,
             mode,
-            step: Step::new(smallest + link.ahead),
+            step: StepLength::new(smallest + link.ahead),
             pairing: Pairing::new(link, regressors.len() + past.len() + 1),
             truths: VecDeque::new(),
             deepest,
@@ -95,7 +95,7 @@ impl Feedback {
     }
 
     /// How long a step was planned to be; none where it is as long as the time between truths.
-    pub(crate) fn step(&self) -> Option<Duration> {
+    pub fn step(&self) -> Option<Duration> {
         self.step.planned()
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::embargo::{DueTruth, Embargo};
-use super::mode::{Mode, Step};
+use super::mode::{Mode, StepLength};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
 use crate::engine::state::NodeState;
 use crate::engine::tick::Gathered;
@@ -18,7 +18,7 @@ pub(crate) struct GatedLearner {
     gate: Gate,
     freeze: Option<usize>,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     /// Whether a run knows of the truth of its own tick.
     at_once: bool,
     /// Whether it may predict otherwise than when it was asked last.
@@ -71,7 +71,7 @@ impl GatedLearner {
                 own,
             },
             mode: Mode::OneStep,
-            step: Step::new(truth.ahead.max(truth.span)),
+            step: StepLength::new(truth.ahead.max(truth.span)),
             nothing: vec![f64::NAN; width],
         })
     }
@@ -82,7 +82,7 @@ impl GatedLearner {
     }
 
     /// How long a step was planned to be; none where it is as long as the time between truths.
-    pub(crate) fn step(&self) -> Option<Duration> {
+    pub fn step(&self) -> Option<Duration> {
         self.step.planned()
     }
 
