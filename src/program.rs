@@ -38,13 +38,19 @@ pub fn command_line() -> ExitCode {
     let mut terminal = terminal::Terminal::new(&arguments.terminal);
     terminal.events = terminal.format == Format::Json && arguments.command.tells_programs();
     told_in_a_line();
-    match caught(|| arguments.command.run(&terminal, Arguments::command)) {
+    match caught(|| arguments.command.run(&terminal)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
             terminal.error(&failure);
             failure.exit_code()
         }
     }
+}
+
+/// The command line, as a shell completes it.
+#[must_use]
+pub fn whole() -> clap::Command {
+    Arguments::command()
 }
 
 /// What a command answers, or that code of the program or of a plugin panicked in it.

@@ -1,14 +1,11 @@
 //! Recorded data on the command line: how files are named, and the warnings after reading them.
 
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata};
-use std::hash::Hasher;
-use std::io::{self, BufRead, BufReader};
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
 use athermal::core::compile::Plan;
-use athermal::core::engine::Fnv1a;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use athermal::run::model::DataCard;
 use clap::Args;
@@ -144,19 +141,10 @@ impl Data {
     /// Warns of files on which the model was fitted, and of data from the time of its fit: scores on them say little. `period` is that
     /// of the data, in s.
     pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
-        let cards = || model.card.iter().flat_map(|card| &card.data);
-        let seen = |path: &&Path| {
-            // Only a file of the same length is read for its checksum.
-            let length = std::fs::metadata(path)
-                .ok()
-                .filter(Metadata::is_file)?
-                .len();
-            cards().find(|card| card.bytes == length)?;
-            let (bytes, hash) = content_of(path).ok()?;
-            cards().find(|card| card.bytes == bytes && card.hash == hash)
-        };
+        let cards = model.card.iter().flat_map(|card| &card.data);
+        let seen = |path: &&Path| cards.clone().any(|card| card.is_of(path));
         let mut again = false;
-        for path in self.paths().filter(|path| seen(path).is_some()) {
+        for path in self.paths().filter(seen) {
             again = true;
             terminal.warning(format_args!(
                 "{}: the model was fitted on this file, so {FITS}",
@@ -177,20 +165,13 @@ impl Data {
         let reports = dataset.reports();
         let mut cards = Vec::with_capacity(self.files.len());
         for path in &self.files {
-            let (bytes, hash) = content_of(path).map_err(|error| {
+            let name = path.display().to_string();
+            let report = reports.iter().find(|(file, _)| *file == name);
+            let rows = report.map_or(0, |(_, report)| report.rows);
+            let card = DataCard::of(path, rows).map_err(|error| {
                 Failure::Outside(format!("cannot read {}: {error}", path.display()))
             })?;
-            let name = path.display().to_string();
-            let rows = reports
-                .iter()
-                .find(|(file, _)| *file == name)
-                .map_or(0, |(_, report)| report.rows);
-            cards.push(DataCard {
-                path: name,
-                rows,
-                bytes,
-                hash,
-            });
+            cards.push(card);
         }
         Ok(cards)
     }
@@ -220,31 +201,8 @@ pub fn is_same_content(one: &Path, other: &Path) -> bool {
         let of = std::fs::metadata(path).ok().filter(Metadata::is_file)?;
         Some(of.len())
     };
-    let of_one = length(one);
-    let content = |path: &Path| content_of(path).ok();
-    one == other
-        || of_one.is_some()
-            && of_one == length(other)
-            && content(one).is_some_and(|of_one| content(other) == Some(of_one))
-}
-
-/// The length of a file in bytes and the checksum of its content as text: [`Fnv1a`] in hexadecimal digits.
-///
-/// # Errors
-/// When it cannot be read.
-pub fn content_of(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
-    let (mut bytes, mut hash) = (0, Fnv1a::default());
-    loop {
-        let piece = file.fill_buf()?;
-        if piece.is_empty() {
-            return Ok((bytes, format!("{:016x}", hash.finish())));
-        }
-        hash.write(piece);
-        let read = piece.len();
-        bytes += read as u64;
-        file.consume(read);
-    }
+    let same_length = length(one).is_some_and(|of_one| length(other) == Some(of_one));
+    one == other || same_length && DataCard::of(one, 0).is_ok_and(|card| card.is_of(other))
 }
 
 /// Checks that the ending of a file that is to be written names a format; one without an ending is CSV.

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::super::aside::write_aside;
-use super::super::data::content_of;
+use athermal::run::model::content_of;
+
 use crate::invocation::{program, quoted};
 use crate::terminal::Failure;
 

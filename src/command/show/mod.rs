@@ -1,6 +1,5 @@
 //! `athermal show`: a graph as a plan, or as a picture; a model by its coefficients.
 
-mod coefficients;
 mod tables;
 
 use std::path::PathBuf;
@@ -9,6 +8,7 @@ use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::nearest;
 use athermal::diagnosis::{is_asked, is_called};
+use athermal::run::model::FittedEstimator;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
@@ -16,7 +16,6 @@ use serde_json::{Value, json};
 use super::model::{self, load_fitted};
 use crate::drawing::{Class, Diagram, Flow, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
-use coefficients::Estimator;
 
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
 ///
@@ -95,8 +94,8 @@ impl Show {
     }
 
     /// The coefficients of the estimators asked for; every name must be that of one.
-    fn estimators(&self, model: &Model) -> Result<Vec<Estimator>, Failure> {
-        let mut estimators = coefficients::estimators(model);
+    fn estimators(&self, model: &Model) -> Result<Vec<FittedEstimator>, Failure> {
+        let mut estimators = model.estimators();
         let unfitted = model.unfitted();
         let known = estimators.iter().map(|of| &of.node).chain(&unfitted);
         let known: Vec<&str> = known.map(String::as_str).collect();
@@ -125,7 +124,7 @@ fn no_estimator(name: &str, known: &[&str]) -> String {
     format!("there is no fitted estimator `{name}`{near} ({there})")
 }
 
-fn facts(diagram: &Diagram, estimators: &[Estimator]) -> Value {
+fn facts(diagram: &Diagram, estimators: &[FittedEstimator]) -> Value {
     let boxes: Vec<Value> = diagram
         .boxes
         .iter()

@@ -4,17 +4,17 @@ use std::fmt::Write as _;
 
 use athermal::core::node::Mode;
 
-use super::coefficients::{Estimator, Found};
+use athermal::run::model::{EstimatorParts, FittedEstimator};
 use athermal_analysis::figures::{digits, paragraph, stated, table, time};
 
 /// The longest name that numbers stand beside; longer ones stand above them.
 const LONGEST_NAME: usize = 36;
 
 /// The text about a model.
-pub(super) fn text(estimators: &[Estimator], unfitted: &[String]) -> String {
+pub(super) fn text(estimators: &[FittedEstimator], unfitted: &[String]) -> String {
     let mut text = String::new();
     for of in estimators {
-        let found = of.found.as_ref();
+        let found = of.parts.as_ref();
         text.push_str(
             &found.map_or_else(|| without_coefficients(of), |found| estimator(of, found)),
         );
@@ -23,14 +23,14 @@ pub(super) fn text(estimators: &[Estimator], unfitted: &[String]) -> String {
     for node in unfitted {
         let _ = writeln!(text, "{node} could not be fitted\n");
     }
-    let all = estimators.iter().filter_map(|of| of.found.as_ref());
+    let all = estimators.iter().filter_map(|of| of.parts.as_ref());
     let mut all = all.flat_map(|found| &found.coefficients);
     if all.any(|of| of.standard_error.is_some()) {
         text.push_str(
             "std. error: as if the errors of rows were independent, so too small where\n\
              windows overlap; with a penalty, the spread of the posterior\n",
         );
-        let mut found = estimators.iter().filter_map(|of| of.found.as_ref());
+        let mut found = estimators.iter().filter_map(|of| of.parts.as_ref());
         if found.any(is_bounded) {
             text.push_str(
                 "polynomials without one are held by the bound of stability, or the rows hardly\n\
@@ -44,7 +44,7 @@ pub(super) fn text(estimators: &[Estimator], unfitted: &[String]) -> String {
 }
 
 /// Whether some polynomials have standard errors, and others have not.
-fn is_bounded(found: &Found) -> bool {
+fn is_bounded(found: &EstimatorParts) -> bool {
     let of_polynomials = found
         .coefficients
         .iter()
@@ -54,15 +54,15 @@ fn is_bounded(found: &Found) -> bool {
     !with.is_empty() && !without.is_empty()
 }
 
-fn without_coefficients(of: &Estimator) -> String {
-    let Estimator {
+fn without_coefficients(of: &FittedEstimator) -> String {
+    let FittedEstimator {
         node, kind, truth, ..
     } = of;
     format!("{node} ({kind} of {truth}): nodes of this type do not tell their coefficients\n")
 }
 
-fn estimator(of: &Estimator, found: &Found) -> String {
-    let Estimator {
+fn estimator(of: &FittedEstimator, found: &EstimatorParts) -> String {
+    let FittedEstimator {
         node,
         kind,
         truth,
@@ -109,7 +109,7 @@ fn estimator(of: &Estimator, found: &Found) -> String {
 }
 
 /// The equation that the polynomials are of.
-fn equation(found: &Found) -> String {
+fn equation(found: &EstimatorParts) -> String {
     let all = || found.coefficients.iter();
     let has = |polynomial: char| all().any(|of| of.polynomial == Some(polynomial));
     let has_constant = all().any(|of| of.polynomial.is_none());
@@ -176,7 +176,7 @@ fn name_lines(name: &str) -> Vec<String> {
 }
 
 /// From where regressors in products count, and how far.
-fn held(found: &Found) -> String {
+fn held(found: &EstimatorParts) -> String {
     let factors = || found.coefficients.iter().flat_map(|of| &of.factors);
     let mut regressors: Vec<&str> = Vec::new();
     for factor in factors().filter(|of| of.about.is_some() || of.held.is_some()) {
