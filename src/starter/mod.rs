@@ -13,7 +13,6 @@ mod spacing;
 mod survey;
 mod text;
 mod texts;
-mod thousands;
 mod undecided;
 mod window;
 
@@ -21,6 +20,7 @@ pub use dates::WITHOUT_ZONE;
 
 use std::path::Path;
 
+use athermal::core::document::TableFormat;
 use athermal::core::time::TimeFormat;
 use athermal::files::{Description, FileError, TimeForm};
 
@@ -51,8 +51,6 @@ pub struct Starter {
     pub columns: Value,
     /// The signal to noise of each drift against its window, for programs.
     pub windows: Value,
-    /// Whether the log has cells that only a lenient reader passes over.
-    pub lenient: bool,
 }
 
 /// Why there is no starter graph for a log.
@@ -95,7 +93,11 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     if let Some(why) = own_times {
         return Err(NoStarter::Unfit(why));
     }
-    let mut survey = Survey::of(path, &clock, &columns)?;
+    let mut table = TableFormat {
+        decimal: described.decimal(clock.columns.names()),
+        ..described.table.clone()
+    };
+    let mut survey = Survey::of(path, &clock, &table, &columns)?;
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
     let dropped = survey.dropped.clone();
@@ -105,7 +107,6 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     survey.take_changes(&mut columns, &clock);
     survey.leave_out_slow(&mut columns, &clock, told);
     survey.leave_out_faults(&mut columns);
-    survey.tell_of_thousands(path, &described, &mut columns)?;
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {
@@ -114,12 +115,12 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
     let columns_taken = columns.iter().map(Column::facts).collect();
+    table.lenient = survey.needs_lenience(&columns);
     Ok(Starter {
-        text: text::graph(path, &clock, &columns, &survey, &choice),
+        text: text::graph(path, (&clock, &table), &columns, &survey, &choice),
         remarks,
         windows: choice.facts(&columns),
         columns: columns_taken,
-        lenient: survey.needs_lenience(&columns),
     })
 }
 

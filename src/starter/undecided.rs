@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use athermal::core::document::TableBase;
 use athermal::files::{FileError, Layout, Options, Reader, Row, TimeColumn, TimeForm};
 
 use super::clock::Clock;
@@ -19,6 +20,7 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError>
             zone: None,
         },
         channels: Vec::new(),
+        table: TableBase::default(),
     };
     let options = Options {
         lenient: true,

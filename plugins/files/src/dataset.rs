@@ -52,6 +52,7 @@ pub fn layout(plan: &Plan) -> Layout {
                 optional: source.optional,
             })
             .collect(),
+        table: plan.table.clone(),
     }
 }
 

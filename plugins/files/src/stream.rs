@@ -8,14 +8,26 @@ use crate::{Reader, Row, Writer};
 
 impl Source for Reader {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        let mut row = Row {
-            time_ns: 0,
-            time_text: std::mem::take(&mut samples.time_text),
-            values: std::mem::take(&mut samples.values),
+        let mut row = match self.waiting.take() {
+            Some(waiting) => waiting,
+            None => {
+                let mut row = Row {
+                    time_text: std::mem::take(&mut samples.time_text),
+                    values: std::mem::take(&mut samples.values),
+                    ..Row::default()
+                };
+                if !self.next_into(&mut row)? {
+                    return Ok(None);
+                }
+                row
+            }
         };
-        let more = self.next_into(&mut row)?;
+        if std::mem::take(&mut row.begins_segment) {
+            self.waiting = Some(row);
+            return Ok(Some(Event::Segment));
+        }
         (samples.time_text, samples.values) = (row.time_text, row.values);
-        Ok(more.then(|| Event::Row(Instant::from_ns(row.time_ns))))
+        Ok(Some(Event::Row(Instant::from_ns(row.time_ns))))
     }
 }
 
