@@ -15,7 +15,7 @@ use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
 use crate::long::Long;
-use crate::{Again, ChannelColumn, FileError, Format, Layout, Place, Report, TimeColumn};
+use crate::{Again, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -58,8 +58,8 @@ pub struct Row {
 pub struct Reader {
     rows: Rows,
     reading: Reading,
-    /// The first row of a segment, while its source reports the break before it.
-    pub(crate) waiting: Option<Row>,
+    /// The first row of a segment, after the break before it was given.
+    waiting: Option<Row>,
 }
 
 enum Rows {
@@ -228,6 +228,19 @@ impl Reader {
             Rows::Csv(rows) => self.reading.next_joined(rows.as_mut(), row),
             Rows::Json(rows) => self.reading.next_joined(rows.as_mut(), row),
         }
+    }
+
+    /// What comes next, with `row` filled if it is a row.
+    pub(crate) fn next_event(&mut self, row: &mut Row) -> Result<Event, FileError> {
+        if let Some(waiting) = self.waiting.take() {
+            *row = waiting;
+        } else if !self.next_into(row)? {
+            return Ok(Event::End);
+        } else if row.begins_segment {
+            self.waiting = Some(std::mem::take(row));
+            return Ok(Event::Segment);
+        }
+        Ok(Event::Row)
     }
 
     /// Reports what is met for the first time as soon as it is: who reads what never ends gets no report at its end.
