@@ -9,7 +9,7 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::data::{Data, no_graph};
 use crate::invocation::{command, program, quoted};
-use crate::starter::{NoStarter, Told, starter};
+use crate::starter::{NoStarter, Request, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
 
@@ -53,7 +53,7 @@ impl Init {
     /// # Errors
     /// When the log cannot be read, nothing in it drifts, or the graph is there already.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let told = Told {
+        let request = Request {
             time: self.time.clone(),
             format: self.time_format.clone(),
             drifting: self.drifts.clone(),
@@ -66,7 +66,7 @@ impl Init {
             )));
         }
         check_apart("--output", &self.output, [&*self.data])?;
-        let starter = starter(&self.data, &told).map_err(|error| match error {
+        let starter = starter(&self.data, &request).map_err(|error| match error {
             NoStarter::File(error) => {
                 // There is no `--lenient` here that it could advise.
                 let told = error.without_advice().to_string();

@@ -29,9 +29,9 @@ use serde_json::Value;
 use survey::Survey;
 use window::Choice;
 
-/// What the user has said, so that it need not be guessed.
+/// What the user asks for, so that it need not be guessed.
 #[derive(Debug, Clone, Default)]
-pub struct Told {
+pub struct Request {
     /// The column that gives the time.
     pub time: Option<String>,
     /// How it is written.
@@ -72,7 +72,7 @@ impl From<FileError> for NoStarter {
 ///
 /// # Errors
 /// When the file cannot be read, or nothing in it drifts with something that could explain it.
-pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
+pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     let described = Description::of(path, 500)?;
     if let Some(long) = described.long_format() {
         return Err(NoStarter::Unfit(long.to_string()));
@@ -81,7 +81,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         return Err(NoStarter::Unfit(why));
     }
     let mut remarks = Vec::new();
-    let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
+    let clock = clock::find(&described, request.time.as_deref(), request.format.as_ref())
         .map_err(NoStarter::Unfit)?;
     let clock = undecided::decided(path, clock)?;
     remarks.push(clock.remark());
@@ -89,7 +89,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     if let Some(why) = dropped::newest_first(&described, &clock) {
         return Err(NoStarter::Unfit(why));
     }
-    let own_times = own_times::told(&described, &clock).filter(|_| told.time.is_none());
+    let own_times = own_times::refusal(&described, &clock).filter(|_| request.time.is_none());
     if let Some(why) = own_times {
         return Err(NoStarter::Unfit(why));
     }
@@ -102,10 +102,10 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     survey.judge(&mut columns);
     let dropped = survey.dropped.clone();
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
-    column::assign(&mut columns, told).map_err(&unfit)?;
+    column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
     survey.take_changes(&mut columns, &clock);
-    survey.leave_out_slow(&mut columns, &clock, told);
+    survey.leave_out_slow(&mut columns, &clock, request);
     survey.leave_out_faults(&mut columns);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
@@ -124,7 +124,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     })
 }
 
-/// Why a log of which there is hardly anything tells nothing.
+/// Why a log has too few rows.
 fn too_few(described: &Description) -> Option<String> {
     let rows = match described.rows.len() {
         0 => "no row",

@@ -12,7 +12,7 @@ use athermal::diagnosis::leap::{Finder, Leaps};
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
-use super::dropped::{self, Steps};
+use super::dropped;
 use athermal_analysis::figures::{count, counted};
 
 /// The values of a log, column by column.
@@ -24,7 +24,7 @@ pub struct Survey {
     pub duration_s: f64,
     /// Rows.
     pub rows: u64,
-    /// What is told of rows that are not taken, or not alone.
+    /// Remarks on rows that are not taken, or not alone.
     pub dropped: Vec<String>,
     /// Whether there are rows that only a lenient reader passes over.
     has_broken_rows: bool,
@@ -51,7 +51,7 @@ pub struct Series {
 #[derive(Debug)]
 pub struct Unreadable {
     /// Its text and its line.
-    told: String,
+    example: String,
     /// Its text.
     found: String,
     /// For a number with another decimal mark than others, their mark and the line of the first.
@@ -73,7 +73,7 @@ impl Unreadable {
         };
         let found = found.replace(char::is_control, "\u{fffd}");
         Some(Self {
-            told: format!("`{found}` in line {line}"),
+            example: format!("`{found}` in line {line}"),
             found,
             mark,
         })
@@ -220,12 +220,10 @@ impl Survey {
         let mut reader = Reader::open(path, layout, options)?;
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
-        let mut steps = Steps::default();
         while reader.next_into(&mut row)? {
             let first = *first.get_or_insert(row.time_ns);
             last = row.time_ns;
             rows += 1;
-            steps.push(last);
             let time_s = (row.time_ns - first) as f64 / 1e9;
             for (series, &value) in series.iter_mut().zip(&row.values) {
                 if value.is_finite() {
@@ -253,12 +251,12 @@ impl Survey {
             series,
             duration_s,
             rows,
-            dropped: dropped::remarks(reader.report(), steps, clock),
+            dropped: dropped::remarks(reader.report(), clock),
             has_broken_rows: reader.report().refused_rows.count > 0,
         })
     }
 
-    /// Leaves out the columns that say nothing, and tells of cells that cannot be read in those that stay.
+    /// Leaves out the columns that say nothing, and warns of cells that cannot be read in those that stay.
     pub fn judge(&self, columns: &mut [Column]) {
         for (series, column) in self.series.iter().zip(columns) {
             let (low, high) = series.extremes();
@@ -267,7 +265,7 @@ impl Survey {
             let example = series
                 .first_unreadable
                 .as_ref()
-                .map_or("", |first| first.told.as_str());
+                .map_or("", |first| first.example.as_str());
             let first = series.first_unreadable.as_ref();
             let mark = first.and_then(|first| first.mark);
             let has_none = first.is_some_and(Unreadable::is_none);
@@ -318,7 +316,7 @@ impl Survey {
         }
     }
 
-    /// Takes the values out of temperatures that only a failed sensor gives, and tells of leaps in these and in what drifts.
+    /// Takes the values out of temperatures that only a failed sensor gives, and warns of leaps in these and in what drifts.
     pub fn leave_out_faults(&mut self, columns: &mut [Column]) {
         for (series, column) in self.series.iter_mut().zip(columns) {
             let is_temperature = column.is_temperature();

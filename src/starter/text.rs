@@ -250,7 +250,7 @@ impl Writer<'_> {
             .iter()
             .filter(|(width_s, _)| *width_s <= 6.0 * self.choice.drift_s);
         for (width_s, ratios) in shown {
-            let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
+            let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
             let mark = match (*width_s == self.choice.drift_s, self.choice.enough) {
                 (false, _) => String::new(),
                 (_, true) => format!("  <- chosen: the narrowest with {ENOUGH} on half of them"),
@@ -260,11 +260,11 @@ impl Writer<'_> {
                 text,
                 "#   {:>10}  {}{mark}",
                 self.clock.length(*width_s),
-                told.join("  ")
+                ratios.join("  ")
             );
         }
         if let Some(bound) = &self.choice.bound {
-            let _ = writeln!(text, "# ({})", bound.told(self.clock));
+            let _ = writeln!(text, "# ({})", bound.text(self.clock));
         }
         let _ = writeln!(
             text,

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use athermal_core::document::Encoding;
-use encoding_rs::{UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::detect::begins_json_array;
@@ -47,14 +47,15 @@ impl Lines {
         encoding: Option<Encoding>,
         input: impl Read + Send + 'static,
     ) -> Self {
-        let declared = encoding.map(|encoding| match encoding {
-            Encoding::Utf8 => UTF_8,
-            Encoding::Utf16Le => UTF_16LE,
-            Encoding::Utf16Be => UTF_16BE,
-            Encoding::Windows1252 => WINDOWS_1252,
+        let declared = encoding.and_then(|encoding| match encoding {
+            Encoding::Utf8 => None,
+            Encoding::Utf16Le => Some(UTF_16LE),
+            Encoding::Utf16Be => Some(UTF_16BE),
+            Encoding::Windows1252 => Some(WINDOWS_1252),
         });
         let decoded = DecodeReaderBytesBuilder::new()
             .encoding(declared)
+            .bom_sniffing(encoding.is_none())
             .utf8_passthru(true)
             .strip_bom(true)
             .build(input);
