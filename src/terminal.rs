@@ -356,7 +356,7 @@ impl From<FitError> for Failure {
         match error {
             FitError::Recording(error) => outside(error),
             FitError::Engine(error) => Self::Request(error.to_string()),
-            FitError::Panicked => Self::Outside(error.to_string()),
+            FitError::Panicked { .. } => Self::Outside(error.to_string()),
         }
     }
 }

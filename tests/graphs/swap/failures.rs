@@ -79,10 +79,10 @@ fn a_refit_in_which_a_node_panics_is_over() {
         }
         std::thread::yield_now();
     };
-    assert!(matches!(outcome, Err(FitError::Panicked)));
+    assert!(matches!(outcome, Err(FitError::Panicked { .. })));
     assert!(polled.poll().is_none(), "it is given once");
     let waited = Refit::on(&running, Panicking, FitOptions::default()).wait();
-    assert!(matches!(waited, Some(Err(FitError::Panicked))));
+    assert!(matches!(waited, Some(Err(FitError::Panicked { .. }))));
 }
 
 #[test]

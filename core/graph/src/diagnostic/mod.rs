@@ -18,7 +18,7 @@ pub use counted::{count, counted, listed};
 pub use digits::digits;
 pub use names::Names;
 pub use nearest::nearest;
-pub use panicked::said;
+pub use panicked::{NodePanic, panic_text, said};
 pub use place::{Place, SourceId, Sources};
 
 #[cfg(test)]

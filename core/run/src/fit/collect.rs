@@ -7,7 +7,7 @@ use super::between::Between;
 use super::candidates::Validity;
 use super::report::Dropped;
 use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
-use crate::engine::{AtHand, Engine, Pairing};
+use crate::engine::{Engine, Pairing, When, naming_one};
 use crate::node::{Role, Runs, TrainingError};
 use crate::recording::Event;
 use crate::time::{Duration, Instant};
@@ -228,15 +228,16 @@ impl Collector {
             } else if !trainee.limits.admits(truth) {
                 trainee.dropped.outside_limits += 1;
             } else if let Some(live) = &mut live {
-                let _at_hand = AtHand::in_fit(engine.plan(), trainee.node);
-                if std::mem::take(&mut trainee.segment_pending) {
-                    live[index].segment();
-                }
-                if let Some(between) = &mut trainee.between {
-                    between.truth(now, |of, row| live[index].run(of, row));
-                }
-                let parts = trainee.taps.iter().map(|&tap| taps[tap].pairing.last());
-                live[index].row(now, parts, truth);
+                naming_one(engine.plan(), trainee.node, When::Fit, || {
+                    if std::mem::take(&mut trainee.segment_pending) {
+                        live[index].segment();
+                    }
+                    if let Some(between) = &mut trainee.between {
+                        between.truth(now, |of, row| live[index].run(of, row));
+                    }
+                    let parts = trainee.taps.iter().map(|&tap| taps[tap].pairing.last());
+                    live[index].row(now, parts, truth);
+                });
             } else {
                 self.keep(index, now, truth);
             }

@@ -9,7 +9,7 @@ use super::progress::{FitProgress, Listener};
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
-use crate::engine::{AtHand, Engine, Fitted};
+use crate::engine::{Engine, Fitted, When, naming_one};
 use crate::recording::{Event, Passed, Recording, pass};
 
 /// A fit under way.
@@ -260,8 +260,9 @@ impl<'a> Fitting<'a> {
         let ended = collector.trainees.iter().zip(makings);
         Ok(ended
             .map(|(trainee, making)| {
-                let _at_hand = AtHand::in_fit(self.plan, trainee.node);
-                end(self.plan, &collector, trainee, making, true, &self.progress)
+                naming_one(self.plan, trainee.node, When::Fit, || {
+                    end(self.plan, &collector, trainee, making, true, &self.progress)
+                })
             })
             .collect())
     }
@@ -277,8 +278,9 @@ impl<'a> Fitting<'a> {
         let (mut nodes, mut makings) = (Vec::new(), Vec::new());
         for (trainee, constant) in trainees {
             nodes.push(trainee.node);
-            let _at_hand = AtHand::in_fit(self.plan, trainee.node);
-            makings.push(begin(self.plan, trainee, memory, constant));
+            makings.push(naming_one(self.plan, trainee.node, When::Fit, || {
+                begin(self.plan, trainee, memory, constant)
+            }));
         }
         let mut collector = Collector::new(self.plan, &nodes, 0);
         self.pass(&mut collector, parts, Some(&mut makings))?;

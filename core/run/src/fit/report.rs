@@ -17,7 +17,10 @@ pub enum FitError {
     /// The engine cannot be built.
     Engine(EngineError),
     /// A node panicked.
-    Panicked,
+    Panicked {
+        /// Which, when, and what it says.
+        text: String,
+    },
 }
 
 impl fmt::Display for FitError {
@@ -25,11 +28,7 @@ impl fmt::Display for FitError {
         match self {
             Self::Recording(error) => write!(f, "{error}"),
             Self::Engine(error) => write!(f, "{error}"),
-            Self::Panicked => write!(
-                f,
-                "a node panicked while it was fitted, which is a mistake of its own and not of the data; what it said stands in the \
-                 program's messages"
-            ),
+            Self::Panicked { text } => write!(f, "the fit cannot go on: {text}"),
         }
     }
 }

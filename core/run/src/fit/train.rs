@@ -10,7 +10,7 @@ use super::progress::{FitProgress, Listener};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedRole};
-use crate::engine::AtHand;
+use crate::engine::{When, naming_one};
 use crate::node::{
     LearningLimits, Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup,
 };
@@ -309,21 +309,20 @@ pub(super) fn train_kept(
                 return made;
             }
             let trainee = &collector.trainees[index];
-            let _at_hand = AtHand::in_fit(plan, trainee.node);
-            // The whole memory, or how folds are cut would depend on the number of threads.
-            let mut making = begin(plan, trainee, options.memory, Vec::new());
-            collector.replay(index, &mut making);
-            let constant = making.constant();
-            if !constant.is_empty() {
-                // What the first one keeps is gone before the next keeps as much.
-                drop(making);
-                making = begin(plan, trainee, options.memory, constant);
+            let trained = naming_one(plan, trainee.node, When::Fit, || {
+                // The whole memory, or how folds are cut would depend on the number of threads.
+                let mut making = begin(plan, trainee, options.memory, Vec::new());
                 collector.replay(index, &mut making);
-            }
-            made.push((
-                index,
-                end(plan, collector, trainee, making, false, progress),
-            ));
+                let constant = making.constant();
+                if !constant.is_empty() {
+                    // What the first one keeps is gone before the next keeps as much.
+                    drop(making);
+                    making = begin(plan, trainee, options.memory, constant);
+                    collector.replay(index, &mut making);
+                }
+                end(plan, collector, trainee, making, false, progress)
+            });
+            made.push((index, trained));
         }
     };
     let mut made = if threads == 1 {

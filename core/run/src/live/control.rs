@@ -12,7 +12,8 @@ use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
 use super::{LiveOptions, StageError, Stepper};
 use crate::compile::Plan;
-use crate::engine::{Engine, Heritage, NodeCarry};
+use crate::diagnostic::panic_text;
+use crate::engine::{Engine, NodeCarry, StateTransfer};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
 
@@ -165,7 +166,10 @@ impl Control {
         StageError::between(&self.running, &model.plan).map_or(Ok(()), Err)?;
         // What runs goes on whatever the code of a node does to what is being made.
         let made = catch_unwind(AssertUnwindSafe(|| self.made_ready(model, carry_learned)));
-        let staged = made.unwrap_or(Err(StageError::Panicked))?;
+        let staged = made.unwrap_or_else(|panic| {
+            let text = panic_text(&*panic);
+            Err(StageError::Panicked { text })
+        })?;
         Ok(self.staged.insert(staged))
     }
 
@@ -195,9 +199,10 @@ impl Control {
         });
         let carry = match &self.replica {
             Some(replica) => {
-                let heritage = Heritage::between(&replica.engine, &seated.engine, carry_learned);
+                let transfer =
+                    StateTransfer::between(&replica.engine, &seated.engine, carry_learned);
                 let state = replica.engine.state();
-                seated.engine.adopt(&state, &heritage, warmed)
+                seated.engine.adopt(&state, &transfer, warmed)
             }
             None => cold(&seated.engine, warmed),
         };

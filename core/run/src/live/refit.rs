@@ -5,6 +5,7 @@ use std::thread::JoinHandle;
 use crossbeam::channel::{Receiver, TryRecvError, bounded};
 
 use super::Control;
+use crate::diagnostic::panic_text;
 use crate::fit::{FitError, FitOptions, FitReport, fit};
 use crate::model::Model;
 use crate::recording::{Recording, Table};
@@ -63,7 +64,10 @@ impl Refit {
         outcome: Option<Result<(Model, FitReport), FitError>>,
     ) -> Option<Result<(Model, FitReport), FitError>> {
         let joined = self.thread.take()?.join();
-        outcome.or_else(|| joined.is_err().then_some(Err(FitError::Panicked)))
+        outcome.or_else(|| {
+            let text = panic_text(&*joined.err()?);
+            Some(Err(FitError::Panicked { text }))
+        })
     }
 }
 

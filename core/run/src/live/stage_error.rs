@@ -34,7 +34,10 @@ pub enum StageError {
     /// What was fitted does not belong to it.
     Engine(EngineError),
     /// A node of it panicked while it was made ready.
-    Panicked,
+    Panicked {
+        /// Which, when, and what it says.
+        text: String,
+    },
     /// Nothing is staged.
     NothingStaged,
     /// There is no graph before, or it is no longer warm.
@@ -92,10 +95,7 @@ impl fmt::Display for StageError {
                 "the new graph gives the output `{output}` in {new} and what runs in {running}: give it in that, or another name"
             ),
             Self::Engine(error) => write!(f, "{error}"),
-            Self::Panicked => write!(
-                f,
-                "a node of the new graph panicked, which is a mistake of its own; what it said stands in the program's messages"
-            ),
+            Self::Panicked { text } => write!(f, "the new graph cannot be made ready: {text}"),
             Self::NothingStaged => write!(f, "no graph is staged: stage one first"),
             Self::NothingToTakeBack => write!(
                 f,

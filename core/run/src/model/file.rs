@@ -1,6 +1,6 @@
 //! Decides how a model is read and written.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read as _};
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::{Card, ModelError};
 use crate::compile::{Change, Plan, PlanDiff, PlannedNode, Wanted, compile_part, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
-use crate::engine::{Engine, FitAtHand, Fitted, SampleRange};
+use crate::engine::{Engine, Fitted, SampleRange, When, naming_one};
 use crate::node::{Mistake, Predictor};
 
 /// The format that this version writes.
@@ -210,14 +210,14 @@ impl Model {
                 sources: Box::new(sources),
             });
         };
+        let instances = plan.nodes.iter().map(PlannedNode::instance);
+        let numbers: HashMap<_, _> = instances.zip(0..).collect();
         let (mut fitted, mut refused) = (Fitted::new(), Vec::new());
         for (node, written) in read.fitted {
-            let at_hand = FitAtHand {
-                plan: &plan,
-                name: &node,
+            let read = match numbers.get(&node) {
+                Some(&number) => naming_one(&plan, number, When::Start, || sound(written)),
+                None => sound(written),
             };
-            let read = sound(written);
-            drop(at_hand);
             match read {
                 Ok(predictor) => _ = fitted.insert(node, Arc::from(predictor)),
                 Err(mistakes) => refused.push((node, mistakes)),

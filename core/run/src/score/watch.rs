@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use super::evidence::Tally;
 use super::interval::Intervals;
 use crate::compile::{Plan, TruthLink, persistence_lag};
-use crate::engine::mode::{Step, times};
-use crate::engine::{Cursor, Engine, History, Mode, Pairing};
+use crate::engine::{Cursor, Engine, History, Mode, Pairing, StepLength, times};
 use crate::recording::Event;
 use crate::time::{Duration, Instant};
 
@@ -62,7 +61,7 @@ pub struct Persistence {
     lag: Duration,
     ahead: Duration,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     max_age: Duration,
     history: History,
     cursor: Cursor,
@@ -229,7 +228,7 @@ impl Truth {
 impl Persistence {
     fn new(link: &TruthLink, mode: Mode) -> Self {
         let lag = persistence_lag(link.span, link.ahead);
-        let step = Step::new(lag + link.ahead);
+        let step = StepLength::new(lag + link.ahead);
         let depth = match (mode, step.planned()) {
             (Mode::Steps(steps), Some(step)) => times(step, steps.get().into()) - link.ahead,
             // How far apart truths will lie is not known. Scoring keeps them all anyway.

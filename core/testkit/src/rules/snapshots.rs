@@ -6,7 +6,7 @@ use super::super::Case;
 use super::super::compared::course;
 use super::super::fixture::NODE;
 use super::Subject;
-use crate::engine::{Carry, EngineState, Heritage};
+use crate::engine::{Carry, EngineState, StateTransfer};
 use crate::node::{State, Written, written_names};
 use crate::prng::Prng;
 
@@ -137,7 +137,7 @@ fn migrates(subject: &Subject<'_>, own: &[u8], older: &str, name: &str) -> Resul
     let mut engine = subject.engine();
     let mut state = engine.state();
     state.nodes.entry(NODE.to_owned()).or_default().own = Some(own.to_vec());
-    let carried = engine.adopt(&state, &Heritage::all(&subject.fixture.plan), false);
+    let carried = engine.adopt(&state, &StateTransfer::all(&subject.fixture.plan), false);
     let first = carried.into_iter().next();
     match first.map_or(Carry::Carried, |node| node.outcome) {
         Carry::Cold { .. } => Ok(()),
@@ -191,11 +191,11 @@ fn offer(subject: &Subject<'_>, other: &Subject<'_>) -> Result<(), String> {
 /// What the node answers to a state; then it has to live on.
 fn offered(subject: &Subject<'_>, state: &EngineState) -> Carry {
     let mut engine = subject.engine();
-    let carried = engine.adopt(state, &Heritage::all(&subject.fixture.plan), false);
+    let carried = engine.adopt(state, &StateTransfer::all(&subject.fixture.plan), false);
     engine.segment();
     course(&subject.fixture, &mut engine, &subject.events()[..100]);
     let mut engine = subject.engine();
-    engine.adopt(state, &Heritage::all(&subject.fixture.plan), false);
+    engine.adopt(state, &StateTransfer::all(&subject.fixture.plan), false);
     for (event, values) in subject.events() {
         if let crate::recording::Event::Row(now) = event {
             let later = *now + crate::time::Duration::from_ns(1_000_000_000_000_000);

@@ -1,7 +1,9 @@
-//! A panic within a node is told with the name that the node has in its graph.
+//! A panic within a node carries the name that the node has in its graph.
 
-use std::process::Command;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use athermal_core::diagnostic::{NodePanic, panic_text};
+use athermal_core::engine::Engine;
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
 };
@@ -53,57 +55,41 @@ const GRAPH: &str = r#"{"athermal_model": 1, "card": null, "fitted": {}, "graph"
     "outputs": {"out": "passed"}
 }}"#;
 
-#[test]
-#[ignore = "panics, and is called by the other"]
-fn a_node_panics() {
-    let model = Model::from_text("model.json", GRAPH.to_owned()).unwrap();
-    let mut engine = model.engine().unwrap();
-    for (second, value) in [(1, 0.5), (2, 1.5)] {
-        let now = Instant::from_ns(second * 1_000_000_000);
-        engine.step(now, &[0.0, value]).unwrap();
-    }
+fn engine(graph: &str) -> Engine {
+    let model = Model::from_text("model.json", graph.to_owned()).unwrap();
+    model.engine().unwrap()
 }
 
-#[test]
-#[ignore = "panics, and is called by the other"]
-fn a_node_panics_when_it_is_made() {
-    let graph = GRAPH.replace('Y', "fragile");
-    let model = Model::from_text("model.json", graph).unwrap();
-    let _ = model.engine();
-}
-
-/// What is told of the node in a test that panics.
-fn told_by(test: &str) -> String {
-    let output = Command::new(std::env::current_exe().unwrap())
-        .args([
-            &format!("panics::{test}"),
-            "--exact",
-            "--ignored",
-            "--nocapture",
-        ])
-        .output()
-        .unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    let mut lines = told.lines();
-    lines
-        .find(|line| line.starts_with("the node"))
-        .unwrap()
-        .to_owned()
+/// What a panic is reported as.
+fn panic_of(work: impl FnOnce()) -> String {
+    let panic = catch_unwind(AssertUnwindSafe(work)).unwrap_err();
+    assert!(panic.is::<NodePanic>());
+    panic_text(&*panic)
 }
 
 #[test]
 fn a_panic_of_a_node_that_is_made_names_it() {
-    let told = told_by("a_node_panics_when_it_is_made");
+    let text = panic_of(|| drop(engine(&GRAPH.replace('Y', "fragile"))));
     assert!(
-        told.starts_with("the node `passed.fragile` panicked before its first tick;"),
-        "{told}"
+        text.starts_with(
+            "the node `passed.fragile` panicked before its first tick: cannot be made;"
+        ),
+        "{text}"
     );
 }
 
 #[test]
 fn a_panic_names_the_node_and_the_tick() {
+    let text = panic_of(|| {
+        let mut engine = engine(GRAPH);
+        for (second, value) in [(1, 0.5), (2, 1.5)] {
+            let now = Instant::from_ns(second * 1_000_000_000);
+            engine.step(now, &[0.0, value]).unwrap();
+        }
+    });
     assert_eq!(
-        told_by("a_node_panics"),
-        "the node `passed.Y` panicked at 2 s; what it said stands above, and is for the author of `brittle`, from athermal-core 0.1.0"
+        text,
+        "the node `passed.Y` panicked at 2 s: too much; this is a mistake in its code, for the author of `brittle`, \
+         from athermal-core 0.1.0"
     );
 }

@@ -4,12 +4,12 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::{Engine, Fitted};
 use crate::compile::{Change, Plan, PlannedNode, diff};
+use crate::engine::{Engine, Fitted};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
-pub struct Heritage {
+pub struct StateTransfer {
     /// How each node begins.
     pub(crate) nodes: Vec<Begin>,
     /// Whether each slot goes on as it was: nothing that it hangs on has changed.
@@ -73,7 +73,7 @@ pub enum Carry {
     },
 }
 
-impl Heritage {
+impl StateTransfer {
     /// All of a plan, in itself.
     pub fn all(plan: &Plan) -> Self {
         Self {
@@ -112,8 +112,8 @@ impl Heritage {
             .map(|signal| signal.change != Change::Unchanged);
         let mut other_signals: Vec<bool> = signals.collect();
         other_signals.truncate(plan.sources.len());
-        let touched = Touched::by(plan, &other_signals, |node| own[node].is_some());
-        let but_for_fits = Touched::by(plan, &other_signals, |node| {
+        let touched = Dependents::by(plan, &other_signals, |node| own[node].is_some());
+        let but_for_fits = Dependents::by(plan, &other_signals, |node| {
             own[node].as_ref().is_some_and(|own| *own != Own::Fit)
         });
         let nodes = plan.nodes.iter().enumerate().map(|(index, node)| {
@@ -247,14 +247,14 @@ impl Own {
 }
 
 /// What hangs on something, by number.
-pub struct Touched {
-    pub nodes: Vec<bool>,
-    pub(super) slots: Vec<bool>,
+pub(crate) struct Dependents {
+    pub(crate) nodes: Vec<bool>,
+    pub(crate) slots: Vec<bool>,
 }
 
-impl Touched {
+impl Dependents {
     /// Everything that hangs on these signals and nodes, through loops too.
-    pub(super) fn by(plan: &Plan, signals: &[bool], node: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn by(plan: &Plan, signals: &[bool], node: impl Fn(usize) -> bool) -> Self {
         let mut slots = vec![false; plan.channels.len()];
         slots[..signals.len()].copy_from_slice(signals);
         let mut readers = vec![Vec::new(); plan.channels.len()];

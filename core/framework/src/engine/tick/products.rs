@@ -5,7 +5,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::node::Strands;
 
 /// The first coefficients of several linear forms whose first regressors are the same values.
-pub(super) struct Products {
+pub(crate) struct Products {
     /// Of [`ABREAST`] forms at a time, then of one: the coefficients of four regressors, form by form, then those of the next four.
     coefficients: Box<[[f64; 4]]>,
     sums: Box<[Strands]>,
@@ -17,7 +17,7 @@ const ABREAST: usize = 6;
 
 impl Products {
     /// Of forms by their coefficients, a multiple of four and of each the same number.
-    pub(super) fn new(forms: &[&[f64]]) -> Self {
+    pub(crate) fn new(forms: &[&[f64]]) -> Self {
         let width = forms.first().map_or(0, |form| form.len());
         let mut products = Self {
             coefficients: vec![[0.0; 4]; forms.len() * (width / 4)].into(),
@@ -31,7 +31,7 @@ impl Products {
     }
 
     /// Sets the coefficients of one of the forms.
-    pub(super) fn set(&mut self, nth: usize, form: &[f64]) {
+    pub(crate) fn set(&mut self, nth: usize, form: &[f64]) {
         let fours = form.as_chunks::<4>().0;
         let grouped = self.sums.len() / ABREAST * ABREAST;
         let (group, abreast) = if nth < grouped {
@@ -47,7 +47,7 @@ impl Products {
 
     /// The sums of all forms after as many products as the regressors are.
     #[inline]
-    pub(super) fn sum(&mut self, regressors: &[f64]) -> &[Strands] {
+    pub(crate) fn sum(&mut self, regressors: &[f64]) -> &[Strands] {
         if regressors.is_empty() {
             return &self.sums;
         }

@@ -60,7 +60,7 @@ impl History {
     /// The same, and from which instant on the answer may be another when nothing more is written down for instants before
     /// `unwritten`.
     #[inline]
-    pub(super) fn at_until(
+    pub(crate) fn at_until(
         &self,
         at: Instant,
         unwritten: Instant,

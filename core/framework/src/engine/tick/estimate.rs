@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::feedback::Feedback;
 use super::gather::Gathered;
-use super::learning::Learning;
 use super::part::Part;
-use super::state::NodeState;
-use super::{EngineError, Mode};
 use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
+use crate::engine::learning::Feedback;
+use crate::engine::learning::GatedLearner;
+use crate::engine::state::NodeState;
+use crate::engine::{EngineError, Mode};
 use crate::node::{FeatureFit, LinearForm, Predictor, Regressor, Restored};
 use crate::time::{Duration, Instant};
 
@@ -37,7 +37,7 @@ fn places_of(
 ///
 /// # Errors
 /// When the node has no regressor of a name that the fit uses.
-pub(super) fn fit_of(
+pub(crate) fn fit_of(
     node: &PlannedNode,
     regressors: &[Regressor],
     predictor: &Arc<dyn Predictor>,
@@ -51,7 +51,7 @@ pub(super) fn fit_of(
 /// What comes out where something was predicted at `now` from values of which the oldest has a stamp: nothing without a
 /// finite prediction.
 #[inline]
-pub(super) fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
+pub(crate) fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
     if prediction.is_finite() {
         (prediction, oldest)
     } else {
@@ -71,7 +71,7 @@ pub(crate) struct Estimate {
     plain: bool,
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
-    pub(super) learning: Option<Box<Learning>>,
+    pub(crate) learning: Option<Box<GatedLearner>>,
     /// What is read in place of measured past truths, in an evaluation that says so.
     feedback: Option<Box<Feedback>>,
 }
@@ -115,7 +115,7 @@ impl Estimate {
         let learning = match learning {
             None => None,
             Some(planned) => {
-                let learning = Learning::new(&predictor, *planned, *truth, *training);
+                let learning = GatedLearner::new(&predictor, *planned, *truth, *training);
                 Some(
                     learning
                         .map(Box::new)
@@ -306,7 +306,7 @@ impl Estimate {
     }
 
     /// What goes on learning.
-    pub(crate) fn learning(&mut self) -> Option<&mut Learning> {
+    pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
         self.learning.as_deref_mut()
     }
 
@@ -314,7 +314,7 @@ impl Estimate {
     pub(crate) fn snapshot(&self) -> NodeState {
         self.learning
             .as_deref()
-            .map(Learning::snapshot)
+            .map(GatedLearner::snapshot)
             .unwrap_or_default()
     }
 

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use super::blend::{Blending, rate};
 use super::slots::Slots;
 use crate::compile::Plan;
+use crate::engine::state::{Blending, rate};
 use crate::time::Instant;
 
 /// The outputs of a running plan, side by side in its order.
 #[derive(Debug)]
-pub(super) struct Outlets {
+pub(crate) struct OutputSlots {
     /// Where they are from: runs of them whose slots lie side by side, and the first slot of each.
     runs: Box<[(Range<usize>, usize)]>,
     /// What the last tick gave.
@@ -28,8 +28,8 @@ pub(super) struct Outlets {
     blendings: Box<[Blending]>,
 }
 
-impl Outlets {
-    pub(super) fn new(plan: &Plan) -> Self {
+impl OutputSlots {
+    pub(crate) fn new(plan: &Plan) -> Self {
         let count = plan.outputs.len();
         let slots: Vec<_> = plan.outputs.iter().map(|output| output.slot).collect();
         let mut first = 0;
@@ -59,12 +59,12 @@ impl Outlets {
     }
 
     /// What the last tick gave.
-    pub(super) fn values(&self) -> &[f64] {
+    pub(crate) fn values(&self) -> &[f64] {
         &self.values
     }
 
     /// Puts out what the nodes gave at the present tick; NaN where one did not run or gave nothing.
-    pub(super) fn put_out(&mut self, slots: &Slots, now: Instant) {
+    pub(crate) fn put_out(&mut self, slots: &Slots, now: Instant) {
         std::mem::swap(&mut self.values, &mut self.before);
         let mut lacks = false;
         for (outputs, first) in &self.runs {
@@ -117,7 +117,7 @@ impl Outlets {
     }
 
     /// How an output passes over, and what it was last.
-    pub(super) fn blending(&self, index: usize) -> Blending {
+    pub(crate) fn blending(&self, index: usize) -> Blending {
         match self.whole {
             Some(whole) => Blending::at_once(whole, self.values[index]),
             None if self.at[index] == Instant::MIN => self.blendings[index],
@@ -126,7 +126,7 @@ impl Outlets {
     }
 
     /// Lets an output go on passing over as it did.
-    pub(super) fn go_on(&mut self, index: usize, blending: Blending) {
+    pub(crate) fn go_on(&mut self, index: usize, blending: Blending) {
         if let Some(whole) = self.whole.take() {
             self.last.copy_from_slice(&self.values);
             self.at.fill(whole);
@@ -136,7 +136,7 @@ impl Outlets {
     }
 
     /// Lets outputs take over from those of another graph, both having been stepped to the same tick.
-    pub fn take_over(&mut self, before: &Self, from: &[Option<usize>]) {
+    pub(crate) fn take_over(&mut self, before: &Self, from: &[Option<usize>]) {
         for (index, from) in from.iter().enumerate() {
             if let Some(from) = *from {
                 let mut blending = self.blending(index);

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::AtHand;
-use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
-use super::estimate::Estimate;
-use super::slots::Given;
-use super::state::{NodeState, SlotState};
-use super::{Engine, EngineState, RestoreError, Running};
+use super::engine_state::{NodeState, SlotState};
+use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
+use crate::engine::tick::Estimate;
+use crate::engine::tick::Given;
+use crate::engine::tick::NodeRunner;
+use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
 use crate::node::Restored;
 
 impl Engine {
@@ -63,7 +63,7 @@ impl Engine {
 
     /// Goes on from a state of the same graph and fit; the first node that does not, and why.
     fn go_on(&mut self, state: &EngineState) -> Option<(String, String)> {
-        let carried = self.adopt(state, &Heritage::all(&self.plan), false);
+        let carried = self.adopt(state, &StateTransfer::all(&self.plan), false);
         carried.into_iter().find_map(|node| match node.outcome {
             Carry::Cold { reason } | Carry::Warmed { reason } => Some((node.node, reason)),
             Carry::Carried | Carry::Adopted { .. } | Carry::Migrated { .. } => None,
@@ -73,7 +73,7 @@ impl Engine {
     /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
     /// each follows, and what is frozen on command stays so.
     pub fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
-        self.outlets.take_over(&before.outlets, from);
+        self.outputs.take_over(&before.outputs, from);
         self.refused = before.refused;
         // Whoever made this engine ready may have missed the command.
         self.frozen = before.frozen;
@@ -116,7 +116,7 @@ impl Engine {
                 .collect(),
             nodes: self.node_states(),
             blending: outputs
-                .map(|(index, output)| (output.name.clone(), self.outlets.blending(index)))
+                .map(|(index, output)| (output.name.clone(), self.outputs.blending(index)))
                 .collect(),
         }
     }
@@ -130,35 +130,31 @@ impl Engine {
     }
 
     fn node_states(&self) -> BTreeMap<String, NodeState> {
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        let states =
-            self.plan
-                .nodes
-                .iter()
-                .zip(&self.nodes)
-                .enumerate()
-                .map(|(index, (node, running))| {
-                    at_hand.is(index);
-                    let state = match running {
-                        Running::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
-                        Running::Estimate { estimate, .. } => estimate
-                            .as_ref()
-                            .map(Estimate::snapshot)
-                            .unwrap_or_default(),
-                        Running::Vote(vote) => vote.snapshot(),
-                    };
-                    (node.instance(), state)
-                });
-        states.collect()
+        naming(&self.plan, When::Tick(self.last), |at_work| {
+            let nodes = self.plan.nodes.iter().zip(&self.nodes).enumerate();
+            let states = nodes.map(|(index, (node, runner))| {
+                at_work.is(index);
+                let state = match runner {
+                    NodeRunner::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
+                    NodeRunner::Estimate { estimate, .. } => estimate
+                        .as_ref()
+                        .map(Estimate::snapshot)
+                        .unwrap_or_default(),
+                    NodeRunner::Vote(vote) => vote.snapshot(),
+                };
+                (node.instance(), state)
+            });
+            states.collect()
+        })
     }
 
-    /// Goes on from a state of this or another graph, as far as the heritage says.
+    /// Goes on from a state of this or another graph, as far as the transfer says.
     ///
     /// `warmed` says whether this engine has been stepped over the past, so that what is not carried is not cold.
     pub fn adopt(
         &mut self,
         state: &EngineState,
-        heritage: &Heritage,
+        transfer: &StateTransfer,
         warmed: bool,
     ) -> Vec<NodeCarry> {
         let plan = Arc::clone(&self.plan);
@@ -171,12 +167,11 @@ impl Engine {
         };
         let mut carried = Vec::with_capacity(plan.nodes.len());
         let mut refusing = vec![false; plan.nodes.len()];
-        let mut at_hand = AtHand::at_start(&plan);
         for (index, (node, running)) in plan.nodes.iter().zip(&mut self.nodes).enumerate() {
-            at_hand.is(index);
             let was = state.nodes.get(&node.instance());
-            let outcome = match &heritage.nodes[index] {
-                Begin::AsItWas => match restored(running, was) {
+            let mut restored = || naming_one(&plan, index, When::Start, || restored(running, was));
+            let outcome = match &transfer.nodes[index] {
+                Begin::AsItWas => match restored() {
                     Restored::Accepted => Carry::Carried,
                     Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason } => {
@@ -184,7 +179,7 @@ impl Engine {
                         afresh(reason)
                     }
                 },
-                Begin::Offered { reason } => match restored(running, was) {
+                Begin::Offered { reason } => match restored() {
                     Restored::Accepted => Carry::Adopted {
                         reason: reason.clone(),
                     },
@@ -198,11 +193,10 @@ impl Engine {
                 outcome,
             });
         }
-        drop(at_hand);
-        self.adopt_slots(state, heritage, &refusing);
+        self.adopt_slots(state, transfer, &refusing);
         if refusing.contains(&true) {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.
-            let touched = Touched::by(&plan, &[], |node| refusing[node]);
+            let touched = Dependents::by(&plan, &[], |node| refusing[node]);
             for (node, carry) in plan.nodes.iter().zip(&mut carried) {
                 let read = plan.reads(node).find(|&slot| touched.slots[slot]);
                 if let (Carry::Carried, Some(slot)) = (&carry.outcome, read) {
@@ -216,9 +210,9 @@ impl Engine {
         carried
     }
 
-    fn adopt_slots(&mut self, state: &EngineState, heritage: &Heritage, refusing: &[bool]) {
+    fn adopt_slots(&mut self, state: &EngineState, transfer: &StateTransfer, refusing: &[bool]) {
         for (slot, channel) in self.plan.channels.iter().enumerate() {
-            if !heritage.slots[slot] || channel.node.is_some_and(|node| refusing[node]) {
+            if !transfer.slots[slot] || channel.node.is_some_and(|node| refusing[node]) {
                 continue;
             }
             if let Some(was) = state.slots.get(&channel.name) {
@@ -246,9 +240,9 @@ impl Engine {
         }
         for (index, output) in self.plan.outputs.iter().enumerate() {
             if let Some(was) = state.blending.get(&output.name)
-                && heritage.outputs[index]
+                && transfer.outputs[index]
             {
-                self.outlets.go_on(index, *was);
+                self.outputs.go_on(index, *was);
             }
         }
         self.slots.tick = state.tick;
@@ -271,20 +265,20 @@ impl Engine {
 }
 
 /// What a node answers to a state.
-fn restored(running: &mut Running, state: Option<&NodeState>) -> Restored {
+fn restored(running: &mut NodeRunner, state: Option<&NodeState>) -> Restored {
     let Some(state) = state else {
         return Restored::cold("nothing is known of it");
     };
     match running {
-        Running::Operator { operator, .. } => match state.unpack() {
+        NodeRunner::Operator { operator, .. } => match state.unpack() {
             Ok(Some(own)) => operator.restore(own),
             Ok(None) => Restored::Accepted,
             Err(cold) => cold,
         },
-        Running::Estimate { estimate, .. } => match estimate {
+        NodeRunner::Estimate { estimate, .. } => match estimate {
             Some(estimate) => estimate.restore(state),
             None => Restored::Accepted,
         },
-        Running::Vote(vote) => vote.restore(state),
+        NodeRunner::Vote(vote) => vote.restore(state),
     }
 }

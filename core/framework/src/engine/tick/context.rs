@@ -2,34 +2,34 @@
 
 use std::ops::Range;
 
-use super::at_hand::AtHand;
 use super::estimate::Estimate;
 use super::gather::Gathered;
-use super::learning::Learning;
-use super::running::Running;
+use super::runner::NodeRunner;
 use super::slots::Slots;
 use super::vote::Vote;
 use crate::channel::unless_infinite;
+use crate::engine::at_work::AtWork;
+use crate::engine::learning::GatedLearner;
 use crate::node::{Operator, Outputs, Tick};
 use crate::time::Instant;
 
 /// What all nodes see of a tick.
-pub(super) struct Turn<'a> {
-    pub(super) now: Instant,
-    pub(super) slots: &'a mut Slots,
-    pub(super) gathered: &'a mut [Gathered],
+pub(crate) struct TickContext<'a> {
+    pub(crate) now: Instant,
+    pub(crate) slots: &'a mut Slots,
+    pub(crate) gathered: &'a mut [Gathered],
     /// Room for the regressors of any estimator.
-    pub(super) row: &'a mut [f64],
+    pub(crate) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
-    pub(super) frozen: bool,
-    pub(super) at_hand: AtHand<'a>,
+    pub(crate) frozen: bool,
+    pub(crate) at_work: &'a mut AtWork,
 }
 
-impl Turn<'_> {
+impl TickContext<'_> {
     #[inline]
-    pub(super) fn of(&mut self, running: &mut Running) {
+    pub(crate) fn run(&mut self, running: &mut NodeRunner) {
         match running {
-            Running::Operator {
+            NodeRunner::Operator {
                 operator,
                 gathers,
                 every_tick,
@@ -44,7 +44,7 @@ impl Turn<'_> {
                     self.operator(&mut **operator, slots.clone(), gathers, *closes_loops);
                 }
             }
-            Running::Estimate {
+            NodeRunner::Estimate {
                 estimate: Some(estimate),
                 trigger,
                 slot,
@@ -55,20 +55,20 @@ impl Turn<'_> {
                     self.slots.set(*slot, value, stamp);
                 }
             }
-            Running::Estimate {
+            NodeRunner::Estimate {
                 estimate,
                 trigger,
                 slot,
                 std_dev,
             } => self.estimate(estimate.as_mut(), *trigger, *slot, *std_dev),
-            Running::Vote(vote) => self.vote(vote),
+            NodeRunner::Vote(vote) => self.vote(vote),
         }
     }
 
     /// Lets a node take what it needs of values that are not yet there when it runs.
     #[inline(never)]
-    pub(super) fn capture(&self, running: &mut Running) {
-        if let Running::Operator {
+    pub(crate) fn capture(&self, running: &mut NodeRunner) {
+        if let NodeRunner::Operator {
             operator, gathers, ..
         } = running
         {
@@ -116,7 +116,7 @@ impl Turn<'_> {
 
     /// Lets an estimator learn before it runs; what became of the newest truth is told beside its prediction.
     #[inline]
-    pub(super) fn learn(&mut self, learning: &mut Learning, slot: usize) {
+    pub(crate) fn learn(&mut self, learning: &mut GatedLearner, slot: usize) {
         let (now, on) = (self.now, !self.frozen);
         if learning.at_once() && self.slots.fresh(learning.truth()) {
             let truth = self.slots.values[learning.truth()];

@@ -1,17 +1,17 @@
 //! Decides which estimators are predicted at once; not what each of them predicts.
 
+use super::context::TickContext;
 use super::estimate::given;
 use super::gather::Gathered;
 use super::part::Part;
 use super::products::Products;
-use super::running::Running;
-use super::turn::Turn;
+use super::runner::NodeRunner;
 use crate::compile::{Plan, Step};
 use crate::node::LinearForm;
 use crate::time::Instant;
 
 /// What is done at a tick, in order.
-pub(super) enum Work {
+pub(crate) enum Work {
     /// As it was planned.
     Step(Step),
     /// Several steps of the plan that follow each other.
@@ -20,7 +20,7 @@ pub(super) enum Work {
 
 /// The steps of a plan, in which linear estimators that follow each other and share their first regressors, or each have a few of
 /// their own, are one.
-pub(super) fn work(plan: &Plan, nodes: &[Running]) -> Box<[Work]> {
+pub(crate) fn work(plan: &Plan, nodes: &[NodeRunner]) -> Box<[Work]> {
     let mut work = Vec::new();
     let mut bank: Vec<Linear<'_>> = Vec::new();
     for step in &plan.steps {
@@ -77,8 +77,8 @@ impl<'a> Linear<'a> {
     /// The fewest regressors of which the products of several estimators are worth being summed at once.
     const MANY: usize = 8;
 
-    fn of(node: usize, running: &'a Running) -> Option<Self> {
-        let Running::Estimate {
+    fn of(node: usize, running: &'a NodeRunner) -> Option<Self> {
+        let NodeRunner::Estimate {
             estimate: Some(estimate),
             trigger,
             slot,
@@ -110,7 +110,7 @@ impl<'a> Linear<'a> {
 }
 
 /// Linear estimators that follow each other, and whose first regressors are the same values.
-pub(super) struct Bank {
+pub(crate) struct Bank {
     shared: Option<Part>,
     /// Of as many of the shared regressors as are a multiple of four.
     products: Products,
@@ -166,28 +166,28 @@ impl Bank {
     }
 
     /// Lets those of its estimators that learn do so, and predicts those that run at a tick.
-    pub(super) fn run(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) {
-        self.learn(turn, nodes);
-        if !self.predict(turn, nodes) {
+    pub(crate) fn run(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
+        self.learn(context, nodes);
+        if !self.predict(context, nodes) {
             for member in self.members.iter().filter(|of| !of.whole) {
-                turn.at_hand.is(member.node);
-                turn.of(&mut nodes[member.node]);
+                context.at_work.is(member.node);
+                context.run(&mut nodes[member.node]);
             }
         }
     }
 
     #[inline]
-    fn learn(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) {
+    fn learn(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
         let learning = self.members.iter_mut().enumerate();
         for (nth, member) in learning.filter(|(_, of)| of.learns) {
-            if let Running::Estimate {
+            if let NodeRunner::Estimate {
                 estimate: Some(estimate),
                 ..
             } = &mut nodes[member.node]
                 && let Some(learning) = estimate.learning()
             {
-                turn.at_hand.is(member.node);
-                turn.learn(learning, member.slot);
+                context.at_work.is(member.node);
+                context.learn(learning, member.slot);
                 if learning.has_changed()
                     && let Some(form) = estimate.form()
                 {
@@ -202,8 +202,8 @@ impl Bank {
 
     /// Predicts those all of whose regressors are known to be there; false where there are others.
     #[inline]
-    fn predict(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) -> bool {
-        let (gathered, now) = (&*turn.gathered, turn.now);
+    fn predict(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) -> bool {
+        let (gathered, now) = (&*context.gathered, context.now);
         let shared = match &self.shared {
             None => Some((&[][..], Instant::MAX)),
             Some(part) => part.in_place(gathered),
@@ -228,12 +228,12 @@ impl Bank {
             if member.learns
                 && let Some(learning) = nodes[member.node].learning()
             {
-                turn.at_hand.is(member.node);
-                learning.ran([at_once, others], now, gathered, !turn.frozen);
+                context.at_work.is(member.node);
+                learning.ran([at_once, others], now, gathered, !context.frozen);
             }
             let prediction = member.constant + sums.sum(&member.coefficients, others);
             let (value, stamp) = given(prediction, stamp.min(oldest), now);
-            turn.slots.set(member.slot, value, stamp);
+            context.slots.set(member.slot, value, stamp);
         }
         all
     }

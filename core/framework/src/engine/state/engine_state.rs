@@ -6,10 +6,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::blend::Blending;
-use super::history::History;
 use super::revision::fnv_1a;
-use super::withheld::LearningState;
 use crate::channel::Extremes;
+use crate::engine::learning::EmbargoState;
+use crate::engine::tick::History;
 use crate::node::{RecentError, Restored, State};
 use crate::time::Instant;
 
@@ -52,7 +52,7 @@ pub(crate) struct SlotState {
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct NodeState {
     pub own: Option<Vec<u8>>,
-    pub(crate) learning: Option<LearningState>,
+    pub(crate) learning: Option<EmbargoState>,
     /// The recent error of an estimator that learns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) recent: Option<RecentError>,

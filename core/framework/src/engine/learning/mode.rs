@@ -36,13 +36,13 @@ pub fn times(step: Duration, count: i64) -> Duration {
 
 /// The length of a step: as it was planned, or where that is nothing the time between the last two truths.
 #[derive(Debug, Clone, Copy)]
-pub struct Step {
+pub struct StepLength {
     planned: Duration,
     last: Option<crate::time::Instant>,
     between: Duration,
 }
 
-impl Step {
+impl StepLength {
     /// A step that was planned, or [`Duration::ZERO`] where none was.
     pub fn new(planned: Duration) -> Self {
         Self {

@@ -8,8 +8,8 @@ use crate::time::Instant;
 
 /// Regressors that follow each other and are read by one gather.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Part {
-    pub(super) gather: usize,
+pub(crate) struct Part {
+    pub(crate) gather: usize,
     places: Places,
 }
 
@@ -21,7 +21,7 @@ enum Places {
 }
 
 impl Part {
-    pub(super) fn new(gather: usize, places: &[usize]) -> Self {
+    pub(crate) fn new(gather: usize, places: &[usize]) -> Self {
         let first = places.first().copied().unwrap_or(0);
         let range = first..first + places.len();
         let side_by_side = range.clone().eq(places.iter().copied());
@@ -35,7 +35,7 @@ impl Part {
         }
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match &self.places {
             Places::SideBySide(range) => range.len(),
             Places::Apart(places) => places.len(),
@@ -43,7 +43,7 @@ impl Part {
     }
 
     /// What its regressors are.
-    pub(super) fn entries(&self, gathers: &[Gather]) -> Vec<Entry> {
+    pub(crate) fn entries(&self, gathers: &[Gather]) -> Vec<Entry> {
         let entries = &gathers[self.gather].entries;
         match &self.places {
             Places::SideBySide(range) => entries[range.clone()].to_vec(),
@@ -52,13 +52,13 @@ impl Part {
     }
 
     /// Whether they lie side by side, so that they need not be copied.
-    pub(super) fn is_side_by_side(&self) -> bool {
+    pub(crate) fn is_side_by_side(&self) -> bool {
         matches!(self.places, Places::SideBySide(_))
     }
 
     /// The values where they lie and the oldest stamp among them, where they lie side by side and are known to be all there.
     #[inline]
-    pub(super) fn in_place<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
+    pub(crate) fn in_place<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
         let Places::SideBySide(range) = &self.places else {
             return None;
         };
@@ -68,7 +68,7 @@ impl Part {
 
     /// Reads its piece of a row: whether all of it is there, and the oldest stamp of what is.
     #[inline]
-    pub(super) fn read(&self, gathered: &[Gathered], piece: &mut [f64]) -> (bool, Instant) {
+    pub(crate) fn read(&self, gathered: &[Gathered], piece: &mut [f64]) -> (bool, Instant) {
         let from = &gathered[self.gather];
         match &self.places {
             Places::SideBySide(range) => piece.copy_from_slice(&from.values[range.clone()]),

@@ -8,7 +8,7 @@ use crate::time::Instant;
 /// number of rows is known.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(into = "InOrder", try_from = "InOrder")]
-pub(super) struct Rows {
+pub(crate) struct Rows {
     width: usize,
     times: Vec<Instant>,
     numbers: Vec<f64>,
@@ -55,7 +55,7 @@ impl TryFrom<InOrder> for Rows {
 
 impl Rows {
     /// None yet.
-    pub(super) fn new(width: usize) -> Self {
+    pub(crate) fn new(width: usize) -> Self {
         Self {
             width,
             times: vec![Instant::MIN; 4],
@@ -65,17 +65,17 @@ impl Rows {
         }
     }
 
-    pub(super) fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
     /// Room for one more row, in which anything may stand.
     #[inline]
-    pub(super) fn push(&mut self, at: Instant) -> &mut [f64] {
+    pub(crate) fn push(&mut self, at: Instant) -> &mut [f64] {
         if self.len == self.times.len() {
             self.grow();
         }
@@ -87,19 +87,19 @@ impl Rows {
 
     /// The instant of a row, counted from the oldest.
     #[inline]
-    pub(super) fn time(&self, nth: usize) -> Option<Instant> {
+    pub(crate) fn time(&self, nth: usize) -> Option<Instant> {
         (nth < self.len).then(|| self.times[self.index(nth)])
     }
 
     /// A row, counted from the oldest; anything where there is none.
     #[inline]
-    pub(super) fn row(&self, nth: usize) -> &[f64] {
+    pub(crate) fn row(&self, nth: usize) -> &[f64] {
         &self.numbers[self.index(nth) * self.width..][..self.width]
     }
 
     /// Forgets the oldest row.
     #[inline]
-    pub(super) fn pop(&mut self) {
+    pub(crate) fn pop(&mut self) {
         if self.len > 0 {
             self.first = self.index(1);
             self.len -= 1;
@@ -107,12 +107,12 @@ impl Rows {
     }
 
     /// Forgets all rows.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
 
     /// Makes room for as many rows more as there are, and for a few.
-    pub(super) fn reserve(&mut self) {
+    pub(crate) fn reserve(&mut self) {
         while self.times.len() < 2 * self.len.max(8) {
             self.grow();
         }

@@ -5,8 +5,8 @@ use std::hash::Hasher;
 
 use serde_json::json;
 
-use super::Fitted;
 use crate::compile::{Plan, meaning};
+use crate::engine::Fitted;
 
 /// The revision of a plan with what was fitted: the same for two files that mean the same.
 ///

@@ -4,71 +4,27 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::pairing::{FormerPairing, Pairing};
+use super::pairing::Pairing;
 use crate::compile::TruthLink;
 use crate::time::Instant;
 
 /// The runs that truths may be paired with, and the pairs that the embargo still withholds.
 #[derive(Debug)]
-pub(crate) struct Withheld {
+pub(crate) struct Embargo {
     link: TruthLink,
-    state: LearningState,
+    state: EmbargoState,
 }
 
 /// What is withheld, as it is kept.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(try_from = "AnyForm")]
-pub(crate) struct LearningState {
+pub(crate) struct EmbargoState {
     pairing: Pairing,
-    withheld: VecDeque<Late>,
-}
-
-/// What is withheld, as it is or was kept.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum AnyForm {
-    Now {
-        pairing: Pairing,
-        withheld: VecDeque<Late>,
-    },
-    /// Rows of truths lay beside them, and not with those of the runs that no truth has come for.
-    Former {
-        pairing: FormerPairing,
-        withheld: Vec<(Instant, f64)>,
-        rows: Vec<f64>,
-    },
-}
-
-impl TryFrom<AnyForm> for LearningState {
-    type Error = &'static str;
-
-    fn try_from(kept: AnyForm) -> Result<Self, Self::Error> {
-        let (truths, former, rows) = match kept {
-            AnyForm::Now { pairing, withheld } => return Ok(Self { pairing, withheld }),
-            AnyForm::Former {
-                pairing,
-                withheld,
-                rows,
-            } => (withheld, pairing, rows),
-        };
-        let (pairing, first) = former.after(&rows, truths.len())?;
-        let late = |(run, (arrived, truth)): (u64, (Instant, f64))| Late {
-            arrived,
-            truth,
-            // It stood in the row.
-            note: 0.0,
-            run,
-        };
-        Ok(Self {
-            pairing,
-            withheld: (first..).zip(truths).map(late).collect(),
-        })
-    }
+    withheld: VecDeque<PendingTruth>,
 }
 
 /// A truth not yet handed over.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Late {
+struct PendingTruth {
     arrived: Instant,
     truth: f64,
     note: f64,
@@ -78,7 +34,7 @@ struct Late {
 
 /// A truth that the embargo lets through.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Released<'a> {
+pub(crate) struct DueTruth<'a> {
     /// What was written down of the run that it belongs to.
     pub(crate) row: &'a [f64],
     pub(crate) truth: f64,
@@ -87,12 +43,12 @@ pub(crate) struct Released<'a> {
     pub(crate) note: f64,
 }
 
-impl Withheld {
+impl Embargo {
     /// Nothing yet, for runs of each of which `width` numbers are written down.
     pub(crate) fn new(link: TruthLink, width: usize) -> Self {
         Self {
             link,
-            state: LearningState {
+            state: EmbargoState {
                 pairing: Pairing::new(&link, width),
                 withheld: VecDeque::new(),
             },
@@ -112,12 +68,12 @@ impl Withheld {
     /// Takes a truth that has just been measured, and a note, if there was a run for it.
     #[inline]
     pub(crate) fn observe(&mut self, truth: f64, now: Instant, note: f64) {
-        let LearningState { pairing, withheld } = &mut self.state;
+        let EmbargoState { pairing, withheld } = &mut self.state;
         if let Some(run) = pairing.number_for(now) {
             if withheld.is_empty() {
                 pairing.keep_from(Some(run));
             }
-            withheld.push_back(Late {
+            withheld.push_back(PendingTruth {
                 arrived: now,
                 truth,
                 note,
@@ -133,7 +89,7 @@ impl Withheld {
 
     /// Hands over every truth that arrived up to `newest`, in order.
     #[inline]
-    pub(crate) fn release(&mut self, newest: Instant, tell: impl FnMut(Released<'_>)) {
+    pub(crate) fn release(&mut self, newest: Instant, tell: impl FnMut(DueTruth<'_>)) {
         let next = self.state.withheld.front();
         if next.is_some_and(|late| late.arrived <= newest) {
             self.release_some(newest, tell);
@@ -141,14 +97,14 @@ impl Withheld {
     }
 
     #[inline(never)]
-    fn release_some(&mut self, newest: Instant, mut tell: impl FnMut(Released<'_>)) {
-        let LearningState { pairing, withheld } = &mut self.state;
+    fn release_some(&mut self, newest: Instant, mut tell: impl FnMut(DueTruth<'_>)) {
+        let EmbargoState { pairing, withheld } = &mut self.state;
         while let Some(&late) = withheld.front()
             && late.arrived <= newest
         {
             withheld.pop_front();
             if let Some(row) = pairing.row_of(late.run) {
-                tell(Released {
+                tell(DueTruth {
                     row,
                     truth: late.truth,
                     arrived: late.arrived,
@@ -160,19 +116,19 @@ impl Withheld {
     }
 
     /// Hands over all, up to the last tick of a segment that has ended.
-    pub(crate) fn end_segment(&mut self, last: Instant, tell: impl FnMut(Released<'_>)) {
+    pub(crate) fn end_segment(&mut self, last: Instant, tell: impl FnMut(DueTruth<'_>)) {
         // The embargo guards predictions of the segment that has ended; none of them is still to come.
         self.release(last, tell);
         self.state.pairing.clear();
     }
 
     /// All that is withheld.
-    pub(crate) fn state(&self) -> LearningState {
+    pub(crate) fn state(&self) -> EmbargoState {
         self.state.clone()
     }
 
     /// Goes on from what was withheld of runs that are paired alike.
-    pub(crate) fn restore(&mut self, state: &LearningState) {
+    pub(crate) fn restore(&mut self, state: &EmbargoState) {
         let own = &mut self.state;
         if own.pairing.go_on_from(&state.pairing) {
             own.withheld.clone_from(&state.withheld);
@@ -202,7 +158,7 @@ mod tests {
     #[test]
     fn each_truth_is_handed_over_with_the_whole_row_of_its_run() {
         let s = |seconds: i64| Instant::from_ns(seconds * 1_000_000_000);
-        let mut withheld = Withheld::new(link(), 3);
+        let mut withheld = Embargo::new(link(), 3);
         let mut handed = 0;
         for t in 0..1000 {
             let now = t as f64;
@@ -220,45 +176,5 @@ mod tests {
             }
         }
         assert!(handed > 500, "{handed}");
-    }
-
-    #[test]
-    fn what_was_kept_in_the_former_form_is_handed_over_as_it_would_have_been() {
-        let former = r#"{
-            "pairing": {
-                "ahead": "0s", "limit": "1min", "width": 2,
-                "times": [40, 10, 20, 30], "rows": [4.0, 4.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5],
-                "first": 2, "len": 3, "number": 7
-            },
-            "withheld": [[15, 15.0], [16, 16.0]],
-            "rows": [1.0, 1.5, 1.0, 1.5]
-        }"#;
-        let mut withheld = Withheld::new(link(), 2);
-        withheld.restore(&serde_json::from_str(former).unwrap());
-        let mut handed = Vec::new();
-        let mut release = |withheld: &mut Withheld, newest| {
-            withheld.release(Instant::from_ns(newest), |released| {
-                handed.push((released.truth, released.row.to_vec()));
-            });
-        };
-        release(&mut withheld, 15);
-        withheld.observe(35.0, Instant::from_ns(35), 0.0);
-        withheld.run(Instant::from_ns(50), [&[5.0, 5.5][..]]);
-        withheld.observe(50.0, Instant::from_ns(50), 0.0);
-        release(&mut withheld, 60);
-        assert_eq!(
-            handed,
-            [
-                (15.0, vec![1.0, 1.5]),
-                (16.0, vec![1.0, 1.5]),
-                (35.0, vec![3.0, 3.5]),
-                (50.0, vec![5.0, 5.5]),
-            ]
-        );
-        let cut = former.replace("[1.0, 1.5, 1.0, 1.5]", "[1.0]");
-        assert!(serde_json::from_str::<LearningState>(&cut).is_err());
-        let kept = serde_json::to_string(&withheld.state()).unwrap();
-        let read: LearningState = serde_json::from_str(&kept).unwrap();
-        assert_eq!(serde_json::to_string(&read).unwrap(), kept);
     }
 }

@@ -2,24 +2,23 @@
 
 use std::sync::Arc;
 
-use super::Mode;
-use super::gather::Gathered;
-use super::mode::Step;
-use super::state::NodeState;
-use super::withheld::{Released, Withheld};
+use super::embargo::{DueTruth, Embargo};
+use super::mode::{Mode, StepLength};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
+use crate::engine::state::NodeState;
+use crate::engine::tick::Gathered;
 use crate::node::{Admission, Learner, LearningGate, LinearForm, Predictor, Restored};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
 #[derive(Debug)]
-pub(crate) struct Learning {
+pub(crate) struct GatedLearner {
     learner: Box<dyn Learner>,
-    withheld: Withheld,
+    withheld: Embargo,
     gate: Gate,
     freeze: Option<usize>,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     /// Whether a run knows of the truth of its own tick.
     at_once: bool,
     /// Whether it may predict otherwise than when it was asked last.
@@ -48,7 +47,7 @@ pub(crate) enum LearnOutcome {
     Incomplete = 6,
 }
 
-impl Learning {
+impl GatedLearner {
     /// Goes on from a fit; none for a predictor that stays as it was fitted.
     pub(crate) fn new(
         predictor: &Arc<dyn Predictor>,
@@ -64,7 +63,7 @@ impl Learning {
             learner,
             changed: false,
             // With each row stands whether learning was frozen at the run.
-            withheld: Withheld::new(truth, width + 1),
+            withheld: Embargo::new(truth, width + 1),
             freeze: planned.freeze,
             gate: Gate {
                 predictor: Arc::clone(predictor),
@@ -72,7 +71,7 @@ impl Learning {
                 own,
             },
             mode: Mode::OneStep,
-            step: Step::new(truth.ahead.max(truth.span)),
+            step: StepLength::new(truth.ahead.max(truth.span)),
             nothing: vec![f64::NAN; width],
         })
     }
@@ -261,10 +260,10 @@ impl Gate {
     fn offer(
         &mut self,
         learner: &mut dyn Learner,
-        released: Released<'_>,
+        released: DueTruth<'_>,
         frozen: f64,
     ) -> LearnOutcome {
-        let Released {
+        let DueTruth {
             row,
             truth,
             arrived,

@@ -33,7 +33,7 @@ pub(crate) fn rate(output: &PlannedOutput, unit: &Unit) -> Option<f64> {
 
 impl Blending {
     /// Of an output that has shown a value of its own graph as it is.
-    pub(super) fn at_once(at: Instant, value: f64) -> Self {
+    pub(crate) fn at_once(at: Instant, value: f64) -> Self {
         Self {
             shown: Some((at, value)),
             own: Some((at, value)),
@@ -45,7 +45,7 @@ impl Blending {
     ///
     /// Between two values that are shown, the offset falls by no more than the rate times the time between them. Where time
     /// starts again, no time has passed.
-    pub(super) fn pass(&mut self, now: Instant, value: f64, rate: f64) -> f64 {
+    pub(crate) fn pass(&mut self, now: Instant, value: f64, rate: f64) -> f64 {
         if std::mem::take(&mut self.begins) {
             self.offset = self.shown.map_or(0.0, |(_, shown)| shown - value);
         }

@@ -1,7 +1,7 @@
 //! Decides what a node sees of the slots that it reads: fresh or held, how old, how far back; not what it does with it.
 
 use super::history::{Cursor, History};
-use super::{Given, Slots};
+use super::slots::{Given, Slots};
 use crate::channel::{ABSENT, UNCHANGED};
 use crate::compile::{Conversion, Entry, Gather};
 use crate::node::Read;

@@ -24,7 +24,7 @@ pub struct Pairing {
 
 /// A run that a truth has been paired with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Paired<'a> {
+pub struct Pair<'a> {
     /// When it ran.
     pub at: Instant,
     /// The number of the run, counted from the first.
@@ -64,9 +64,9 @@ impl Pairing {
     }
 
     /// The run that a truth at `tau` belongs to. Instants asked for never go back.
-    pub fn truth(&mut self, tau: Instant) -> Option<Paired<'_>> {
+    pub fn truth(&mut self, tau: Instant) -> Option<Pair<'_>> {
         let number = self.number_for(tau)?;
-        Some(Paired {
+        Some(Pair {
             at: self.runs.time(self.past)?,
             number,
             row: self.last(),
@@ -75,7 +75,7 @@ impl Pairing {
 
     /// The number of that run.
     #[inline]
-    pub(super) fn number_for(&mut self, tau: Instant) -> Option<u64> {
+    pub(crate) fn number_for(&mut self, tau: Instant) -> Option<u64> {
         let due = tau - self.ahead;
         self.forget_before(due);
         let at = self.runs.time(self.past)?;
@@ -93,20 +93,20 @@ impl Pairing {
     }
 
     /// Keeps all runs from one of them on, those too that no later truth belongs to; without a number none of these.
-    pub(super) fn keep_from(&mut self, number: Option<u64>) {
+    pub(crate) fn keep_from(&mut self, number: Option<u64>) {
         self.needed = number.unwrap_or(u64::MAX);
     }
 
     /// What was written down of a run, if it is kept.
     #[inline]
-    pub(super) fn row_of(&self, number: u64) -> Option<&[f64]> {
+    pub(crate) fn row_of(&self, number: u64) -> Option<&[f64]> {
         let nth = number.checked_sub(self.first())?;
         let nth = usize::try_from(nth).ok()?;
         (nth < self.runs.len()).then(|| self.runs.row(nth))
     }
 
     /// Goes on from another that pairs alike; false where it does not.
-    pub(super) fn go_on_from(&mut self, other: &Self) -> bool {
+    pub(crate) fn go_on_from(&mut self, other: &Self) -> bool {
         let of = |pairing: &Self| (pairing.ahead, pairing.limit, pairing.runs.width());
         let counts = other.past <= other.runs.len() && other.past as u64 <= other.number;
         let takes = of(self) == of(other) && counts;
@@ -145,57 +145,6 @@ impl Pairing {
             self.runs.pop();
             self.past -= 1;
         }
-    }
-}
-
-/// As runs were kept before they waited for truths that are withheld too: in a ring of which `len` from `first` on counted.
-#[derive(Debug, Deserialize)]
-pub(super) struct FormerPairing {
-    ahead: Duration,
-    limit: Duration,
-    width: usize,
-    times: Vec<Instant>,
-    rows: Vec<f64>,
-    first: usize,
-    len: usize,
-    number: u64,
-}
-
-impl FormerPairing {
-    /// The same after some rows that truths wait with, and the number of the first of these.
-    ///
-    /// # Errors
-    /// When its parts do not fit together.
-    pub(super) fn after(
-        self,
-        waiting: &[f64],
-        count: usize,
-    ) -> Result<(Pairing, u64), &'static str> {
-        let (width, room) = (self.width, self.times.len());
-        let fits = |count: usize, numbers: &[f64]| count.checked_mul(width) == Some(numbers.len());
-        if !(fits(count, waiting) && fits(room, &self.rows) && self.len <= room) {
-            return Err("rows of runs are not as long as they say");
-        }
-        let mut runs = Rows::new(width);
-        for nth in 0..count {
-            // Nobody asks when a run was that no later truth belongs to.
-            let row = runs.push(Instant::MIN);
-            row.copy_from_slice(&waiting[nth * width..][..width]);
-        }
-        for nth in 0..self.len {
-            let index = (self.first % room + nth) % room;
-            let row = runs.push(self.times[index]);
-            row.copy_from_slice(&self.rows[index * width..][..width]);
-        }
-        let pairing = Pairing {
-            ahead: self.ahead,
-            limit: self.limit,
-            runs,
-            past: count,
-            number: self.number.saturating_add(count as u64),
-            needed: if count > 0 { self.number } else { u64::MAX },
-        };
-        Ok((pairing, self.number))
     }
 }
 

@@ -3,10 +3,11 @@
 
 use std::collections::VecDeque;
 
-use super::mode::{Step, times};
+use super::mode::Mode;
+use super::mode::{StepLength, times};
 use super::pairing::Pairing;
-use super::{Mode, Slots};
 use crate::compile::{Entry, TruthLink};
+use crate::engine::tick::Slots;
 use crate::time::{Duration, Instant};
 
 /// How many of the newest innovations that a prediction rests on count in its deviation.
@@ -17,7 +18,7 @@ const MOST_BROUGHT: usize = 256;
 pub(crate) struct Feedback {
     link: TruthLink,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     past: Vec<Past>,
     /// Each run with what was predicted, after it.
     pairing: Pairing,
@@ -80,7 +81,7 @@ impl Feedback {
         Some(Self {
             link: *link,
             mode,
-            step: Step::new(smallest + link.ahead),
+            step: StepLength::new(smallest + link.ahead),
             pairing: Pairing::new(link, regressors.len() + past.len() + 1),
             truths: VecDeque::new(),
             deepest,

@@ -1,37 +1,37 @@
 //! Decides when a combiner is told of a truth; not what it makes of it.
 
 use super::gather::Gathered;
-#[cfg(feature = "testkit")]
-use super::idle::Answer;
-use super::state::NodeState;
-use super::withheld::{Released, Withheld};
 use crate::channel::unless_infinite;
 use crate::compile::{AuxPorts, TruthLink};
+#[cfg(feature = "testkit")]
+use crate::engine::idle::Answer;
+use crate::engine::learning::{DueTruth, Embargo};
+use crate::engine::state::NodeState;
 use crate::node::{Combine, Combiner, Evidence, Restored, Votes};
 use crate::time::{Duration, Instant};
 
 /// A combiner in a running plan, with the truths that the embargo still withholds from it.
 pub(crate) struct Vote {
     combine: Box<dyn Combine>,
-    withheld: Option<Withheld>,
+    withheld: Option<Embargo>,
     /// Both ends of the interval of this tick and its extent, for a combiner that gives intervals.
     interval: Option<[f64; 3]>,
     /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
     /// How many truths it has been told that there was a vote for.
     told: u64,
-    pub(super) wires: Wires,
+    pub(crate) wires: Wires,
 }
 
 /// What a combiner reads and where what it gives goes.
 pub(crate) struct Wires {
     /// The gather of the votes.
-    pub(super) voters: usize,
+    pub(crate) voters: usize,
     /// The gather of the state that it goes by, where it goes by one.
-    pub(super) state: Option<usize>,
-    pub(super) slot: usize,
+    pub(crate) state: Option<usize>,
+    pub(crate) slot: usize,
     /// What it gives beside its prediction, where it gives anything.
-    pub(super) beside: Option<Box<AuxPorts>>,
+    pub(crate) beside: Option<Box<AuxPorts>>,
 }
 
 impl Vote {
@@ -46,7 +46,7 @@ impl Vote {
         let width = voters + interval.map_or(0, |ends| ends.len());
         Self {
             combine: spec.build(voters),
-            withheld: link.map(|link| Withheld::new(link, width)),
+            withheld: link.map(|link| Embargo::new(link, width)),
             interval,
             weights: vec![f64::NAN; voters],
             told: 0,
@@ -181,7 +181,7 @@ impl Vote {
     /// What the combiner knows, and what is still withheld from it.
     pub(crate) fn snapshot(&self) -> NodeState {
         let mut state = NodeState::pack(self.combine.snapshot());
-        state.learning = self.withheld.as_ref().map(Withheld::state);
+        state.learning = self.withheld.as_ref().map(Embargo::state);
         state
     }
 
@@ -207,7 +207,7 @@ impl Vote {
 }
 
 /// Tells a truth; 1 if there was any vote for it.
-fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) -> u64 {
+fn tell(combine: &mut dyn Combine, voters: usize, released: DueTruth<'_>) -> u64 {
     let (votes, interval) = released.row.split_at(voters);
     if let &[lower, upper, extent] = interval {
         combine.judge([lower, upper], extent, released.truth);
