@@ -380,7 +380,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
         }
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
-                let (n, taken) = (count(found.count), first.taken());
+                let (n, taken) = (count(found.count), first.without_advice());
                 let words = format!("{file}: {n} × {what}, {then}; the first: {taken}");
                 messages.push(refused::message(first, Some(found.count), words));
             }

@@ -226,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_coefficient_is_told_to_the_second_digit_of_its_standard_error() {
+    fn a_coefficient_is_shown_to_the_second_digit_of_its_standard_error() {
         let shown = |value: f64, error| digits(value, places(value, error));
         assert_eq!(shown(1_000_010.0, Some(0.0182)), "1.000010000e6");
         assert_eq!(shown(-0.523_456, Some(0.1)), "-0.52346");
@@ -237,22 +237,22 @@ mod tests {
     }
 
     #[test]
-    fn a_type_that_does_not_tell_its_coefficients_is_said_to() {
-        let of = Told {
+    fn a_type_without_coefficients_is_reported() {
+        let of = FittedEstimator {
             node: "model.Z".to_owned(),
             kind: "my_node",
             truth: "drift.Z".to_owned(),
             unit: "nm/min".to_owned(),
-            found: None,
+            parts: None,
         };
         assert_eq!(
-            untold(&of),
+            without_coefficients(&of),
             "model.Z (my_node of drift.Z): nodes of this type do not tell their coefficients\n"
         );
     }
 
     #[test]
-    fn what_does_not_come_to_rest_is_said_to() {
+    fn what_does_not_come_to_rest_stays_or_grows() {
         let mode = |time_constant_s: f64| Mode {
             of: "A".to_owned(),
             time_constant_s,
