@@ -122,17 +122,17 @@ mod tests {
     #[test]
     fn what_is_no_number_is_told_in_words_of_the_program() {
         let refusals = refusals(&Arguments::command(), &["athermal".to_owned()]);
-        let ours = message
+        let ours = refusals
             .iter()
             .filter(|message| message.contains("expected ") && message.contains("number"));
-        assert!(ours.count() >= 6, "{message:#?}");
+        assert!(ours.count() >= 6, "{refusals:#?}");
         for words in [
             "invalid digit",
             "invalid float",
             "non-zero type",
             "from empty string",
         ] {
-            let foreign = message.iter().find(|message| message.contains(words));
+            let foreign = refusals.iter().find(|message| message.contains(words));
             assert_eq!(foreign, None);
         }
     }
