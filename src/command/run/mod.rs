@@ -16,8 +16,8 @@ use std::path::PathBuf;
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
 use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{self, Frame, LiveOptions, RunError, Samples, Sink, Source, pair_from};
-use athermal::core::recording::Event;
+use athermal::core::live::{self, Frame, LiveOptions, RunError, Sink, pair_from};
+use athermal::core::recording::{Event, Samples, Source};
 use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
@@ -30,9 +30,9 @@ use serde_json::json;
 use crate::command::aside::check_apart;
 use crate::command::model::{self, check_fitted, tell_unfitted};
 use crate::command::{beyond, data, refused, unread};
-use crate::figures::{counted, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
+use athermal_analysis::figures::{counted, instant, length, seconds};
 use heard::Heard;
 use held::Held;
 use kept::Kept;

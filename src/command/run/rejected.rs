@@ -3,17 +3,17 @@
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{Feed, Samples, Source, SourceError};
-use athermal::core::recording::Event;
+use athermal::core::live::Feed;
+use athermal::core::recording::{Event, Samples, Source, SourceError};
 
 use athermal::{Duration, Instant};
 use serde_json::json;
 
 use crate::command::beyond;
 use crate::command::data::REJECTED;
-use crate::figures::number;
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::number;
 
 /// A channel that has been in order for so long is told of when it is not again.
 const IN_ORDER: Duration = Duration::from_ns(3600 * 1_000_000_000);
