@@ -93,7 +93,7 @@ impl Run {
             }
             if !lasts(state) {
                 let told = format!("--state {}: {NO_FILE}", state.display());
-                return Err(Failure::Request(message));
+                return Err(Failure::Request(told));
             }
             // Where the output is a stream, the state is none.
             let output = Some(&*self.output).filter(|path| path.as_os_str() != "-");
