@@ -21,6 +21,7 @@ mod learning_gate;
 mod linear_form;
 mod port;
 mod predictor;
+mod range;
 mod reach;
 mod recent_error;
 mod registry;
@@ -47,14 +48,13 @@ pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read
 #[doc(hidden)]
 pub use predictor::InModel;
 pub use predictor::Predictor;
+pub use range::{ParameterPart, Range, each_parameter, out_of_range};
 pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
-#[cfg(feature = "testkit")]
-pub(crate) use registry::as_toml;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{
-    Kind, NodeSpec, ReadSpec, Role, RoleName, first_paragraph, inline_toml, kind, kinds,
+    Kind, NodeSpec, ReadSpec, Role, RoleName, as_toml, first_paragraph, inline_toml, kind, kinds,
 };
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
