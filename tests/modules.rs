@@ -194,7 +194,7 @@ nodes.any = { type = "{kind}", inputs.truth = "{truth}" }
     for output in [
         "vote",
         "vote:weights",
-        "vote:deviation",
+        "vote:std_dev",
         "slope:stderr",
         "any:what",
         "inner",

@@ -167,7 +167,7 @@ fn voting(vote: &str, of: &[&str]) -> String {
 
 #[test]
 fn a_deviation_is_that_of_the_fit_at_the_present_features() {
-    let text = voting("fallback", &["one", "one:deviation"]);
+    let text = voting("fallback", &["one", "one:std_dev"]);
     let fitted = [
         ("one", linear(5.0, 4.0, 0.1)),
         ("other", linear(7.0, 9.0, 0.0)),
@@ -180,7 +180,7 @@ fn a_deviation_is_that_of_the_fit_at_the_present_features() {
 
 #[test]
 fn a_choice_has_the_deviation_of_what_it_chose() {
-    let text = voting("fallback", &["vote", "vote:deviation"]);
+    let text = voting("fallback", &["vote", "vote:std_dev"]);
     let fitted = [
         ("one", linear(5.0, 4.0, 0.0)),
         ("other", linear(7.0, 9.0, 0.0)),
@@ -199,7 +199,7 @@ fn a_watch_passes_the_deviation_of_what_it_watches_on() {
     for watch in ["page_hinkley", "adwin"] {
         let text = voting(
             &format!("{watch}\"\ninputs.truth = \"drift"),
-            &["vote", "vote:deviation", "vote:reason"],
+            &["vote", "vote:std_dev", "vote:reason"],
         )
         .replace("[\"one\", \"other\"]", "\"one\"");
         let fitted = [
@@ -224,7 +224,7 @@ fn a_vote_is_unsure_of_what_its_voters_are_and_of_what_they_disagree_about() {
         memory = "15min"
         power = 0.0
         weights = "inverse_power"#;
-    let text = voting(vote, &["vote", "vote:deviation"]);
+    let text = voting(vote, &["vote", "vote:std_dev"]);
     let fitted = [
         ("one", linear(5.0, 4.0, 0.0)),
         ("other", linear(9.0, 10.0, 0.0)),
@@ -238,31 +238,27 @@ fn a_vote_is_unsure_of_what_its_voters_are_and_of_what_they_disagree_about() {
 
 #[test]
 fn where_theory_says_nothing_there_is_no_deviation_to_refer_to() {
-    let text = voting("fallback", &["one:deviation"]).replacen(
+    let text = voting("fallback", &["one:std_dev"]).replacen(
         r#"inputs.features"#,
         r#"solver = { type = "sgd" }
             inputs.features"#,
         1,
     );
     let told = problems(&text);
-    assert!(told.contains("deviation"), "{told}");
+    assert!(told.contains("std_dev"), "{told}");
 }
 
 #[test]
 fn a_deviation_that_nobody_reads_is_not_computed() {
     let text = voting("fallback", &["vote"]);
     let plan = plan(&text);
-    assert!(
-        plan.nodes
-            .iter()
-            .all(|node| node.role.deviation().is_none())
-    );
+    assert!(plan.nodes.iter().all(|node| node.role.std_dev().is_none()));
     let wanted = telling(&text);
     assert!(
         wanted
             .nodes
             .iter()
-            .all(|node| node.role.deviation().is_some())
+            .all(|node| node.role.std_dev().is_some())
     );
 }
 
@@ -278,7 +274,7 @@ fn following(noises: &str, more: &str) -> String {
         {more}
         [outputs]
         level = "level"
-        deviation = "level:deviation"
+        deviation = "level:std_dev"
         "#
     )
 }

@@ -128,9 +128,9 @@ fn ports(kind: &str) -> BTreeMap<String, String> {
 #[test]
 fn the_page_of_a_node_names_the_output_ports_that_it_has() {
     for (kind, expected) in [
-        ("rls", &["deviation", "learning", "prediction"][..]),
-        ("auto_weighted", &["deviation", "prediction", "weights"]),
-        ("guard", &["deviation", "prediction", "reason", "weights"]),
+        ("rls", &["learning", "prediction", "std_dev"][..]),
+        ("auto_weighted", &["prediction", "std_dev", "weights"]),
+        ("guard", &["prediction", "reason", "std_dev", "weights"]),
         ("conformal", &["lower", "prediction", "upper"]),
         ("narx", &["prediction"]),
     ] {
@@ -141,7 +141,7 @@ fn the_page_of_a_node_names_the_output_ports_that_it_has() {
     }
     // With stochastic gradients it goes on learning, and does not tell how sure it is.
     let ports = ports("linear");
-    for port in ["learning", "deviation"] {
+    for port in ["learning", "std_dev"] {
         assert!(
             ports[port].ends_with(" (not with all parameters)"),
             "{port}"

@@ -34,7 +34,7 @@ inputs.truth = "drift.X"
 memory = "15min"
 [nodes.of-deviation]
 type = "persistence"
-inputs.truth = "thermal:deviation"
+inputs.truth = "thermal:std_dev"
 ahead = "0s"
 [nodes.of-weight]
 type = "linear"
@@ -47,26 +47,26 @@ inputs.truth = "thermal:learning"
 ahead = "0s"
 [nodes.sure]
 type = "stack"
-inputs.voters = ["thermal", "thermal:deviation"]
+inputs.voters = ["thermal", "thermal:std_dev"]
 inputs.truth = "drift.X"
 ahead = "0s"
 [[tests]]
 name = "compared"
 on = "days.csv"
-expect = [{ of = "thermal", beats = ["thermal:deviation"] }]
+expect = [{ of = "thermal", beats = ["thermal:std_dev"] }]
 "#;
     let expected = [
         (
             30,
-            "`thermal:deviation.X` tells of the prediction `thermal.X` and cannot be the truth",
+            "`thermal:std_dev.X` tells of the prediction `thermal.X` and cannot be the truth",
         ),
         (35, "`vote:weights.weight-thermal` tells of the prediction"),
         (39, "`thermal:learning.X` tells of the prediction"),
         (
             43,
-            "`thermal:deviation.X` tells of the prediction `thermal` and is none",
+            "`thermal:std_dev.X` tells of the prediction `thermal` and is none",
         ),
-        (49, "`thermal:deviation` does not predict `drift.X`"),
+        (49, "`thermal:std_dev` does not predict `drift.X`"),
     ];
     assert_told("command-line-truth-of-prediction", &text, &expected);
 }

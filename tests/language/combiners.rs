@@ -169,8 +169,8 @@ fn what_a_node_gives_beside_its_prediction_has_no_vote() {
     let mean = "[nodes.vote]\ntype = \"mean\"\ninputs.voters = ";
     let stack = "[nodes.vote]\ntype = \"stack\"\nahead = \"5min\"\ninputs.truth = \"drift.Z\"\ninputs.voters = ";
     for (voter, instead) in [
-        ("thermal:deviation", "`thermal`"),
-        ("thermal:deviation.Z", "`thermal.Z`"),
+        ("thermal:std_dev", "`thermal`"),
+        ("thermal:std_dev.Z", "`thermal.Z`"),
         ("sure:upper", "`sure`"),
         ("first:weights.weight-same", "`first.Z`"),
     ] {

@@ -34,7 +34,7 @@ inputs.truth = "shift"
 ahead = "0s"
 [outputs]
 out = "model"
-deviation = "model:deviation"
+deviation = "model:std_dev"
 learning = "model:learning"
 "#
     )
@@ -56,7 +56,7 @@ fn rows(seed: u64, count: usize) -> Vec<[f64; 3]> {
 fn outputs(node: &str, rows_run: &[[f64; 3]]) -> Vec<Vec<f64>> {
     let mut text = graph(node);
     if node == SGD {
-        text = text.replace("deviation = \"model:deviation\"", "again = \"model\"");
+        text = text.replace("deviation = \"model:std_dev\"", "again = \"model\"");
     }
     let (plan, fitted) = fitted_on(&text, &rows(1, 1500));
     run(&mut Engine::new(plan, &fitted).unwrap(), 0, rows_run)

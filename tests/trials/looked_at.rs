@@ -116,8 +116,8 @@ fit = "past.csv"
 {EVENLY}
 expect = [
   {{ of = "vote:weights.*", from = "5min", between = ["0 1", "1 1"] }},
-  {{ of = "follow:deviation", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
-  {{ of = "both:deviation", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
+  {{ of = "follow:std_dev", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
+  {{ of = "both:std_dev", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
 ]
 [[tests]]
 name = "they are not absent"
@@ -125,8 +125,8 @@ fit = "past.csv"
 {EVENLY}
 expect = [
   {{ of = "vote:weights.*", absent = true }},
-  {{ of = "follow:deviation", absent = true }},
-  {{ of = "both:deviation", absent = true }},
+  {{ of = "follow:std_dev", absent = true }},
+  {{ of = "both:std_dev", absent = true }},
 ]
 "#
     ));

@@ -187,7 +187,7 @@ conformance!(
         learn = false
         "#
     )
-    .speaks_without_input(&["prediction", "deviation"]),
+    .speaks_without_input(&["prediction", "std_dev"]),
 );
 
 conformance!(
@@ -298,7 +298,7 @@ conformance!(
         learn = false
         "#
     )
-    .speaks_without_input(&["prediction", "deviation"]),
+    .speaks_without_input(&["prediction", "std_dev"]),
 );
 
 conformance!(
@@ -324,7 +324,7 @@ conformance!(
 
 conformance!(
     Kalman,
-    Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction", "deviation"]),
+    Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction", "std_dev"]),
     Case::new(
         r#"
         ahead = "0s"
@@ -383,7 +383,7 @@ conformance!(
         horizon = 3
         "#
     )
-    .speaks_without_input(&["prediction", "deviation"]),
+    .speaks_without_input(&["prediction", "std_dev"]),
     Case::new(
         r#"
         ahead = "0s"

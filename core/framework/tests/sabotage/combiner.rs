@@ -43,11 +43,11 @@ impl Combiner for Votes {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
     }
 
-    fn weighs(&self) -> bool {
+    fn has_weights(&self) -> bool {
         true
     }
 
-    fn covers(&self) -> Option<f64> {
+    fn coverage(&self) -> Option<f64> {
         Some(if self.fault == Fault::CoversMore {
             1.5
         } else {
@@ -161,7 +161,7 @@ fn an_interval_stands_about_the_answer_and_covers_a_share() {
     finds::<Votes>(
         with("covers_more"),
         Rule::Uncertainty,
-        "`covers` says that intervals cover 1.5 of the truths, which is no share between 0 and 1",
+        "`coverage` says that intervals cover 1.5 of the truths, which is no share between 0 and 1",
     );
     finds::<Votes>(
         with("upside_down"),

@@ -67,7 +67,7 @@ impl Estimator for Ratio {
         }
     }
 
-    fn deviates(&self) -> bool {
+    fn has_std_dev(&self) -> bool {
         matches!(self.fault, Fault::Negative | Fault::Unsure)
     }
 
@@ -169,7 +169,7 @@ impl Predictor for Fitted {
         self.means[0] + self.unwritten
     }
 
-    fn deviation(&self, _regressors: &[f64]) -> f64 {
+    fn std_dev(&self, _regressors: &[f64]) -> f64 {
         if self.unsure {
             f64::NAN
         } else {
@@ -279,7 +279,7 @@ fn a_deviation_is_not_negative() {
     finds::<Ratio>(
         with("negative"),
         Rule::Uncertainty,
-        "`node:deviation.a` is -0.8019520665777313 at 8.189 s",
+        "`node:std_dev.a` is -0.8019520665777313 at 8.189 s",
     );
 }
 
@@ -289,7 +289,7 @@ fn a_deviation_that_is_promised_comes() {
     finds::<Ratio>(
         with("unsure"),
         Rule::Uncertainty,
-        "`node:deviation.a` is never there in the second half of the run, though predictions are",
+        "`node:std_dev.a` is never there in the second half of the run, though predictions are",
     );
 }
 

@@ -98,7 +98,7 @@ code!(
     A067,
     Error,
     "a vote that is no prediction",
-    "The first port of an estimator or combiner is its prediction. Its other ports, such as `deviation`, `lower` or `weights`, describe \
+    "The first port of an estimator or combiner is its prediction. Its other ports, such as `std_dev`, `lower` or `weights`, describe \
      that prediction; combined with predictions they would make a number of no meaning."
 );
 

@@ -90,7 +90,7 @@ code!(
     Error,
     "a truth that is a prediction",
     "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what describes one, \
-     such as its `deviation` or `weights`."
+     such as its `std_dev` or `weights`."
 );
 
 const SOMETHING_MEASURED: &str = "refer to something measured, such as the slope of a position";
