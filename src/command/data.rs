@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fnv1a;
-use athermal::core::model::DataCard;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
+use athermal::run::model::DataCard;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::json;
@@ -416,7 +416,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
         }
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
-                let (n, taken) = (count(found.count), first.taken());
+                let (n, taken) = (count(found.count), first.without_advice());
                 let words = format!("{file}: {n} × {what}, {then}; the first: {taken}");
                 told.push(refused::message(first, Some(found.count), words));
             }

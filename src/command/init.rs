@@ -9,7 +9,7 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::data::{Data, no_graph};
 use crate::invocation::{command, program, quoted};
-use crate::starter::{NoStarter, Told, starter};
+use crate::starter::{NoStarter, Request, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
 
@@ -53,7 +53,7 @@ impl Init {
     /// # Errors
     /// When the log cannot be read, nothing in it drifts, or the graph is there already.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let told = Told {
+        let request = Request {
             time: self.time.clone(),
             format: self.time_format.clone(),
             drifting: self.drifts.clone(),
@@ -66,10 +66,10 @@ impl Init {
             )));
         }
         check_apart("--output", &self.output, [&*self.data])?;
-        let starter = starter(&self.data, &told).map_err(|error| match error {
+        let starter = starter(&self.data, &request).map_err(|error| match error {
             NoStarter::File(error) => {
                 // There is no `--lenient` here that it could advise.
-                let told = error.taken().to_string();
+                let told = error.without_advice().to_string();
                 match error.into() {
                     Failure::Request(_) => Failure::Request(told),
                     other => other,
@@ -89,7 +89,7 @@ impl Init {
         }
         write_aside(&self.output, &starter.text)?;
         if people {
-            terminal.note(self.next(starter.lenient));
+            terminal.note(self.next());
         } else {
             let told = json!({
                 "graph": self.output,
@@ -102,22 +102,11 @@ impl Init {
         Ok(Answer::Fine)
     }
 
-    fn next(&self, lenient: bool) -> String {
+    fn next(&self) -> String {
         let program = program();
         let [graph, data] =
             [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
-        let lenient = if lenient { "--lenient" } else { "" };
-        let fit: [&str; 7] = [
-            &program,
-            "fit",
-            &graph,
-            "--data",
-            &data,
-            lenient,
-            "-o model.json",
-        ];
-        let fit: Vec<&str> = fit.into_iter().filter(|part| !part.is_empty()).collect();
-        let fit = command(&fit);
+        let fit = command(&[&program, "fit", &graph, "--data", &data, "-o model.json"]);
         let unseen = quoted(&Data::of(vec![self.data.clone()]).unseen());
         let evaluate = format!("evaluate model.json --data {unseen}");
         let evaluate = command(&[&program, &evaluate]);

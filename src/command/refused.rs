@@ -26,7 +26,7 @@ const CELLS: &str = "unreadable_cells";
 
 fn facts(error: &FileError) -> (&'static str, Value) {
     match error {
-        FileError::TimeNotAfter { time, .. } | FileError::TimeStaysBehind { time, .. } => {
+        FileError::TimeNotAfter { time, .. } => {
             (ROWS, json!({ "reason": "time_before", "time": time }))
         }
         FileError::TimeAgain { time, .. } => {
@@ -44,7 +44,7 @@ fn facts(error: &FileError) -> (&'static str, Value) {
         FileError::BadCell { column, found, .. } | FileError::MixedMarks { column, found, .. } => {
             (CELLS, json!({ "column": column, "found": found }))
         }
-        FileError::StaysUnreadable { newest, .. } => facts(newest),
+        FileError::StillRefused { newest, .. } => facts(newest),
         FileError::HeaderAgain { .. } => ("header_again", json!({})),
         FileError::MissingColumns { missing, .. } => {
             let columns: Vec<_> = missing.iter().map(|of| &of.name).collect();

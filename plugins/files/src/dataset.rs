@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
-use athermal_core::recording::{self, RecordingError, Rows};
-use athermal_core::time::{Duration, Instant};
+use athermal_core::time::Duration;
+use athermal_run::recording::{self, Samples, Source, SourceError};
 
-use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, Row, TimeColumn, TimeForm};
+use crate::stream::next_of;
+use crate::{ChannelColumn, Layout, Options, Recording, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -52,6 +53,7 @@ pub fn layout(plan: &Plan) -> Layout {
                 optional: source.optional,
             })
             .collect(),
+        table: plan.table.clone(),
     }
 }
 
@@ -88,11 +90,10 @@ impl Dataset {
 }
 
 impl recording::Recording for Dataset {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let recording = Recording::join(&self.paths, layout(plan), self.options.clone())?;
         Ok(Box::new(Reading {
             recording,
-            row: Row::default(),
             reports: &self.reports,
         }))
     }
@@ -100,24 +101,15 @@ impl recording::Recording for Dataset {
 
 struct Reading<'a> {
     recording: Recording,
-    row: Row,
     reports: &'a RefCell<Vec<(String, Report)>>,
 }
 
-impl Rows for Reading<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<recording::Event>, RecordingError> {
-        match self.recording.next_into(&mut self.row)? {
-            Event::Row => {
-                values.copy_from_slice(&self.row.values);
-                Ok(Some(recording::Event::Row(Instant::from_ns(
-                    self.row.time_ns,
-                ))))
-            }
-            Event::Segment => Ok(Some(recording::Event::Segment)),
-            Event::End => {
-                *self.reports.borrow_mut() = self.recording.reports().to_vec();
-                Ok(None)
-            }
+impl Source for Reading<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
+        let next = next_of(samples, |row| self.recording.next_into(row))?;
+        if next.is_none() {
+            *self.reports.borrow_mut() = self.recording.reports().to_vec();
         }
+        Ok(next)
     }
 }

@@ -1,21 +1,33 @@
-//! Files as source and sink of a run: rows in, rows out; what a row looks like is decided by reader and writer.
+//! Files as source and sink of a run: rows in, rows out.
 
-use athermal_core::live::{Frame, Samples, Sink, SinkError, Source, SourceError};
-use athermal_core::recording::Event;
 use athermal_core::time::Instant;
+use athermal_run::live::{Frame, Sink, SinkError};
+use athermal_run::recording::{Event, Samples, Source, SourceError};
 
-use crate::{Reader, Row, Writer};
+use crate::{FileError, Reader, Row, Writer};
+
+/// What comes next, its row read into the room that samples have; none at the end.
+pub(crate) fn next_of(
+    samples: &mut Samples,
+    next: impl FnOnce(&mut Row) -> Result<crate::Event, FileError>,
+) -> Result<Option<Event>, FileError> {
+    let mut row = Row {
+        time_text: std::mem::take(&mut samples.time_text),
+        values: std::mem::take(&mut samples.values),
+        ..Row::default()
+    };
+    let event = next(&mut row)?;
+    (samples.time_text, samples.values) = (row.time_text, row.values);
+    Ok(match event {
+        crate::Event::Row => Some(Event::Row(Instant::from_ns(row.time_ns))),
+        crate::Event::Segment => Some(Event::Segment),
+        crate::Event::End => None,
+    })
+}
 
 impl Source for Reader {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        let mut row = Row {
-            time_ns: 0,
-            time_text: std::mem::take(&mut samples.time_text),
-            values: std::mem::take(&mut samples.values),
-        };
-        let more = self.next_into(&mut row)?;
-        (samples.time_text, samples.values) = (row.time_text, row.values);
-        Ok(more.then(|| Event::Row(Instant::from_ns(row.time_ns))))
+        Ok(next_of(samples, |row| self.next_event(row))?)
     }
 }
 

@@ -16,13 +16,13 @@ use std::path::PathBuf;
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
 use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{self, Frame, LiveOptions, RunError, Samples, Sink, Source, pair_from};
-use athermal::core::recording::Event;
 use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
     layout,
 };
+use athermal::run::live::{self, Frame, LiveOptions, RunError, Sink, pair_from};
+use athermal::run::recording::{Event, Samples, Source};
 use athermal::{Engine, Model};
 use clap::Args;
 use serde_json::json;
@@ -308,19 +308,18 @@ impl Run {
             opened => opened?,
         };
         let terminal = *terminal;
-        reader.tell_first(move |first| {
+        reader.report_first(move |first| {
             let told = match first {
                 FileError::MissingColumns { .. } => {
                     let words = format_args!("{first} (missing until a line has it)");
                     refused::message(first, None, words)
                 }
-                FileError::TimeStaysBehind { .. }
-                | FileError::StaysUnreadable { .. }
-                | FileError::HeaderAgain { moved: true, .. } => {
+                FileError::StillRefused { .. } | FileError::HeaderAgain { moved: true, .. } => {
                     refused::message(first, None, first)
                 }
                 _ => {
-                    let words = format_args!("{}; others like it are counted", first.taken());
+                    let words =
+                        format_args!("{}; others like it are counted", first.without_advice());
                     refused::message(first, None, words)
                 }
             };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{nearest_of_many, nearest_or_all};
 use crate::diagnostic::{Names, code, names, problem};
+use crate::document::problem::A043;
 
 code!(
     A042,
@@ -33,13 +34,6 @@ problem! {
     label: "removed",
     help: "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`",
 }
-
-code!(
-    A043,
-    Error,
-    "unknown port",
-    "What follows the `:` of a reference is one of the node's output ports. `athermal nodes TYPE` lists them."
-);
 
 problem! {
     /// A reference to a port that the node does not have.
