@@ -1,13 +1,6 @@
 //! Parameters that go wrong only at a default, a word or a switch that no case states.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
-};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::breaks_only;
+use super::*;
 
 /// Passes its input on by a factor.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -101,7 +94,7 @@ athermal_core::register!(Gain, Feature, "sabotaged_choices");
 #[test]
 fn a_default_out_of_its_own_range_is_found_though_no_case_leaves_it_out() {
     breaks_only::<Gain>(Case::new("factor = 0.5"), &[Rule::Explained]);
-    let broken = athermal_testkit::broken::<Gain>(&[Case::new("factor = 0.5")]);
+    let broken = broken::<Gain>(&[Case::new("factor = 0.5")]);
     let words = "by default `factor` is 2 and must be from 0 to 1";
     assert_eq!(broken[0].found, words, "{broken:#?}");
 }
@@ -113,9 +106,7 @@ fn a_word_a_switch_and_a_tagged_table_that_no_case_tries_are_tried() {
         ("strict", "`strict = true`"),
         ("ends", "`ends = { type = \"cut\" }`"),
     ] {
-        let broken = athermal_testkit::broken::<Gain>(&[Case::new(format!(
-            "factor = 0.5\nfault = \"{fault}\""
-        ))]);
+        let broken = broken::<Gain>(&[Case::new(format!("factor = 0.5\nfault = \"{fault}\""))]);
         let told = format!("with {value} it panics: not written yet");
         assert!(
             broken.iter().any(|broken| broken.found.contains(&told)),
