@@ -108,7 +108,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         let name = format!("  {port:<17} ");
         print!("{}", paragraph(&name, 6, &what));
     }
-    let schema = Value::from((kind.schema)());
+    let schema = (kind.schema)();
     println!("\nParameters:");
     if kind.framework_keys().contains(&"ahead") {
         let truth = match kind.role {
@@ -228,6 +228,6 @@ fn describe(kind: &Kind) -> Value {
             .iter()
             .map(|(name, summary)| json!({ "name": name, "summary": summary }))
             .collect::<Vec<_>>(),
-        "parameters": Value::from((kind.schema)()),
+        "parameters": (kind.schema)(),
     })
 }
