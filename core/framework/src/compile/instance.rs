@@ -196,7 +196,7 @@ fn read_instance(
                 let sound = wrong.is_empty();
                 for (place, message) in wrong {
                     let help = None;
-                    diagnostics.report(place, CompileProblem::Parameter { message, help });
+                    diagnostics.report(place, problem::Parameter { message, help });
                 }
                 if !sound {
                     return None;
