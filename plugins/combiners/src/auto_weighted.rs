@@ -22,7 +22,7 @@ use crate::share::{raise, shrink};
 /// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
 /// much, at the cost of the larger ones.
 ///
-/// Where all voters tell their standard deviation, the port `deviation` is that of
+/// Where all voters tell their standard deviation, the port `std_dev` is that of
 /// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
 /// small, since it takes one of the voters to be right.
 ///
@@ -104,7 +104,7 @@ impl Combiner for AutoWeighted {
         mistakes
     }
 
-    fn weighs(&self) -> bool {
+    fn has_weights(&self) -> bool {
         true
     }
 

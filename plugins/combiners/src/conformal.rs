@@ -76,7 +76,7 @@ impl Combiner for Conformal {
         mistakes
     }
 
-    fn covers(&self) -> Option<f64> {
+    fn coverage(&self) -> Option<f64> {
         Some(self.coverage)
     }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The mean of the votes that are there. The port `weights` shows an equal one for each of them.
 ///
-/// Where all voters tell their standard deviation, the port `deviation` is that of their mixture, as of `auto_weighted`.
+/// Where all voters tell their standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {}
@@ -16,7 +16,7 @@ impl Combiner for Mean {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
     }
 
-    fn weighs(&self) -> bool {
+    fn has_weights(&self) -> bool {
         true
     }
 

@@ -21,7 +21,7 @@ macro_rules! reasons {
     () => {
         "The port `reason`, written `watch:reason` of a node `watch` (in a node with `each`, `watch:reason.{axis}` is that of its\n\
          member), says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched.\n\
-         The port `deviation` passes the standard deviation of the prediction on, where it has one. The port `weights` shows an\n\
+         The port `std_dev` passes the standard deviation of the prediction on, where it has one. The port `weights` shows an\n\
          equal one for each of several."
     };
 }
@@ -238,11 +238,11 @@ impl Combiner for PageHinkley {
         checks.0
     }
 
-    fn weighs(&self) -> bool {
+    fn has_weights(&self) -> bool {
         true
     }
 
-    fn reasons(&self) -> bool {
+    fn has_reason(&self) -> bool {
         true
     }
 
@@ -294,11 +294,11 @@ impl Combiner for Adwin {
         checks.0
     }
 
-    fn weighs(&self) -> bool {
+    fn has_weights(&self) -> bool {
         true
     }
 
-    fn reasons(&self) -> bool {
+    fn has_reason(&self) -> bool {
         true
     }
 

@@ -23,7 +23,7 @@ use crate::order::Order;
 /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
 /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
 /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that had
-/// always been; with `learn = false` it stays at the level of the fit. The port `deviation` is the standard deviation
+/// always been; with `learn = false` it stays at the level of the fit. The port `std_dev` is the standard deviation
 /// of the truth about its prediction, larger after truths that are missing. Where rows tell the level less well than
 /// one of them does by itself, it is taken to be their mean, which is told. Since the answer changes with time alone,
 /// the node runs at every tick.

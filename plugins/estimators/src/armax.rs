@@ -25,7 +25,7 @@ use crate::order::Order;
 /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that and
 /// the features had always been what they are, and so does, in the fit too, what comes after more steps without
 /// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
-/// port `deviation` is the standard deviation of the truth about its prediction, larger after truths that are missing.
+/// port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that are missing.
 /// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Where rows tell
 /// the level less well than one of them does by itself, it is taken to be their mean, which is told. Since the answer
 /// changes with time alone, the node runs at every tick.

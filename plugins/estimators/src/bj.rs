@@ -31,7 +31,7 @@ use crate::order::Order;
 /// features had always been what they are; what they do not explain of it the filters and the noise share by how much
 /// each varies. The truths that follow tell the better what is the one and what the other, as in a Kalman filter of the
 /// model (Harvey 1989, section 3.2), until the filters go by the features alone. So does what comes after as many steps
-/// without features; with `learn = false` it stays at rest. The port `deviation` is the standard deviation of the truth
+/// without features; with `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the truth
 /// about its prediction, larger after truths that are missing and until it is known where the filters are. Features
 /// that are missing are taken for the last ones; what that adds to the error is not in it. Where rows tell the level
 /// less well than one of them does by itself, it is taken to be their mean, which is told. Since the answer changes

@@ -19,7 +19,7 @@ use crate::solver::Solver;
 /// `by = "sensor"` and `most = 2` tell which two sensors are worth their price. The penalty of ridge can be chosen too, for
 /// all candidates before a selection and for those chosen after it: `alpha = { by = "cross_validation", folds = 5 }`.
 ///
-/// The port `deviation` is the standard deviation of the truth about the prediction, in the unit of the truth (not with the
+/// The port `std_dev` is the standard deviation of the truth about the prediction, in the unit of the truth (not with the
 /// solver `sgd`): `s √(1 + 1/n + (x − x̄)ᵀ (XᵀX + αI)⁻¹ (x − x̄))` on standardised features, `s²` the residual variance
 /// (Draper and Smith 1998, section 3.1; for ridge, the posterior of Hastie, Tibshirani and Friedman 2009, section 3.4.1).
 /// It takes the data for more of the same: `conformal` measures how often an interval holds.
@@ -56,8 +56,8 @@ impl Estimator for Linear {
         self.solver.learns()
     }
 
-    fn deviates(&self) -> bool {
-        self.solver.deviates()
+    fn has_std_dev(&self) -> bool {
+        self.solver.has_std_dev()
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {

@@ -28,7 +28,7 @@ use crate::order::Order;
 /// then tell where the filters are, as in a Kalman filter of the model (Harvey 1989, section 3.2): the better that is
 /// known, the less a truth moves them, until they go by the features alone. So does what comes after as many steps without
 /// features; a free run is told as many truths as the filters have past values. With `learn = false` it stays at rest. The
-/// port `deviation` is the standard deviation of the truth about its prediction, larger until it is known where the filters
+/// port `std_dev` is the standard deviation of the truth about its prediction, larger until it is known where the filters
 /// are. It goes by the errors that are left in the fit: where noise is coloured and pieces are short, what filters gave before takes
 /// slow noise up too, and the deviation is too small. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer
 /// changes with time alone, the node runs at every tick.

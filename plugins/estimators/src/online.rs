@@ -97,7 +97,7 @@ impl Frame {
     }
 
     /// `s √(1 + zᵀPz)`: the noise, and what is not known of the coefficients; NaN where the recursion knows neither.
-    fn deviation(&self, recursion: &Recursion, regressors: &[f64]) -> f64 {
+    fn std_dev(&self, recursion: &Recursion, regressors: &[f64]) -> f64 {
         let Recursion::Rls { rls, noise } = recursion else {
             return f64::NAN;
         };
@@ -228,8 +228,8 @@ impl Predictor for OnlinePredictor {
         Some(form(self.intercept, &self.coefficients))
     }
 
-    fn deviation(&self, regressors: &[f64]) -> f64 {
-        self.frame.deviation(&self.recursion, regressors)
+    fn std_dev(&self, regressors: &[f64]) -> f64 {
+        self.frame.std_dev(&self.recursion, regressors)
     }
 
     fn coefficients(&self) -> Option<Coefficients> {
@@ -292,7 +292,7 @@ impl OnlineLearner {
         let by = truth - self.predict(regressors, at);
         let usual = match &self.state.recursion {
             Recursion::Sgd(_) => self.usual_error(),
-            Recursion::Rls { .. } => self.deviation(regressors, at),
+            Recursion::Rls { .. } => self.std_dev(regressors, at),
         };
         // Written so that NaN fails.
         let leapt = by.is_finite() && by.abs() > LEAP * usual && usual > 0.0;
@@ -324,9 +324,9 @@ impl Learner for OnlineLearner {
         Some(form(self.intercept, &self.coefficients))
     }
 
-    fn deviation(&self, regressors: &[f64], _of: Instant) -> f64 {
+    fn std_dev(&self, regressors: &[f64], _of: Instant) -> f64 {
         let OnlineState { frame, recursion } = &self.state;
-        frame.deviation(recursion, regressors)
+        frame.std_dev(recursion, regressors)
     }
 
     fn usual_error(&self) -> f64 {

@@ -380,7 +380,7 @@ impl Predictor for LinearPredictor {
         Some(self.form())
     }
 
-    fn deviation(&self, regressors: &[f64]) -> f64 {
+    fn std_dev(&self, regressors: &[f64]) -> f64 {
         let variance = self.variance.as_ref();
         variance.map_or(f64::NAN, |variance| variance.at(regressors).sqrt())
     }

@@ -33,7 +33,7 @@ use crate::unsolved::unsolved;
 ///
 /// The port `learning` tells what became of the newest truth: 0 learned from, 1 frozen on command, 2 frozen by a channel, 3
 /// an outlier, 4 a regressor outside the range of the fit, 5 outside `train.abs_truth`, 6 no complete row. The port
-/// `deviation` is the standard deviation of the truth about the prediction, `s √(1 + xᵀPx)`.
+/// `std_dev` is the standard deviation of the truth about the prediction, `s √(1 + xᵀPx)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rls {
@@ -174,7 +174,7 @@ impl Estimator for Rls {
         Learns::UnlessTold
     }
 
-    fn deviates(&self) -> bool {
+    fn has_std_dev(&self) -> bool {
         true
     }
 

@@ -124,7 +124,7 @@ impl Solver {
     }
 
     /// Whether theory says how far predictions may be off.
-    pub(crate) fn deviates(&self) -> bool {
+    pub(crate) fn has_std_dev(&self) -> bool {
         match self {
             Self::Ridge { .. } | Self::Ols {} => true,
             Self::Sgd { .. } => false,

@@ -46,7 +46,7 @@ const LARGEST_PAST: usize = 1000;
 /// are missing were is told from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
 /// missing in the fit, windows end and begin again. A segment begins with its first truth, as if that and the features had
 /// always been what they are, and so does what comes after more steps without features than ten, or than the model reaches
-/// back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard deviation of the
+/// back where that is more; with `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the
 /// truth about its prediction, larger after truths that are missing. Features that are missing are taken for the last ones,
 /// and what that adds to the error is not in it. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

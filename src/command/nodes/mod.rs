@@ -125,7 +125,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
             tell(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
-                 truths that miss by more than so many times the recent error (both in units of `deviation` where the kind tells it), \
+                 truths that miss by more than so many times the recent error (both in units of `std_dev` where the kind tells it), \
                  nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `armax`",
             );
         }
@@ -173,29 +173,29 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                     |spec| matches!(spec, Role::Estimator(of) if !matches!(of.learns(), Learns::Never { .. })),
                 ),
                 port(
-                    "deviation",
+                    "std_dev",
                     "the standard deviation of the truth about the prediction",
-                    |spec| matches!(spec, Role::Estimator(of) if of.deviates()),
+                    |spec| matches!(spec, Role::Estimator(of) if of.has_std_dev()),
                 ),
             ];
             ports.into_iter().flatten().collect()
         }
         RoleName::Combiner => {
-            let weighs = |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.weighs());
+            let weighs = |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.has_weights());
             let covers =
-                |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.covers().is_some());
+                |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.coverage().is_some());
             let ports = [
                 Some(prediction),
                 port("weights", "the weight of each voter, by its name", weighs),
                 port(
                     "reason",
                     "the number of why it does what it does, as told above",
-                    |spec| matches!(spec, Role::Combiner(of) if of.reasons()),
+                    |spec| matches!(spec, Role::Combiner(of) if of.has_reason()),
                 ),
                 port("lower", "where the interval begins", covers),
                 port("upper", "where it ends", covers),
                 port(
-                    "deviation",
+                    "std_dev",
                     "where all voters have one: that of the truth about the prediction",
                     weighs,
                 ),

@@ -21,7 +21,7 @@ use coefficients::Told;
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
 ///
 /// Coefficients are in the units of the data, temperatures as K, with their standard errors where theory tells them: those of
-/// least squares; with a penalty those of the posterior of ridge, on which the port `deviation` stands too; of `rls` those that
+/// least squares; with a penalty those of the posterior of ridge, on which the port `std_dev` stands too; of `rls` those that
 /// its memory leaves; of models that are identified by the prediction error those that its derivatives tell, with none for a
 /// polynomial that would be unstable if the search had let it. They take the errors of rows for independent, and are too small
 /// where windows overlap. In products regressors count from their means. What follows its own past comes to rest in time

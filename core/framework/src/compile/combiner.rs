@@ -1,8 +1,8 @@
 //! Decides which predictions a combiner may put together.
 
-use super::estimator::deviation_of;
+use super::estimator::std_dev_of;
 use super::instance::Instance;
-use super::plan::{Beside, DEVIATION, PlannedRole, TruthLink, WEIGHTS};
+use super::plan::{AuxPorts, PlannedRole, STD_DEV, TruthLink, WEIGHTS};
 use super::provenance::Provenance;
 use super::resolver::{Resolver, Suspect};
 use crate::channel::Channel;
@@ -85,13 +85,13 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let (outputs, beside, deviations) =
+        let (outputs, beside, std_devs) =
             self.ports(instance, combiner, combined, (&port, &voters))?;
         let channels = outputs.iter().map(|port| port.channels.len()).sum();
         let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
             voters: gather,
-            deviations,
+            std_devs,
             state,
             truth: link,
             beside,
@@ -131,9 +131,9 @@ impl Resolver<'_> {
         combiner: &dyn Combiner,
         combined: Channel,
         (port, voters): (&InputPort, &[usize]),
-    ) -> Option<(Vec<OutputPort>, Beside, Option<usize>)> {
+    ) -> Option<(Vec<OutputPort>, AuxPorts, Option<usize>)> {
         let reason = self.beside(voters[0], combined.name.clone());
-        let deviation = deviation_of(&combined);
+        let std_dev = std_dev_of(&combined);
         let mut outputs = vec![OutputPort {
             name: "prediction",
             channels: vec![combined.clone()],
@@ -145,36 +145,36 @@ impl Resolver<'_> {
             outputs.push(OutputPort { name, channels });
             first
         };
-        let (mut beside, mut of_votes) = (Beside::default(), None);
-        if combiner.weighs() {
+        let (mut beside, mut of_votes) = (AuxPorts::default(), None);
+        if combiner.has_weights() {
             put(WEIGHTS, self.weights(voters));
         }
-        if combiner.reasons() {
+        if combiner.has_reason() {
             beside.reason = Some(put("reason", vec![reason]));
         }
-        if combiner.covers().is_some() {
+        if combiner.coverage().is_some() {
             let mut bound = |name| put(name, vec![combined.clone()]);
             beside.bounds = Some((bound("lower"), bound("upper")));
         }
-        if combiner.weighs()
-            && let Some(of_voters) = self.deviations(voters)
+        if combiner.has_weights()
+            && let Some(of_voters) = self.std_devs(voters)
         {
-            let unit = deviation.channels[0].unit.clone();
+            let unit = std_dev.channels[0].unit.clone();
             let lags = [Duration::ZERO];
-            put(deviation.name, deviation.channels);
+            put(std_dev.name, std_dev.channels);
             of_votes = Some(self.gather(instance, port, &of_voters, &lags, Some(&unit))?);
         }
         Some((outputs, beside, of_votes))
     }
 
     /// The standard deviation that stands beside each of these predictions, where all have one.
-    fn deviations(&self, voters: &[usize]) -> Option<Vec<usize>> {
+    fn std_devs(&self, voters: &[usize]) -> Option<Vec<usize>> {
         let beside = |&slot: &usize| {
             let node = &self.nodes[self.channels[slot].node?];
             let (_, predictions) = node.ports.first()?;
-            let (_, deviations) = node.ports.iter().find(|(name, _)| *name == DEVIATION)?;
+            let (_, std_devs) = node.ports.iter().find(|(name, _)| *name == STD_DEV)?;
             let nth = slot.checked_sub(predictions.start)?;
-            (nth < deviations.len()).then(|| deviations.start + nth)
+            (nth < std_devs.len()).then(|| std_devs.start + nth)
         };
         voters.iter().map(beside).collect()
     }

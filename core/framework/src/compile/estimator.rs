@@ -6,7 +6,7 @@ use super::instance::{Declared, Instance};
 use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
-use super::plan::{DEVIATION, PlannedRole, TrainingLimits, TruthLink};
+use super::plan::{PlannedRole, STD_DEV, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
@@ -17,13 +17,13 @@ use crate::quantity::Quantity;
 use crate::time::Duration;
 
 /// The port of the standard deviation of the truth about a prediction.
-pub(super) fn deviation_of(prediction: &Channel) -> OutputPort {
+pub(super) fn std_dev_of(prediction: &Channel) -> OutputPort {
     let channel = Channel {
         unit: prediction.unit.difference(),
         ..prediction.clone()
     };
     OutputPort {
-        name: DEVIATION,
+        name: STD_DEV,
         channels: vec![channel],
     }
 }
@@ -117,8 +117,8 @@ impl Resolver<'_> {
         if learning.is_some() {
             ports.push(learning::port(&prediction));
         }
-        if estimator.deviates() {
-            ports.push(deviation_of(&prediction));
+        if estimator.has_std_dev() {
+            ports.push(std_dev_of(&prediction));
         }
         let behind = vec![behind; ports.len()];
         let role = PlannedRole::Estimator {
@@ -128,7 +128,7 @@ impl Resolver<'_> {
             truth: link,
             training,
             learning,
-            deviation: None,
+            std_dev: None,
         };
         self.add(instance, ports, role, behind, Some(truth))?;
         // Asked for later by whoever wants to know whether it needs a fit, and to fail here where it fails.

@@ -35,7 +35,7 @@ pub use diff::{
 pub(crate) use keys::EstimatorKeys;
 pub use kind_fault::KindFault;
 pub use plan::{
-    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
+    AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
     PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub(crate) use plan::{Rows, admits};

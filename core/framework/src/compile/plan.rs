@@ -200,20 +200,20 @@ pub enum PlannedRole {
         /// How it goes on learning while it runs, where it does.
         learning: Option<PlannedLearning>,
         /// The slot of its standard deviation, where somebody reads it.
-        deviation: Option<usize>,
+        std_dev: Option<usize>,
     },
     /// One prediction of several.
     Combiner {
         /// The gather of the votes.
         voters: usize,
         /// The gather of their standard deviations, where all have one: read only for one of the combination.
-        deviations: Option<usize>,
+        std_devs: Option<usize>,
         /// The gather of the state that it goes by, where it goes by one.
         state: Option<usize>,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
         /// What it gives beside its prediction.
-        beside: Beside,
+        beside: AuxPorts,
     },
 }
 
@@ -234,7 +234,7 @@ impl PlannedRole {
         let more = match self {
             Self::Feature { .. } => None,
             Self::Estimator { learning, .. } => learning.as_ref().and_then(|l| l.freeze),
-            Self::Combiner { beside, .. } => beside.deviation.map(|(_, of_voters)| of_voters),
+            Self::Combiner { beside, .. } => beside.std_dev.map(|(_, of_voters)| of_voters),
         };
         self.inputs().chain(more)
     }
@@ -272,11 +272,11 @@ impl PlannedRole {
 
     /// The slot of the standard deviation of its predictions, where somebody reads it.
     #[must_use]
-    pub fn deviation(&self) -> Option<usize> {
+    pub fn std_dev(&self) -> Option<usize> {
         match self {
             Self::Feature { .. } => None,
-            Self::Estimator { deviation, .. } => *deviation,
-            Self::Combiner { beside, .. } => beside.deviation.map(|(slot, _)| slot),
+            Self::Estimator { std_dev, .. } => *std_dev,
+            Self::Combiner { beside, .. } => beside.std_dev.map(|(slot, _)| slot),
         }
     }
 }
@@ -363,14 +363,14 @@ impl PlannedNode {
 }
 
 /// The port of the standard deviation of the truth about a prediction.
-pub(super) const DEVIATION: &str = "deviation";
+pub(super) const STD_DEV: &str = "std_dev";
 
 /// The port of the weights of votes.
 pub(super) const WEIGHTS: &str = "weights";
 
 /// What a combiner gives beside its prediction: the slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Beside {
+pub struct AuxPorts {
     /// The first of the weights, where somebody reads them.
     pub weights: Option<usize>,
     /// Of the reason.
@@ -378,7 +378,7 @@ pub struct Beside {
     /// Of both ends of its intervals.
     pub bounds: Option<(usize, usize)>,
     /// Of the standard deviation, where somebody reads it, and the gather of those of the voters.
-    pub deviation: Option<(usize, usize)>,
+    pub std_dev: Option<(usize, usize)>,
 }
 
 /// How an estimator goes on learning while it runs.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::Wanted;
 use super::column_unit;
-use super::plan::{DEVIATION, Plan, PlannedNode, PlannedRole, Step, WEIGHTS};
+use super::plan::{Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHTS};
 use super::problem::CompileProblem;
 use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
@@ -111,7 +111,7 @@ pub(super) fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
             Some(slots.start)
         };
         let weights = first(node.port(WEIGHTS), false);
-        let deviation = first(node.port(DEVIATION), wanted.intervals);
+        let std_dev = first(node.port(STD_DEV), wanted.intervals);
         match &mut node.role {
             PlannedRole::Feature { wanted: ports, .. } => {
                 for (index, (name, slots)) in node.ports.iter().enumerate() {
@@ -120,15 +120,14 @@ pub(super) fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
                 }
             }
             PlannedRole::Estimator {
-                deviation: computed,
-                ..
-            } => *computed = computed.or(deviation),
+                std_dev: computed, ..
+            } => *computed = computed.or(std_dev),
             PlannedRole::Combiner {
-                deviations, beside, ..
+                std_devs, beside, ..
             } => {
                 beside.weights = beside.weights.or(weights);
-                beside.deviation = beside.deviation.or(deviation.zip(*deviations));
-                if let Some((_, of_votes)) = beside.deviation {
+                beside.std_dev = beside.std_dev.or(std_dev.zip(*std_devs));
+                if let Some((_, of_votes)) = beside.std_dev {
                     let entries = &plan.gathers[of_votes].entries;
                     read.extend(entries.iter().map(|entry| entry.slot));
                 }

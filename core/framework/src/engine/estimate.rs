@@ -92,7 +92,7 @@ impl Estimate {
             truth,
             training,
             learning,
-            deviation,
+            std_dev,
             ..
         } = &node.role
         else {
@@ -127,7 +127,7 @@ impl Estimate {
         };
         Ok(Self {
             width: used.len(),
-            plain: deviation.is_none(),
+            plain: std_dev.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -249,14 +249,14 @@ impl Estimate {
 
     /// Writes a run down for those that read its prediction in place of the truth.
     fn feed_back(&mut self, row: &[f64], prediction: f64, now: Instant) {
-        let deviation = self.deviation_of_one(row, now);
+        let std_dev = self.std_dev_of_one(row, now);
         let (learning, predictor) = (&self.learning, &self.predictor);
         let predict = |row: &[f64], at: Instant| match learning {
             Some(learning) => learning.predict(row, at),
             None => predictor.predict(row),
         };
         if let Some(feedback) = &mut self.feedback {
-            feedback.ran(row, prediction, deviation, now, predict);
+            feedback.ran(row, prediction, std_dev, now, predict);
         }
     }
 
@@ -287,21 +287,21 @@ impl Estimate {
     }
 
     /// The standard deviation of the truth about the prediction that was made at this tick from a row.
-    pub(crate) fn deviation(&self, row: &[f64], now: Instant) -> f64 {
+    pub(crate) fn std_dev(&self, row: &[f64], now: Instant) -> f64 {
         let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
-        let deviation = widened * self.deviation_of_one(row, now);
-        if deviation.is_finite() {
-            deviation
+        let std_dev = widened * self.std_dev_of_one(row, now);
+        if std_dev.is_finite() {
+            std_dev
         } else {
             f64::NAN
         }
     }
 
     /// The same from past truths that were all measured.
-    fn deviation_of_one(&self, row: &[f64], now: Instant) -> f64 {
+    fn std_dev_of_one(&self, row: &[f64], now: Instant) -> f64 {
         match &self.learning {
-            Some(learning) => learning.deviation(row, now),
-            None => self.predictor.deviation(row),
+            Some(learning) => learning.std_dev(row, now),
+            None => self.predictor.std_dev(row),
         }
     }
 

@@ -222,12 +222,12 @@ impl Feedback {
         &mut self,
         row: &[f64],
         prediction: f64,
-        deviation: f64,
+        std_dev: f64,
         now: Instant,
         predict: impl Fn(&[f64], Instant) -> f64,
     ) {
-        if deviation > 0.0 {
-            self.nudge = deviation;
+        if std_dev > 0.0 {
+            self.nudge = std_dev;
         }
         let (mut nudged, mut slopes) = (
             std::mem::take(&mut self.row),

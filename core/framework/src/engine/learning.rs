@@ -8,7 +8,7 @@ use super::mode::Step;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
-use crate::node::{Learner, LearningGate, LinearForm, Offered, Predictor, Restored};
+use crate::node::{Admission, Learner, LearningGate, LinearForm, Predictor, Restored};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
@@ -31,7 +31,7 @@ pub(crate) struct Learning {
 /// What became of a truth that the embargo let through, as the port `learning` tells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub(crate) enum Became {
+pub(crate) enum LearnOutcome {
     /// It was learned from.
     Learned = 0,
     /// Learning was frozen on command.
@@ -104,9 +104,9 @@ impl Learning {
         self.learner.predict(row, now + self.withheld.link().ahead)
     }
 
-    pub(crate) fn deviation(&self, row: &[f64], now: Instant) -> f64 {
+    pub(crate) fn std_dev(&self, row: &[f64], now: Instant) -> f64 {
         let of = now + self.withheld.link().ahead;
-        self.learner.deviation(row, of)
+        self.learner.std_dev(row, of)
     }
 
     /// The slot of the truth.
@@ -171,14 +171,14 @@ impl Learning {
         now: Instant,
         gathered: &[Gathered],
         on: bool,
-    ) -> Option<(Became, Instant)> {
+    ) -> Option<(LearnOutcome, Instant)> {
         let frozen = self.frozen(gathered, on);
         let newest = self.newest(now);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
         let mut news = None;
         let free = self.mode == Mode::FreeRun;
         self.withheld.release(newest, |released| {
-            if free && learner.settled() {
+            if free && learner.is_settled() {
                 return;
             }
             news = Some((gate.offer(learner, released, frozen), released.arrived));
@@ -193,7 +193,7 @@ impl Learning {
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
         let free = self.mode == Mode::FreeRun;
         self.withheld.end_segment(last, |released| {
-            if !(free && learner.settled()) {
+            if !(free && learner.is_settled()) {
                 gate.offer(learner, released, frozen);
             }
         });
@@ -236,13 +236,13 @@ impl Learning {
             .freeze
             .iter()
             .flat_map(|&freeze| &gathered[freeze].values);
-        let became = if !on && !self.learner.follows() {
-            Became::FrozenOnCommand
+        let became = if !on && !self.learner.tracks_state() {
+            LearnOutcome::FrozenOnCommand
         } else if channels.any(|&value| value != 0.0) {
             // NaN too: where nobody says that learning may go on, it does not.
-            Became::FrozenByChannel
+            LearnOutcome::FrozenByChannel
         } else {
-            Became::Learned
+            LearnOutcome::Learned
         };
         f64::from(became as u8)
     }
@@ -258,7 +258,12 @@ struct Gate {
 
 impl Gate {
     /// Lets a learner learn from a pair, unless something speaks against it.
-    fn offer(&mut self, learner: &mut dyn Learner, released: Released<'_>, frozen: f64) -> Became {
+    fn offer(
+        &mut self,
+        learner: &mut dyn Learner,
+        released: Released<'_>,
+        frozen: f64,
+    ) -> LearnOutcome {
         let Released {
             row,
             truth,
@@ -267,23 +272,23 @@ impl Gate {
         } = released;
         let (row, frozen_at_run) = row.split_at(row.len() - 1);
         let frozen = frozen.max(frozen_at_run[0]).max(frozen_at_arrival);
-        if frozen == f64::from(Became::FrozenOnCommand as u8) {
-            return Became::FrozenOnCommand;
+        if frozen == f64::from(LearnOutcome::FrozenOnCommand as u8) {
+            return LearnOutcome::FrozenOnCommand;
         }
         if frozen > 0.0 {
-            return Became::FrozenByChannel;
+            return LearnOutcome::FrozenByChannel;
         }
         if row.iter().any(|value| value.is_nan()) {
-            return Became::Incomplete;
+            return LearnOutcome::Incomplete;
         }
         if !self.training.admits(truth) {
-            return Became::OutsideLimits;
+            return LearnOutcome::OutsideLimits;
         }
         let range = self.predictor.trained_range();
         match self.own.offer(learner, range, row, truth, arrived) {
-            Offered::Learned => Became::Learned,
-            Offered::Outlier => Became::Outlier,
-            Offered::OutsideRange => Became::OutsideRange,
+            Admission::Learned => LearnOutcome::Learned,
+            Admission::Outlier => LearnOutcome::Outlier,
+            Admission::OutsideRange => LearnOutcome::OutsideRange,
         }
     }
 }

@@ -8,7 +8,7 @@ use super::estimate::{Estimate, fit_of};
 use super::learning::Learning;
 use super::vote::{Vote, Wires};
 use super::{EngineError, Fitted};
-use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
+use crate::compile::{AuxPorts, Plan, PlannedNode, PlannedRole};
 use crate::node::{Inputs, Operator, Role};
 
 /// What runs a node, with all that a tick needs of its plan.
@@ -25,7 +25,7 @@ pub(super) enum Running {
         trigger: Option<usize>,
         slot: usize,
         /// The slot of the standard deviation, where somebody reads it.
-        deviation: Option<usize>,
+        std_dev: Option<usize>,
     },
     Vote(Box<Vote>),
 }
@@ -120,7 +120,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                 PlannedRole::Estimator {
                     gathers,
                     every_tick,
-                    deviation,
+                    std_dev,
                     ..
                 },
                 Role::Estimator(_),
@@ -147,7 +147,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                         gathers.first().copied()
                     },
                     slot: node.slots.start,
-                    deviation: *deviation,
+                    std_dev: *std_dev,
                 }
             }
             (
@@ -164,7 +164,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                     voters: *voters,
                     state: *state,
                     slot: node.slots.start,
-                    beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
+                    beside: (*beside != AuxPorts::default()).then(|| Box::new(*beside)),
                 };
                 let vote = Vote::new(spec, wires, widths[*voters], *truth);
                 Running::Vote(Box::new(vote))

@@ -59,8 +59,8 @@ impl Turn<'_> {
                 estimate,
                 trigger,
                 slot,
-                deviation,
-            } => self.estimate(estimate.as_mut(), *trigger, *slot, *deviation),
+                std_dev,
+            } => self.estimate(estimate.as_mut(), *trigger, *slot, *std_dev),
             Running::Vote(vote) => self.vote(vote),
         }
     }
@@ -134,7 +134,7 @@ impl Turn<'_> {
         mut estimate: Option<&mut Estimate>,
         trigger: Option<usize>,
         slot: usize,
-        deviation: Option<usize>,
+        std_dev: Option<usize>,
     ) {
         if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
             self.learn(learning, slot);
@@ -161,11 +161,11 @@ impl Turn<'_> {
         let row = &mut row[..estimate.width()];
         let (value, stamp) = estimate.run(gathered, row, now, on);
         slots.set(slot, value, stamp);
-        if let Some(slot) = deviation {
+        if let Some(slot) = std_dev {
             let known = if value.is_nan() {
                 f64::NAN
             } else {
-                estimate.deviation(row, now)
+                estimate.std_dev(row, now)
             };
             slots.set(slot, known, stamp);
         }
@@ -195,7 +195,7 @@ impl Turn<'_> {
         let Some(&beside) = vote.wires.beside.as_deref() else {
             return;
         };
-        if beside.weights.is_some() || beside.deviation.is_some() {
+        if beside.weights.is_some() || beside.std_dev.is_some() {
             let weights = vote.weigh(votes);
             if let Some(first) = beside.weights {
                 for (slot, &weight) in (first..).zip(weights) {
@@ -211,9 +211,9 @@ impl Turn<'_> {
             slots.set(lower, unless_infinite(ends[0]), stamp);
             slots.set(upper, unless_infinite(ends[1]), stamp);
         }
-        if let Some((slot, of_voters)) = beside.deviation {
+        if let Some((slot, of_voters)) = beside.std_dev {
             let of_voters = &gathered[of_voters].values;
-            slots.set(slot, vote.deviation(votes, of_voters, value), stamp);
+            slots.set(slot, vote.std_dev(votes, of_voters, value), stamp);
         }
     }
 }

@@ -6,7 +6,7 @@ use super::idle::Answer;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::channel::unless_infinite;
-use crate::compile::{Beside, TruthLink};
+use crate::compile::{AuxPorts, TruthLink};
 use crate::node::{Combine, Combiner, Evidence, Restored, Votes};
 use crate::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub(crate) struct Wires {
     pub(super) state: Option<usize>,
     pub(super) slot: usize,
     /// What it gives beside its prediction, where it gives anything.
-    pub(super) beside: Option<Box<Beside>>,
+    pub(super) beside: Option<Box<AuxPorts>>,
 }
 
 impl Vote {
@@ -41,7 +41,7 @@ impl Vote {
         voters: usize,
         link: Option<TruthLink>,
     ) -> Self {
-        let interval = spec.covers().map(|_| [f64::NAN; 3]);
+        let interval = spec.coverage().map(|_| [f64::NAN; 3]);
         // The interval that was given for a truth is written down with the votes for it.
         let width = voters + interval.map_or(0, |ends| ends.len());
         Self {
@@ -117,12 +117,12 @@ impl Vote {
     /// The truth is taken to follow one of the voters, each with the probability of its weight, so that the variance is
     /// `Σ w_i (σ_i² + (ŷ_i − ŷ)²)`: what voters disagree about is uncertain too (Hoeting, Madigan, Raftery and Volinsky 1999,
     /// section 2). NaN where a vote that counts has none, or the weights do not add up to 1.
-    pub(crate) fn deviation(&self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
+    pub(crate) fn std_dev(&self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
         let (mut sum, mut variance) = (0.0, 0.0);
-        for ((&weight, &vote), deviation) in self.weights.iter().zip(&votes.values).zip(of_votes) {
+        for ((&weight, &vote), std_dev) in self.weights.iter().zip(&votes.values).zip(of_votes) {
             if weight != 0.0 && !vote.is_nan() {
                 sum += weight;
-                variance += weight * (deviation * deviation + (vote - combined).powi(2));
+                variance += weight * (std_dev * std_dev + (vote - combined).powi(2));
             }
         }
         // Written so that NaN fails.

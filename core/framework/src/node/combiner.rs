@@ -60,18 +60,18 @@ pub trait Combiner: Debug + Send + Sync {
     }
 
     /// Whether its answer is a sum of votes by weights, which the port `weights` then shows. Where all voters tell their
-    /// standard deviation, the port `deviation` combines them by these weights: `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)`.
-    fn weighs(&self) -> bool {
+    /// standard deviation, the port `std_dev` combines them by these weights: `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)`.
+    fn has_weights(&self) -> bool {
         false
     }
 
     /// Whether it gives a reason for what it does: a number, which the port `reason` shows.
-    fn reasons(&self) -> bool {
+    fn has_reason(&self) -> bool {
         false
     }
 
     /// The share of truths that its intervals are to cover, for kinds that give intervals: the ports `lower` and `upper`.
-    fn covers(&self) -> Option<f64> {
+    fn coverage(&self) -> Option<f64> {
         None
     }
 

@@ -125,8 +125,8 @@ pub trait Estimator: Debug + Send + Sync {
         true
     }
 
-    /// Whether its predictions come with their standard deviation, in the port `deviation`.
-    fn deviates(&self) -> bool {
+    /// Whether its predictions come with their standard deviation, in the port `std_dev`.
+    fn has_std_dev(&self) -> bool {
         false
     }
 

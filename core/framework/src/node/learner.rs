@@ -106,7 +106,7 @@ pub trait Learner: Debug + Send {
     /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known. Truths
     /// that miss by too much in units of it are not handed over. How large misses are is learned anew where it comes or goes: one
     /// that is known should stay so.
-    fn deviation(&self, _regressors: &[f64], _of: Instant) -> f64 {
+    fn std_dev(&self, _regressors: &[f64], _of: Instant) -> f64 {
         f64::NAN
     }
 
@@ -123,19 +123,19 @@ pub trait Learner: Debug + Send {
 
     /// Whether truths only move a state, and nothing of the model: they are then handed over while learning is frozen on
     /// command too.
-    fn follows(&self) -> bool {
+    fn tracks_state(&self) -> bool {
         false
     }
 
     /// Whether it goes on from where the last truths were, as an autoregression goes on from those among its regressors. It is
     /// then given the truth of a run's own tick before the run, where that would be allowed as a regressor.
     fn extrapolates(&self) -> bool {
-        self.follows()
+        self.tracks_state()
     }
 
     /// Whether the state is where it should be, after as many truths as that takes. Until it is, truths are handed over in a
     /// free run too.
-    fn settled(&self) -> bool {
+    fn is_settled(&self) -> bool {
         true
     }
 

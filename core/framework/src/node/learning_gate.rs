@@ -31,7 +31,7 @@ pub struct LearningGate {
 
 /// What became of a row that was offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Offered {
+pub enum Admission {
     /// It was learned from.
     Learned,
     /// The truth missed its prediction by too much.
@@ -59,24 +59,24 @@ impl LearningGate {
         row: &[f64],
         truth: f64,
         at: Instant,
-    ) -> Offered {
+    ) -> Admission {
         let outside = range.is_some_and(|range| !range.contains(row, self.limits.margin));
         if outside && !learner.has_level() {
-            return Offered::OutsideRange;
+            return Admission::OutsideRange;
         }
         let error = truth - learner.predict(row, at);
-        let deviation = learner.deviation(row, at);
+        let std_dev = learner.std_dev(row, at);
         let most = self.limits.outliers;
         // What has yet to find out where it is may be far off.
         let starts_anywhere = learner.extrapolates();
-        if learner.settled() && !self.recent.admits(error, deviation, most, starts_anywhere) {
-            return Offered::Outlier;
+        if learner.is_settled() && !self.recent.admits(error, std_dev, most, starts_anywhere) {
+            return Admission::Outlier;
         }
         if outside {
             learner.follow_level(row, truth, at);
-            return Offered::OutsideRange;
+            return Admission::OutsideRange;
         }
         learner.learn(row, truth, at);
-        Offered::Learned
+        Admission::Learned
     }
 }

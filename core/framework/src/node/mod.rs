@@ -40,7 +40,7 @@ pub use feature::{Feature, Operator, Outputs, Tick};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
-pub use learning_gate::{LearningGate, LearningLimits, Offered};
+pub use learning_gate::{Admission, LearningGate, LearningLimits};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read};

@@ -36,8 +36,8 @@ pub trait Predictor: InModel + Any + Debug + Send + Sync {
     }
 
     /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
-    /// it is not known. Only asked of kinds that say [`Estimator::deviates`](super::Estimator::deviates).
-    fn deviation(&self, _regressors: &[f64]) -> f64 {
+    /// it is not known. Only asked of kinds that say [`Estimator::has_std_dev`](super::Estimator::has_std_dev).
+    fn std_dev(&self, _regressors: &[f64]) -> f64 {
         f64::NAN
     }
 

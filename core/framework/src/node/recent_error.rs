@@ -50,12 +50,12 @@ impl RecentError {
     pub(crate) fn admits(
         &mut self,
         error: f64,
-        deviation: f64,
+        std_dev: f64,
         multiple: f64,
         starts_anywhere: bool,
     ) -> bool {
-        let weighed = deviation > 0.0 && deviation < f64::INFINITY;
-        let error = if weighed { error / deviation } else { error };
+        let weighed = std_dev > 0.0 && std_dev < f64::INFINITY;
+        let error = if weighed { error / std_dev } else { error };
         let square = error * error;
         if !square.is_finite() {
             return false;

@@ -113,14 +113,14 @@ impl Kind {
     pub fn outputs(&self) -> Vec<&'static str> {
         match self.role {
             RoleName::Feature => (self.ports)().iter().map(|port| port.name).collect(),
-            RoleName::Estimator => vec!["prediction", "learning", "deviation"],
+            RoleName::Estimator => vec!["prediction", "learning", "std_dev"],
             RoleName::Combiner => vec![
                 "prediction",
                 "weights",
                 "reason",
                 "lower",
                 "upper",
-                "deviation",
+                "std_dev",
             ],
         }
     }

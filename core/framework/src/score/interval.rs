@@ -22,21 +22,21 @@ enum From {
     /// The slots of both ends.
     Bounds { lower: usize, upper: usize },
     /// The slot of the standard deviation.
-    Deviation { slot: usize },
+    StdDev { slot: usize },
 }
 
 impl Intervals {
     /// Those of a node, if it gives any.
     pub(crate) fn of(node: &PlannedNode) -> Option<Self> {
         if let Role::Combiner(combiner) = node.spec.role()
-            && let (Some(stated), Some((lower, upper))) = (combiner.covers(), node.role.bounds())
+            && let (Some(stated), Some((lower, upper))) = (combiner.coverage(), node.role.bounds())
         {
             let from = From::Bounds { lower, upper };
             return Some(Self { from, stated });
         }
-        let slot = node.role.deviation()?;
+        let slot = node.role.std_dev()?;
         Some(Self {
-            from: From::Deviation { slot },
+            from: From::StdDev { slot },
             stated: OF_DEVIATIONS.0,
         })
     }
@@ -45,7 +45,7 @@ impl Intervals {
     pub(crate) fn read(&self, engine: &Engine, prediction: f64) -> [f64; 2] {
         match self.from {
             From::Bounds { lower, upper } => [engine.value(lower), engine.value(upper)],
-            From::Deviation { slot } => {
+            From::StdDev { slot } => {
                 let reach = OF_DEVIATIONS.1 * engine.value(slot);
                 [prediction - reach, prediction + reach]
             }
@@ -56,7 +56,7 @@ impl Intervals {
 /// How well the intervals of a prediction hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IntervalScore {
-    /// What they are: `bounds` that the node gives, or made of the `deviation` that it gives as if errors were normal.
+    /// What they are: `bounds` that the node gives, or made of the `std_dev` that it gives as if errors were normal.
     pub from: &'static str,
     /// The share of truths that they are to cover.
     pub stated: f64,
@@ -92,7 +92,7 @@ impl IntervalScore {
         (n > 0).then(|| Self {
             from: match intervals.from {
                 From::Bounds { .. } => "bounds",
-                From::Deviation { .. } => "deviation",
+                From::StdDev { .. } => "std_dev",
             },
             stated: intervals.stated,
             n,

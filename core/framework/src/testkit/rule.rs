@@ -46,7 +46,7 @@ pub enum Rule {
     Allocation,
     /// A combiner takes no absent vote for zero, and its answer is the sum of the votes by its weights where it weighs.
     Votes,
-    /// A deviation that is promised comes, and is not negative; an interval stands about the prediction.
+    /// A promised standard deviation is present and not negative; an interval stands about the prediction.
     Uncertainty,
     /// An answer that is asked for leaves no trace.
     NoTrace,
@@ -175,8 +175,8 @@ impl Rule {
             }
             Self::Uncertainty => {
                 "give NaN where no deviation or interval is known; else a deviation of 0 or more, and the lower end before the upper, \
-                 with the combination between them. An estimator that says `deviates` gives one in `Predictor::deviation`, and in \
-                 `Learner::deviation` if it learns"
+                 with the combination between them. An estimator that says `has_std_dev` gives one in `Predictor::std_dev`, and in \
+                 `Learner::std_dev` if it learns"
             }
             Self::NoTrace => {
                 "let `predict` and `combine` change nothing, not even behind a `Cell`, that later answers depend on"

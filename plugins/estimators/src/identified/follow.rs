@@ -282,11 +282,11 @@ pub(super) fn part(of: Duration, count: i64, parts: i64) -> Duration {
 }
 
 impl Learner for Following {
-    fn follows(&self) -> bool {
+    fn tracks_state(&self) -> bool {
         true
     }
 
-    fn settled(&self) -> bool {
+    fn is_settled(&self) -> bool {
         let mut series = self.known.series.iter();
         // As many truths as tell what filters gave, or how far the model looks back.
         let needed = |of: &Stepper| of.model().a.len().max(of.model().starts()).max(1);
@@ -355,7 +355,7 @@ impl Learner for Following {
         ahead.foresee(self.known.scaling.of(regressors))
     }
 
-    fn deviation(&self, _regressors: &[f64], of: Instant) -> f64 {
+    fn std_dev(&self, _regressors: &[f64], of: Instant) -> f64 {
         let followed = self.known.nearest(of);
         let known = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
         let last = self.deviations.len().saturating_sub(1);

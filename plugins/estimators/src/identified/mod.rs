@@ -49,7 +49,7 @@ macro_rules! identified {
                 false
             }
 
-            fn deviates(&self) -> bool {
+            fn has_std_dev(&self) -> bool {
                 true
             }
 

@@ -51,7 +51,7 @@ impl Predictor for Identified {
         self.at_rest(regressors)
     }
 
-    fn deviation(&self, _regressors: &[f64]) -> f64 {
+    fn std_dev(&self, _regressors: &[f64]) -> f64 {
         self.deviations.last().copied().unwrap_or(f64::NAN)
     }
 

@@ -79,7 +79,7 @@ fn with_one(scaled: impl Fn(usize) -> f64) -> impl Fn(usize) -> f64 {
 }
 
 /// The standard deviation of a truth so many seconds from now.
-pub(super) fn deviation(filter: &Filter, time: f64, regressors: impl Fn(usize) -> f64) -> f64 {
+pub(super) fn std_dev(filter: &Filter, time: f64, regressors: impl Fn(usize) -> f64) -> f64 {
     let forecast = filter.forecast_of(time, regressors);
     forecast.map_or(f64::NAN, |forecast| {
         (forecast.variance + filter.model().observation).sqrt()
@@ -136,7 +136,7 @@ impl Following {
     /// How uncertain the level is where a truth misses by so much that it has leapt: as much as it misses.
     fn leap(&self, regressors: &[f64], truth: f64, at: Instant) -> Option<f64> {
         let leap = (truth - self.predict(regressors, at)).powi(2);
-        let usual = self.deviation(regressors, at).powi(2);
+        let usual = self.std_dev(regressors, at).powi(2);
         // Written so that NaN fails.
         (leap < f64::INFINITY && leap > LEAP * LEAP * usual).then(|| leap.min(WIDEST * usual))
     }
@@ -151,12 +151,12 @@ impl Learner for Following {
         self.known.scaling.truth + self.known.expected(regressors, of)
     }
 
-    fn deviation(&self, regressors: &[f64], of: Instant) -> f64 {
+    fn std_dev(&self, regressors: &[f64], of: Instant) -> f64 {
         let Known {
             filter, scaling, ..
         } = &self.known;
         let scaled = with_one(scaling.of(regressors));
-        deviation(filter, self.known.since(of), scaled)
+        std_dev(filter, self.known.since(of), scaled)
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -294,12 +294,12 @@ mod tests {
             assert!(off < within * expected.abs(), "{found}, not {expected}");
         };
         near(following.predict(&[14.0], after(0)), from + 500.0, 1e-3);
-        near(following.deviation(&[14.0], after(0)), 500.0, 0.01);
+        near(following.std_dev(&[14.0], after(0)), 500.0, 0.01);
         let now = coefficient(&following);
         near(now.0, before.0, 1e-3);
         near(now.1, before.1, 1e-4);
         following.learn(&[14.0], from + 500.0, after(1));
-        assert!(following.deviation(&[14.0], after(1)) < 2.0);
+        assert!(following.std_dev(&[14.0], after(1)) < 2.0);
     }
 
     #[test]
@@ -311,7 +311,7 @@ mod tests {
         following.segment(Duration::ZERO);
         let (mean, deviation) = (
             following.predict(&[10.0], after(0)),
-            following.deviation(&[10.0], after(0)),
+            following.std_dev(&[10.0], after(0)),
         );
         assert!((mean - 600.0).abs() < 20.0, "{mean}");
         assert!((deviation - 500.0).abs() < 20.0, "{deviation}");

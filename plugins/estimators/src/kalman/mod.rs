@@ -18,7 +18,7 @@ mod told;
 use crate::features::too_many;
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
-use follow::{Following, deviation};
+use follow::{Following, std_dev};
 
 /// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
 ///
@@ -34,7 +34,7 @@ use follow::{Following, deviation};
 ///
 /// The fit knows nothing of level and trend where it starts, nor at the start of a segment (a diffuse start). A level is one
 /// that returns only where that makes the rows likelier by a factor of 60, as one in twenty does that does not return. What is
-/// not known of the variances and of that rate is no part of `deviation`; what is not known of level, trend and coefficients is.
+/// not known of the variances and of that rate is no part of `std_dev`; what is not known of level, trend and coefficients is.
 ///
 /// A truth of which a feature lies outside the range of the fit, by more than `learn.margin` says, moves level and trend and
 /// leaves the coefficients as they are (Schmidt 1966), so that a dead sensor cannot spoil them. One that misses by more than
@@ -52,7 +52,7 @@ use follow::{Following, deviation};
 /// Truths whose windows overlap share their noise, which the model would take for a level that moves; so a truth that comes
 /// sooner than `every` after the one before counts for its share of that time, its variance being multiplied by the inverse.
 /// The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new segment level and
-/// trend start from what the fit knew of them at large. The port `deviation` is the standard deviation of the truth about its
+/// trend start from what the fit knew of them at large. The port `std_dev` is the standard deviation of the truth about its
 /// prediction; it grows while no truth comes. The port `learning` tells what became of the newest truth, in the numbers of
 /// `rls`, and what is not learned from is not followed either, but for 4, a feature outside the range of the fit. The answer
 /// changes with time alone, so the node runs at every tick.
@@ -150,7 +150,7 @@ impl Estimator for Kalman {
         Learns::UnlessTold
     }
 
-    fn deviates(&self) -> bool {
+    fn has_std_dev(&self) -> bool {
         true
     }
 
@@ -287,8 +287,8 @@ impl Predictor for KalmanPredictor {
         self.scaling.truth + self.filter.expected(0.0, self.scaling.of(regressors))
     }
 
-    fn deviation(&self, regressors: &[f64]) -> f64 {
-        deviation(&self.filter, 0.0, self.scaling.of(regressors))
+    fn std_dev(&self, regressors: &[f64]) -> f64 {
+        std_dev(&self.filter, 0.0, self.scaling.of(regressors))
     }
 
     fn coefficients(&self) -> Option<Coefficients> {

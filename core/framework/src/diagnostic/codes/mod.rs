@@ -256,7 +256,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A056",
         "a truth that is a prediction",
-        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what tells of one, such as its `deviation` or `weights`."
+        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what tells of one, such as its `std_dev` or `weights`."
     ),
     code!(
         "A057",
@@ -311,7 +311,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A067",
         "a vote that is no prediction",
-        "What an estimator or combiner gives first is its prediction. Its other ports, such as `deviation`, `lower` or `weights`, tell of that prediction; put together with predictions they would make a number of no meaning."
+        "What an estimator or combiner gives first is its prediction. Its other ports, such as `std_dev`, `lower` or `weights`, tell of that prediction; put together with predictions they would make a number of no meaning."
     ),
     code!(
         "A068",

@@ -17,7 +17,7 @@ pub(super) fn answers(subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), 
         ));
     }
     // Whether a deviation that is promised comes is another rule.
-    let slots = slots.filter(|&slot| subject.fixture.port(slot) != "deviation");
+    let slots = slots.filter(|&slot| subject.fixture.port(slot) != "std_dev");
     for slot in slots {
         let place = place(subject, slot);
         let mut same = all.iter().flat_map(|other| {

@@ -31,7 +31,7 @@ pub(super) fn votes(subject: &Subject<'_>) -> Result<(), String> {
                 let same = |one: f64, two: f64| one == two || (one.is_nan() && two.is_nan());
                 as_zero &= same(without.combined, with_zero.combined);
                 counts |= !same(without.combined, with.combined);
-                if combiner.weighs() {
+                if combiner.has_weights() {
                     weighed(&votes, &without).map_err(|found| format!("{when}, {found}"))?;
                 }
             }
@@ -72,11 +72,11 @@ fn weighed(votes: &[f64], answer: &Answer) -> Result<(), String> {
 pub(super) fn uncertainty(subject: &Subject<'_>) -> Result<(), String> {
     let role = subject.fixture.plan.nodes[0].spec.role();
     if let Role::Combiner(combiner) = role
-        && let Some(covers) = combiner.covers()
+        && let Some(covers) = combiner.coverage()
     {
         if !(covers > 0.0 && covers < 1.0) {
             return Err(format!(
-                "`covers` says that intervals cover {covers} of the truths, which is no share between 0 and 1"
+                "`coverage` says that intervals cover {covers} of the truths, which is no share between 0 and 1"
             ));
         }
         of_engine(subject, |engine, voters, when| {
@@ -102,7 +102,7 @@ pub(super) fn uncertainty(subject: &Subject<'_>) -> Result<(), String> {
     if matches!(role, Role::Estimator(_)) {
         let course = subject.usual();
         for (number, slot) in subject.fixture.slots().enumerate() {
-            if subject.fixture.port(slot) != "deviation" {
+            if subject.fixture.port(slot) != "std_dev" {
                 continue;
             }
             // What is predicted in the second half comes after all that is to be learned before.

@@ -51,7 +51,7 @@ fn from_far_off(model: &Identified, count: i64) -> (Vec<f64>, Vec<f64>) {
         learner.run(&[1.0], of, of - model.step);
         let told = (
             learner.predict(&[1.0], of) - filtered,
-            learner.deviation(&[1.0], of),
+            learner.std_dev(&[1.0], of),
         );
         learner.learn(&[1.0], filtered + draw(), of);
         told
@@ -131,7 +131,7 @@ fn right_after_a_start_the_deviation_is_larger_by_what_was_not_foreseen_before_i
     for nth in 0..60 {
         let of = Instant::from_ns(0) + part(step, nth, 1);
         learner.run(&[1.0], of, of - step);
-        deviations.push(learner.deviation(&[1.0], of));
+        deviations.push(learner.std_dev(&[1.0], of));
         learner.learn(&[1.0], 0.0, of);
     }
     // Of nothing it knows least; then the innovation before the first truth counts by half.
@@ -155,7 +155,7 @@ fn deviations_after(truths: i64, count: i64) -> Vec<f64> {
     let deviations = (0..truths + count).map(|nth| {
         let of = Instant::from_ns(0) + part(step, nth, 1);
         learner.run(&[1.0], of, of - step);
-        let deviation = learner.deviation(&[1.0], of);
+        let deviation = learner.std_dev(&[1.0], of);
         if nth < truths {
             learner.learn(&[1.0], 0.0, of);
         }
@@ -259,7 +259,7 @@ fn where_truths_are_missing_predictions_and_deviations_are_those_of_a_kalman_fil
             // Until then the filters know of different pasts.
             if nth >= 120 {
                 let found = learner.predict(&input[..width], of);
-                let unsure = learner.deviation(&input[..width], of);
+                let unsure = learner.std_dev(&input[..width], of);
                 assert!(
                     (found - predicted).abs() < 1e-8 * (1.0 + predicted.abs()),
                     "{name}, {nth}: {found}, not {predicted}"
