@@ -1,5 +1,6 @@
 //! Every mistake that reading a graph file can find, with the data of its text; where it stands is told by who reports it.
 
+mod codes;
 mod told;
 
 use std::sync::Arc;
