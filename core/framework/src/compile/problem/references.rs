@@ -69,7 +69,6 @@ problem! {
             false => format!("{written}, or name a port; its ports are {}", names(known)),
         }
     },
-    certain: true,
 }
 
 code!(
