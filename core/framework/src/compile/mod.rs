@@ -19,7 +19,7 @@ mod misplaced;
 mod order;
 mod plan;
 mod port_channels;
-mod problem;
+pub mod problem;
 mod provenance;
 mod reference;
 mod resolver;
@@ -40,7 +40,7 @@ pub use plan::{
 };
 pub(crate) use plan::{Rows, admits};
 pub(crate) use port_channels::PortChannels;
-pub use problem::CompileProblem;
+
 pub(crate) use provenance::persistence_lag;
 pub(crate) use reference::Reference;
 pub(crate) use scope::outermost;

@@ -7,10 +7,9 @@ mod named;
 pub mod number;
 pub mod number_or_none;
 pub mod numbers;
-mod problem;
+pub mod problem;
 
 pub use card::{Card, DataCard, EstimatorCard, Period};
 pub use error::ModelError;
 pub use file::Model;
 pub use named::named_model;
-pub use problem::NamedModelProblem;

@@ -8,7 +8,7 @@ mod expect;
 mod expectation;
 mod judge;
 mod observed;
-mod problem;
+pub mod problem;
 mod run;
 mod series;
 mod shape;
@@ -18,7 +18,7 @@ pub use data::{DataSet, Simulation};
 pub use declare::{On, Trial, declare, mistakes, observe};
 pub use expectation::{Check, Expectation, Period, Rival, Tolerance};
 pub use judge::{Finding, Wanted};
-pub use problem::TrialProblem;
+
 pub use run::{Verdict, run};
 pub use series::{Curve, Series, Shape, Synthetic};
 pub(crate) use table::TestTable;

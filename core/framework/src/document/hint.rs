@@ -4,7 +4,7 @@ use super::tree::Data;
 
 /// What alone stands between a value and the type that its key needs.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Lacks {
+pub enum Hint {
     /// The unit of a duration.
     UnitOfTime,
     /// The unit of a quantity.
@@ -28,7 +28,7 @@ pub enum Lacks {
     },
 }
 
-impl Lacks {
+impl Hint {
     /// What a value that is found in the place of a duration lacks.
     pub(super) fn for_duration(found: &Data) -> Option<Self> {
         found.is_number().then_some(Self::UnitOfTime)
