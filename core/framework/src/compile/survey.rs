@@ -6,7 +6,7 @@ use super::keys::Learn;
 use super::problem;
 use super::resolver::Resolver;
 use crate::document::{InstanceDecl, NodeDecl};
-use crate::node::{Kind, Role};
+use crate::node::{Kind, Read, Role};
 
 impl Resolver<'_> {
     /// Looks through an instance of which nobody will read anything.
@@ -28,7 +28,10 @@ impl Resolver<'_> {
         // Inputs that cannot be read at all are not missing.
         if !(node.faulty && decl.inputs.is_empty()) {
             for port in (kind.inputs)() {
-                self.slots(&declared, port);
+                let slots = self.slots(&declared, port).unwrap_or_default();
+                if port.read == Read::Truth && slots.len() > 1 {
+                    self.one_of(&declared, port, &slots);
+                }
             }
         }
         let role = parts.spec.as_ref().map(|spec| spec.role());

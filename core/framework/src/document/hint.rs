@@ -1,4 +1,4 @@
-//! What a value of another type lacks to be right, and how that is said; which types are needed is decided by who reads it.
+//! What to write instead of a value of another type.
 
 use super::tree::Data;
 
@@ -20,11 +20,6 @@ pub enum Hint {
     Brackets {
         /// What stands in them.
         around: String,
-    },
-    /// Braces with keys in them.
-    Table {
-        /// A table that stands there by default.
-        example: String,
     },
 }
 
@@ -48,16 +43,6 @@ impl Hint {
             unit: unit.to_owned(),
             known,
         })
-    }
-
-    /// The unit that a number lacks to be like an example.
-    pub(super) fn unit_of(number: String, example: &str) -> Self {
-        let unit = example.split_once(' ').map_or("1", |(_, unit)| unit);
-        Self::Unit {
-            number,
-            unit: unit.to_owned(),
-            known: false,
-        }
     }
 
     /// What a value that is found in the place of a list of texts lacks.
@@ -91,7 +76,6 @@ impl Hint {
             Self::Brackets { around } => {
                 format!("a list stands in brackets, e.g. [{around}]")
             }
-            Self::Table { example } => format!("the default is {example}"),
         }
     }
 }

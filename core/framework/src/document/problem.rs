@@ -5,7 +5,7 @@ mod told;
 
 use std::sync::Arc;
 
-use super::foreign::ForeignSyntax;
+use super::foreign_syntax::ForeignSyntax;
 use super::hint::Hint;
 use crate::diagnostic::{Names, Place};
 use crate::quantity::{Quantity, QuantityError};

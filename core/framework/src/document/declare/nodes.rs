@@ -7,7 +7,7 @@ use super::reading::{
     in_samples, known_keys, length, meant, missing, one_or_more, samples, table, text,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::diagnostic::{Diagnostics, nearest};
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
