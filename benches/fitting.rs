@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Recording;
-use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Recording, Samples};
+use athermal::run::score::{ScoreOptions, score};
 use athermal_numerics::{Direction, Folds, GramBlocks, LeastSquares, Search, Standardization};
 use divan::Bencher;
 use divan::counter::BytesCount;
@@ -179,10 +179,10 @@ fn read_csv(bencher: Bencher) {
     bencher.counter(BytesCount::new(bytes)).bench_local(|| {
         let data = dataset(&path);
         let mut rows = data.open(&plan).expect("the file can be read");
-        let mut values = vec![f64::NAN; plan.sources.len()];
+        let mut samples = Samples::default();
         let mut count = 0_u64;
         while rows
-            .next(&mut values)
+            .next(&mut samples)
             .expect("the file can be read")
             .is_some()
         {

@@ -52,7 +52,7 @@ impl<'a> Reference<'a> {
 
 impl<'a> Reference<'a> {
     /// The mistake where the node has no such port; none are known of a signal.
-    pub(crate) fn no_port(&self, known: Vec<&'static str>) -> Box<dyn Problem> {
+    pub fn no_port(&self, known: Vec<&'static str>) -> Box<dyn Problem> {
         let node = self.node.to_owned();
         match self.port {
             Some("") => Box::new(problem::EmptyPort {
@@ -70,7 +70,7 @@ impl<'a> Reference<'a> {
     }
 
     /// The node without the members that are picked out of the modules around it: `axis[Z1]/thermal` is `axis/thermal`.
-    pub(crate) fn whole_node(&self) -> Cow<'a, str> {
+    pub fn whole_node(&self) -> Cow<'a, str> {
         if !self.is_member() {
             return Cow::Borrowed(self.node);
         }

@@ -5,7 +5,7 @@ use crate::time::Instant;
 
 /// The node that is at work. Where a panic ends it, a line on standard error says which it was: the panic itself knows only a place
 /// in the source.
-pub(crate) struct AtHand<'a> {
+pub struct AtHand<'a> {
     plan: &'a Plan,
     when: When,
     node: usize,
@@ -32,7 +32,7 @@ impl<'a> AtHand<'a> {
     }
 
     /// This one, while it is fitted.
-    pub(crate) fn in_fit(plan: &'a Plan, node: usize) -> Self {
+    pub fn in_fit(plan: &'a Plan, node: usize) -> Self {
         let when = When::Fit;
         Self { plan, when, node }
     }
@@ -65,9 +65,11 @@ impl Drop for AtHand<'_> {
 }
 
 /// The node of a name, while what it was fitted to is read: as [`AtHand`], and looked for only where a panic ends it.
-pub(crate) struct FitAtHand<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) name: &'a str,
+pub struct FitAtHand<'a> {
+    /// The plan that is fitted.
+    pub plan: &'a Plan,
+    /// The node at hand.
+    pub name: &'a str,
 }
 
 impl Drop for FitAtHand<'_> {

@@ -9,7 +9,7 @@ use crate::compile::{Change, Plan, PlannedNode, diff};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
-pub(crate) struct Heritage {
+pub struct Heritage {
     /// How each node begins.
     pub(crate) nodes: Vec<Begin>,
     /// Whether each slot goes on as it was: nothing that it hangs on has changed.
@@ -20,7 +20,7 @@ pub(crate) struct Heritage {
 
 /// How a node begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Begin {
+pub enum Begin {
     /// As it was.
     AsItWas,
     /// The old state is offered to it.
@@ -75,7 +75,7 @@ pub enum Carry {
 
 impl Heritage {
     /// All of a plan, in itself.
-    pub(crate) fn all(plan: &Plan) -> Self {
+    pub fn all(plan: &Plan) -> Self {
         Self {
             nodes: vec![Begin::AsItWas; plan.nodes.len()],
             slots: vec![true; plan.channels.len()],
@@ -85,7 +85,7 @@ impl Heritage {
 
     /// What goes on from one engine in another. With `learned`, a node is offered its old state although it, or what it
     /// reads, has been fitted anew.
-    pub(crate) fn between(old: &Engine, new: &Engine, learned: bool) -> Self {
+    pub fn between(old: &Engine, new: &Engine, learned: bool) -> Self {
         let (was, plan) = (&**old.plan(), &**new.plan());
         let diff = diff(was, plan);
         let changes: HashMap<_, _> = diff
@@ -247,8 +247,8 @@ impl Own {
 }
 
 /// What hangs on something, by number.
-pub(super) struct Touched {
-    pub(super) nodes: Vec<bool>,
+pub struct Touched {
+    pub nodes: Vec<bool>,
     pub(super) slots: Vec<bool>,
 }
 

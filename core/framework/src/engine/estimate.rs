@@ -151,7 +151,7 @@ impl Estimate {
 
     /// How long a step of it was planned to be, which is none where it is as long as the time between truths; none of either where
     /// no past truth changes what it predicts in the mode that it is in.
-    pub(crate) fn step(&self) -> Option<Option<Duration>> {
+    pub fn step(&self) -> Option<Option<Duration>> {
         let read = self.feedback.as_ref().map(|feedback| feedback.step());
         let followed = self.learning.as_ref().map(|learning| learning.step());
         read.max(followed)
@@ -329,7 +329,7 @@ impl Estimate {
 
     /// Asks for the prediction from any values.
     #[cfg(feature = "testkit")]
-    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+    pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);
         if let Some(learning) = &self.learning {

@@ -94,7 +94,7 @@ impl Feedback {
     }
 
     /// How long a step was planned to be; none where it is as long as the time between truths.
-    pub(crate) fn step(&self) -> Option<Duration> {
+    pub fn step(&self) -> Option<Duration> {
         self.step.planned()
     }
 

@@ -11,7 +11,7 @@ use crate::time::{Duration, Instant};
 ///
 /// What a tick needs of the plan is copied here, so that it touches little memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Gathered {
+pub struct Gathered {
     /// The values; NaN where there is none.
     pub(crate) values: Box<[f64]>,
     /// Their stamps; of no meaning where there is no value.

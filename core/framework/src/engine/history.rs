@@ -106,7 +106,7 @@ impl History {
     }
 
     /// Lets a cursor go back, so that an instant before the one asked last may be asked for.
-    pub(crate) fn go_back(&self, at: Instant, cursor: &mut Cursor) {
+    pub fn go_back(&self, at: Instant, cursor: &mut Cursor) {
         while let Some(last) = cursor.checked_sub(1)
             && self.entry(last).is_some_and(|past| past.at > at)
         {

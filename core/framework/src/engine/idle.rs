@@ -4,17 +4,18 @@ use super::{Engine, Running};
 
 /// What a combiner makes of votes.
 #[derive(Debug)]
-pub(crate) struct Answer {
-    pub(crate) combined: f64,
+pub struct Answer {
+    /// The combined prediction; NaN where there is none.
+    pub combined: f64,
     /// NaN for each vote where it does not weigh.
-    pub(crate) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Both ends, NaN where there is none.
-    pub(crate) interval: [f64; 2],
+    pub interval: [f64; 2],
 }
 
 impl Engine {
     /// Asks every estimator and combiner for answers to values that `value` draws.
-    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+    pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         for node in &self.nodes {
             match node {
                 Running::Operator { .. } => {}
@@ -37,7 +38,7 @@ impl Engine {
     }
 
     /// What the only combiner would make of votes; none where there is no combiner.
-    pub(crate) fn answer(&self, votes: &[f64]) -> Option<Answer> {
+    pub fn answer(&self, votes: &[f64]) -> Option<Answer> {
         self.nodes.iter().find_map(|node| match node {
             Running::Vote(vote) => Some(vote.answer(votes)),
             Running::Operator { .. } | Running::Estimate { .. } => None,

@@ -51,7 +51,7 @@ impl Engine {
     ///
     /// # Errors
     /// When a node does not take its own state back.
-    pub(crate) fn twin(&self) -> Result<Self, RestoreError> {
+    pub fn twin(&self) -> Result<Self, RestoreError> {
         let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)
             .expect("what was fitted belongs to the plan, or there would be no engine to copy");
         twin.revision.clone_from(&self.revision);
@@ -72,7 +72,7 @@ impl Engine {
 
     /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
     /// each follows, and what is frozen on command stays so.
-    pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
+    pub fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
         self.outlets.take_over(&before.outlets, from);
         self.refused = before.refused;
         // Whoever made this engine ready may have missed the command.
@@ -155,7 +155,7 @@ impl Engine {
     /// Goes on from a state of this or another graph, as far as the heritage says.
     ///
     /// `warmed` says whether this engine has been stepped over the past, so that what is not carried is not cold.
-    pub(crate) fn adopt(
+    pub fn adopt(
         &mut self,
         state: &EngineState,
         heritage: &Heritage,

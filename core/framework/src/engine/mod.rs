@@ -14,7 +14,7 @@ mod history;
 mod idle;
 mod keep;
 mod learning;
-pub(crate) mod mode;
+pub mod mode;
 mod outlets;
 mod pairing;
 mod part;
@@ -40,13 +40,13 @@ pub use revision::{Fnv1a, fnv_1a, revision};
 pub use sample_range::SampleRange;
 pub use state::{EngineState, RestoreError};
 
-pub(crate) use at_hand::{AtHand, FitAtHand};
-pub(crate) use carry::Heritage;
-pub(crate) use gather::Gathered;
+pub use at_hand::{AtHand, FitAtHand};
+pub use carry::Heritage;
+pub use gather::Gathered;
 pub use history::{Cursor, History};
 #[cfg(feature = "testkit")]
-pub(crate) use idle::Answer;
-pub(crate) use slots::{Given, Slots};
+pub use idle::Answer;
+pub use slots::{Given, Slots};
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
@@ -225,7 +225,7 @@ impl Engine {
     }
 
     /// Whether a tick at this instant would be taken.
-    pub(crate) fn takes(&self, time: Instant) -> bool {
+    pub fn takes(&self, time: Instant) -> bool {
         time > self.last
     }
 
@@ -262,7 +262,7 @@ impl Engine {
 
     /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
     /// where no past truth changes what it predicts in the mode of the engine.
-    pub(crate) fn step_of(&self, node: usize) -> Option<Option<Duration>> {
+    pub fn step_of(&self, node: usize) -> Option<Option<Duration>> {
         match self.nodes.get(node) {
             Some(Running::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
             _ => None,
@@ -413,7 +413,7 @@ impl Engine {
     }
 
     /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
-    pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+    pub fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
         let mut at_hand = AtHand::at(&self.plan, self.last);
         at_hand.is(node);
         match &self.nodes[node] {

@@ -136,7 +136,7 @@ impl Outlets {
     }
 
     /// Lets outputs take over from those of another graph, both having been stepped to the same tick.
-    pub(super) fn take_over(&mut self, before: &Self, from: &[Option<usize>]) {
+    pub fn take_over(&mut self, before: &Self, from: &[Option<usize>]) {
         for (index, from) in from.iter().enumerate() {
             if let Some(from) = *from {
                 let mut blending = self.blending(index);

@@ -83,12 +83,12 @@ impl Pairing {
     }
 
     /// The run that the last truth was paired with.
-    pub(crate) fn last(&self) -> &[f64] {
+    pub fn last(&self) -> &[f64] {
         self.runs.row(self.past)
     }
 
     /// The number of the run that the last truth was paired with.
-    pub(crate) fn last_number(&self) -> u64 {
+    pub fn last_number(&self) -> u64 {
         self.number
     }
 

@@ -51,7 +51,7 @@ impl Running {
     }
 
     /// Whether what it knows stays true whatever becomes of what it reads.
-    pub(super) fn outlives_changes(&self) -> bool {
+    pub fn outlives_changes(&self) -> bool {
         matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
     }
 

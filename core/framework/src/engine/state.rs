@@ -33,7 +33,8 @@ pub struct EngineState {
     pub(crate) extremes: BTreeMap<String, Extremes>,
     pub(crate) slots: BTreeMap<String, SlotState>,
     pub(crate) histories: BTreeMap<String, History>,
-    pub(crate) nodes: BTreeMap<String, NodeState>,
+    /// What each node keeps.
+    pub nodes: BTreeMap<String, NodeState>,
     pub(crate) blending: BTreeMap<String, Blending>,
     /// Whether learning has been frozen on command.
     pub(crate) frozen: bool,
@@ -49,8 +50,8 @@ pub(crate) struct SlotState {
 
 /// What a node knows. Its own state is kept as bytes, so that one that nobody understands spoils no other.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(crate) struct NodeState {
-    pub(crate) own: Option<Vec<u8>>,
+pub struct NodeState {
+    pub own: Option<Vec<u8>>,
     pub(crate) learning: Option<LearningState>,
     /// The recent error of an estimator that learns.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -135,7 +135,7 @@ impl Vote {
 
     /// The answer to any votes.
     #[cfg(feature = "testkit")]
-    pub(crate) fn answer(&self, votes: &[f64]) -> Answer {
+    pub fn answer(&self, votes: &[f64]) -> Answer {
         let mut weights = vec![f64::NAN; votes.len()];
         self.combine.weights(Votes(votes), &mut weights);
         Answer {
@@ -174,7 +174,7 @@ impl Vote {
     }
 
     /// How many truths came, and how many of them it goes by.
-    pub(crate) fn evidence(&self) -> Option<(u64, Evidence)> {
+    pub fn evidence(&self) -> Option<(u64, Evidence)> {
         Some((self.told, self.combine.evidence()?))
     }
 

@@ -1,0 +1,87 @@
+//! Decides how a graph is run from a [`Source`](crate::recording::Source) to a [`Sink`], and how a running one is replaced: staged, watched in the shadow,
+//! handed over between two ticks, taken back; not where samples come from or go.
+//!
+//! [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
+//! a hand-over. The **control thread** (or the same one, for recorded data) owns a [`Control`], to which every tick is
+//! mirrored through a bounded ring. It steps a replica of what runs, to the same bits, so that states are copied, candidates
+//! warmed and compared, and old graphs kept warm without the engine thread noticing.
+//!
+//! ```text
+//!  engine thread                              control thread
+//!  ┌──────────┐   ticks (bounded ring)   ┌──────────────────────────────┐
+//!  │ Stepper  │ ───────────────────────▶ │ replica · candidate · retained│
+//!  │  engine  │ ◀─────────────────────── │ stage → shadow → commit       │
+//!  └──────────┘   engines, both ways     └──────────────────────────────┘
+//! ```
+
+mod control;
+mod handover;
+mod refit;
+mod retained;
+mod run;
+mod shadow;
+mod sink;
+mod stage_error;
+mod staged;
+mod stepper;
+
+pub use control::{Control, Notice};
+pub use handover::Feed;
+pub use refit::Refit;
+pub use run::{RunError, run, run_keeping};
+pub use shadow::{Compared, Shadow, Verdict};
+pub use sink::{Frame, Sink, SinkError};
+pub use stage_error::StageError;
+pub use staged::Staged;
+pub use stepper::{Stepped, Stepper};
+
+use std::sync::Arc;
+
+use crate::engine::{Engine, EngineError, RestoreError};
+use crate::model::Model;
+use crate::time::Duration;
+
+/// How a graph is run so that it can be replaced.
+#[derive(Debug, Clone)]
+pub struct LiveOptions {
+    /// How many ticks may wait for the control thread; beyond, the replica is lost and states are no longer carried.
+    pub mirrored: usize,
+    /// How much of the past is kept at least, beyond what the running graph needs to warm up.
+    pub retain: Duration,
+    /// How many bytes of the past are kept at most.
+    pub memory: usize,
+    /// How long a replaced graph is kept warm, so that it can be taken back.
+    pub keep_warm: Duration,
+    /// Channels that samples are given for, beyond those that the graph reads: what later graphs may read.
+    pub channels: Vec<Feed>,
+}
+
+impl Default for LiveOptions {
+    fn default() -> Self {
+        Self {
+            mirrored: 4096,
+            retain: Duration::from_ns(3_600_000_000_000),
+            memory: 256 << 20,
+            keep_warm: Duration::from_ns(3_600_000_000_000),
+            channels: Vec::new(),
+        }
+    }
+}
+
+/// The two ends of a running graph.
+///
+/// # Errors
+/// When what was fitted does not belong to the graph.
+pub fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Control), EngineError> {
+    let engine = || Engine::new(Arc::clone(&model.plan), &model.fitted);
+    Ok(control::pair(engine()?, engine()?, options))
+}
+
+/// The two ends of a graph that goes on from where an engine is.
+///
+/// # Errors
+/// When a node does not take its own state back, so that the engine cannot be copied.
+pub fn pair_from(engine: Engine, options: LiveOptions) -> Result<(Stepper, Control), RestoreError> {
+    let replica = engine.twin()?;
+    Ok(control::pair(engine, replica, options))
+}
