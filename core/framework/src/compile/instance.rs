@@ -11,7 +11,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
     Data, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode,
 };
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -162,6 +162,15 @@ fn read_instance(
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
         let read = panics.caught(kind, &context, || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
+            let wrong = out_of_range((kind.schema)(), &parameters);
+            let is_sound = wrong.is_empty();
+            for (place, message) in wrong {
+                let help = None;
+                diagnostics.report(place, problem::Parameter { message, help });
+            }
+            if !is_sound {
+                return None;
+            }
             let closes_loops = match spec.role() {
                 Role::Feature(feature) => feature.closes_loops(),
                 _ => false,
@@ -285,8 +294,7 @@ impl Declared<'_> {
             Some(("inputs", port)) => (self.kind.inputs)().iter().any(|own| own.name == port),
             way => {
                 let first = way.map_or(at, |(first, _)| first);
-                let schema = serde_json::Value::from((self.kind.schema)());
-                !schema["properties"][first].is_null()
+                !(self.kind.schema)()["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
         }
