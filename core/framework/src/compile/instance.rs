@@ -181,12 +181,11 @@ fn read_instance(
             }
         }
     }
-    let context = context(node, instance);
-    diagnostics.within(context.clone(), |diagnostics| {
+    diagnostics.within(context(node, instance), |diagnostics| {
         let estimator =
             decode_rest::<EstimatorKeys>(&framework, "the node", &[], &|_| None, diagnostics);
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
-        let read = panics.caught(kind, &context, || {
+        let read = panics.caught(kind, (node, instance), || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
             let spec = spec.map(Arc::<dyn NodeSpec>::from);
             let closes_loops = spec.as_whole().is_some_and(|spec| match spec.role() {
@@ -206,6 +205,14 @@ fn read_instance(
             closes_loops: closes_loops.unwrap_or_default(),
         }
     })
+}
+
+/// The name of an instance: `thermal.Z1`.
+pub(super) fn instance_name(node: &str, member: Option<&str>) -> String {
+    match member {
+        Some(member) => format!("{node}.{member}"),
+        None => node.to_owned(),
+    }
 }
 
 /// How diagnostics say which instance they speak of.
@@ -296,14 +303,6 @@ impl Declared<'_> {
                 !schema["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
-        }
-    }
-
-    /// Whether an input such as `inputs.signal` or a parameter such as `selection.folds` is given.
-    pub(super) fn states(&self, way: &str) -> bool {
-        match way.strip_prefix("inputs.") {
-            Some(port) => self.input(port).is_some(),
-            None => self.parameter(way).all(|inner| inner.is_some()),
         }
     }
 
