@@ -1,9 +1,11 @@
 //! The program as a user calls it. Decides nothing that is expected.
 
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::Mutex;
 
 /// What a call of the program left behind.
 #[derive(Debug)]
@@ -98,12 +100,26 @@ pub fn athermal_unread(arguments: &[&dyn AsRef<OsStr>]) -> i32 {
     child.wait().unwrap().code().unwrap()
 }
 
+/// The name of a folder, with a number where this process has used the name before: tests run at the same time.
+fn unshared(name: &str) -> String {
+    static USED: Mutex<BTreeMap<String, usize>> = Mutex::new(BTreeMap::new());
+    let mut used = USED.lock().unwrap();
+    let count = used.entry(name.to_owned()).or_default();
+    *count += 1;
+    match *count {
+        1 => name.to_owned(),
+        nth => format!("{name}-{nth}"),
+    }
+}
+
 /// A folder for one test, empty at first.
 pub struct Scratch(PathBuf);
 
 impl Scratch {
     pub fn new(test: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(env!("CARGO_CRATE_NAME"))
+            .join(unshared(test));
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).unwrap();
         Self(folder)
@@ -127,7 +143,8 @@ pub struct Folder(pub PathBuf);
 
 impl Folder {
     pub fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("athermal-{}-{name}", std::process::id()));
+        let name = format!("athermal-{}-{}", std::process::id(), unshared(name));
+        let path = std::env::temp_dir().join(name);
         let _ = std::fs::remove_dir_all(&path);
         std::fs::create_dir_all(&path).unwrap();
         Self(path)

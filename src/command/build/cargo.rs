@@ -35,6 +35,9 @@ impl Cargo {
         command.args(["--format-version", "1"]);
         if !dependencies {
             command.arg("--no-deps");
+        } else if let Some(host) = self.host() {
+            // Else cargo wants the crates of all platforms, which no build here has downloaded.
+            command.args(["--filter-platform", &host]);
         }
         let output = command.output().map_err(|error| self.missing(&error))?;
         if !output.status.success() {
@@ -47,6 +50,14 @@ impl Cargo {
         }
         serde_json::from_slice(&output.stdout)
             .map_err(|error| Failure::Outside(format!("cargo metadata is no JSON: {error}")))
+    }
+
+    /// The platform of this machine, as cargo calls it.
+    fn host(&self) -> Option<String> {
+        let output = Command::new(&self.program).arg("-vV").output().ok()?;
+        let version = String::from_utf8(output.stdout).ok()?;
+        let mut lines = version.lines();
+        lines.find_map(|line| Some(line.strip_prefix("host: ")?.to_owned()))
     }
 
     /// Builds the crate in a folder; cargo tells its progress itself, unless it is to be quiet.

@@ -5,9 +5,9 @@ use athermal::core::engine::Engine;
 use athermal::core::live::{Frame, Sink, SinkError};
 use serde_json::json;
 
-use crate::figures::{counted, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{counted, time};
 
 /// A sink whose rows are looked at on their way.
 pub struct Heard<'a, S> {

@@ -12,9 +12,9 @@ use serde_json::json;
 use super::ran::Ran;
 use super::standing::Standing;
 use crate::command::aside::{not_written, whole_aside};
-use crate::figures::{count, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal, outside};
+use athermal_analysis::figures::{count, instant, length, seconds};
 
 /// How long a run that is killed may have learned in vain.
 const KEEP_EVERY: Duration = Duration::from_secs(60);

@@ -11,9 +11,9 @@ use serde_json::json;
 
 use crate::command::beyond;
 use crate::command::data::REJECTED;
-use crate::figures::number;
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::number;
 
 /// A channel that has been in order for so long is told of when it is not again.
 const IN_ORDER: Duration = Duration::from_ns(3600 * 1_000_000_000);

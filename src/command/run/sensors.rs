@@ -12,9 +12,9 @@ use serde_json::json;
 use super::rejected::Ranged;
 use crate::command::faults::{self, Looks, Purpose, of_standstill, places};
 use crate::command::model::few;
-use crate::figures::{count, instant, number, seconds, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{count, instant, number, seconds, time};
 
 /// So long, in s, a sensor is silent before that is told.
 const SILENT_S: f64 = 600.0;

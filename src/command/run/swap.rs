@@ -16,8 +16,8 @@ use clap::Args;
 use super::ran;
 use super::watched::{Watched, Went};
 use crate::command::model::{self, check_fitted, few, tell_unfitted};
-use crate::figures::length;
 use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::length;
 
 /// When and how the graph is replaced.
 #[derive(Debug, Args)]

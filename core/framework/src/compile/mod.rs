@@ -18,6 +18,7 @@ mod keys;
 mod kind_fault;
 mod leak;
 mod learning;
+mod misplaced;
 mod order;
 mod plan;
 mod port_channels;
@@ -34,6 +35,7 @@ pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
 pub(crate) use keys::EstimatorKeys;
+pub use gate::Misordered;
 pub use kind_fault::KindFault;
 pub use plan::{
     AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
@@ -132,7 +134,7 @@ fn planned(
     if diagnostics.has_errors() {
         return Err(Box::new(Part { plan, broken }));
     }
-    debug_assert_eq!(gate::check(&plan), Ok(()), "the steps can be done in this order");
+    debug_assert_eq!(plan.check_order(), Ok(()));
     steps::warn(graph, &plan, diagnostics);
     Ok(plan)
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod compensate;
+mod conformance;
 mod health;
 mod loss_and_settling;
 mod machine;

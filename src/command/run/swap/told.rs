@@ -8,9 +8,9 @@ use athermal::core::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
 use crate::command::run::watched::{Watched, Went};
-use crate::figures::{count, counted, length, number, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::{count, counted, length, number, seconds};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 pub const ANOTHER_RUN: &str =

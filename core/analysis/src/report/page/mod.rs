@@ -1,0 +1,281 @@
+//! Decides what stands on the page and in which order; how a picture is drawn is decided by [`crate::chart`].
+
+mod charts;
+mod curves;
+mod style;
+mod tables;
+
+use std::fmt::Write as _;
+
+use super::{Axis, Facts, Hours, Light, Worth, figure};
+use crate::chart::{COLOURS, Chart, Plot, STYLE};
+use crate::markup::escaped;
+
+/// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
+#[must_use]
+pub fn page(facts: &Facts) -> String {
+    let title = escaped(&facts.graph);
+    let mut html = format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>{title} report</title><link rel=\"icon\" href=\"data:,\"><style>:root{{color-scheme:light dark}}{COLOURS}{STYLE}{}</style></head><body><h1>{title}</h1>",
+        style::STYLE
+    );
+    verdicts(&mut html, facts);
+    worth_section(&mut html, facts);
+    html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
+    html.push_str(&tables::scores(&facts.scores));
+    over_time(&mut html, facts);
+    votes(&mut html, facts);
+    chosen(&mut html, facts);
+    html.push_str("<h2>Sensors</h2>");
+    html.push_str(&tables::sensors(&facts.course.sensors));
+    card(&mut html, facts);
+    let _ = write!(html, "<script>{}</script></body></html>", style::SCRIPT);
+    html
+}
+
+fn verdicts(html: &mut String, facts: &Facts) {
+    let data: Vec<String> = facts.data.iter().map(|path| escaped(path)).collect();
+    let (from, to) = facts.course.period_s.unwrap_or((0.0, 0.0));
+    let _ = write!(
+        html,
+        "<p class=\"muted\">On {}: {} ticks over {:.1} days.</p><ul>",
+        data.join(", "),
+        facts.course.ticks,
+        (to - from) / 86400.0
+    );
+    for headline in facts.worth.iter().flat_map(Worth::headlines) {
+        let _ = write!(html, "<li><b>{}</b></li>", escaped(&headline));
+    }
+    for verdict in &facts.verdicts {
+        let class = if verdict.is_good() {
+            ""
+        } else {
+            " class=\"bad\""
+        };
+        let _ = write!(
+            html,
+            "<li{class}><b>{}</b>: {}</li>",
+            escaped(&verdict.axis),
+            escaped(&verdict.sentence())
+        );
+    }
+    html.push_str("</ul>");
+}
+
+fn worth_section(html: &mut String, facts: &Facts) {
+    if facts.worth.is_none() && facts.unjudged.is_empty() {
+        return;
+    }
+    html.push_str("<h2>What the correction is worth</h2>");
+    for of in &facts.unjudged {
+        let _ = write!(
+            html,
+            "<p class=\"bad\">Nothing is told of <b>{}</b>: {}.</p>",
+            escaped(&of.of),
+            escaped(&of.why)
+        );
+    }
+    let Some(worth) = &facts.worth else {
+        return;
+    };
+    html.push_str(&tables::departures(&worth.departures));
+    for light in worth.lights() {
+        if let Some(name) = light.loss.as_ref().filter(|_| !worth.others.is_empty()) {
+            let _ = write!(html, "<h3>{}</h3>", escaped(name));
+        }
+        light_section(html, light, &Hours::of(&facts.course));
+    }
+}
+
+fn light_section(html: &mut String, light: &Light, hours: &Hours) {
+    if let Some(chart) = charts::loss(light, hours) {
+        let worst = |losses: &[f64]| figure(losses.iter().copied().reduce(f64::max));
+        let _ = write!(
+            html,
+            "<p>Largest loss over {}: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\">{}</div>",
+            light.span(),
+            worst(&light.loss_without.value),
+            worst(&light.loss_with.value),
+            10.0 * light.loss_limit,
+            chart.svg()
+        );
+    }
+    if !light.settling.is_empty() {
+        html.push_str("<h3>Settle time and largest loss per change of the set point</h3>");
+        html.push_str(&tables::settling(light, hours));
+        let _ = write!(
+            html,
+            "<p class=\"muted\">From the change, in {}, to the start of the first ten minutes that are stable throughout.</p>",
+            hours.label
+        );
+    }
+    if !light.steps.is_empty() {
+        html.push_str("<h3>Largest loss per temperature step</h3>");
+        html.push_str(&tables::steps(light));
+    }
+}
+
+fn over_time(html: &mut String, facts: &Facts) {
+    html.push_str("<h2>Drift over time</h2><p class=\"muted screen\">Drag across a picture to look closer, double-click for all; the wheel with Ctrl or Shift zooms.</p>");
+    let axes = &facts.course.axes;
+    for (states, of) in limits(axes) {
+        let _ = write!(
+            html,
+            "<p class=\"muted\">Shaded{}: quasi-stable from {}.</p>",
+            escaped(&of),
+            escaped(&states)
+        );
+    }
+    for axis in axes {
+        let errors = axis.errors();
+        wide(html, &charts::drift(axis, &errors, facts));
+    }
+}
+
+/// Limits of the states of stability, each with the axes of which they are where others have others.
+fn limits(axes: &[Axis]) -> Vec<(String, String)> {
+    let mut limits: Vec<(String, Vec<&str>)> = Vec::new();
+    for axis in axes {
+        let Some((stable, transient)) = axis.states else {
+            continue;
+        };
+        let told = format!("{stable}, transient from {transient} {}", axis.unit);
+        match limits.iter_mut().find(|(known, _)| *known == told) {
+            Some((_, names)) => names.push(&axis.name),
+            None => limits.push((told, vec![&axis.name])),
+        }
+    }
+    let several = limits.len() > 1;
+    let of = |names: Vec<&str>| match several {
+        true => format!(" of {}", names.join(", ")),
+        false => String::new(),
+    };
+    let limits = limits.into_iter();
+    limits.map(|(told, names)| (told, of(names))).collect()
+}
+
+fn wide(html: &mut String, chart: &Chart<'_>) {
+    let _ = write!(html, "<div class=\"wide\">{}</div>", chart.svg());
+}
+
+fn votes(html: &mut String, facts: &Facts) {
+    html.push_str(
+        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
+         Responses are the estimator's to one sensor alone: a step of one unit, and an impulse of the size that stands at its axis.</p>",
+    );
+    let hours = Hours::of(&facts.course);
+    for (axis, errors) in facts.course.axes.iter().zip(&facts.errors) {
+        let _ = write!(html, "<details><summary>{}</summary>", escaped(&axis.name));
+        wide(html, &charts::votes(axis, &hours));
+        if let Some(chart) = charts::weights(axis, &hours) {
+            wide(html, &chart);
+        }
+        html.push_str("<div class=\"pair\">");
+        for curves in curves::of(axis, facts) {
+            html.push_str(&curves.chart().svg());
+        }
+        for (_, chart) in charts::errors(axis, errors) {
+            html.push_str(&chart.svg());
+        }
+        html.push_str("</div></details>");
+    }
+}
+
+fn chosen(html: &mut String, facts: &Facts) {
+    let estimators = facts.card.iter().flat_map(|card| &card.estimators);
+    let mut chosen = estimators
+        .filter(|e| !e.report.selection.is_empty())
+        .peekable();
+    if chosen.peek().is_none() {
+        return;
+    }
+    html.push_str(
+        "<h2>Chosen features</h2><p class=\"muted\">Sensor and window, in the order chosen, with the cross-validated R² after each. A slope over a window follows what happens half of it later.</p>",
+    );
+    for estimator in chosen {
+        let steps = estimator
+            .report
+            .selection
+            .iter()
+            .map(|step| format!("{} ({:.3})", escaped(&step.label()), step.score));
+        let _ = write!(
+            html,
+            "<p><b>{}</b>: {}</p>",
+            escaped(&estimator.node),
+            steps.collect::<Vec<_>>().join(", ")
+        );
+    }
+}
+
+fn card(html: &mut String, facts: &Facts) {
+    let Some(card) = &facts.card else {
+        html.push_str("<h2>Model card</h2><p>A graph without a fit.</p>");
+        return;
+    };
+    let _ = write!(
+        html,
+        "<h2>Model card</h2><p>Made by athermal {}",
+        escaped(&card.athermal)
+    );
+    if let Some(created) = &card.created {
+        let _ = write!(html, " on {}", escaped(created));
+    }
+    let _ = write!(html, " from {} ticks", card.ticks);
+    if let Some(period) = card.period {
+        let _ = write!(
+            html,
+            " over {:.1} days",
+            (period.to_s - period.from_s) / 86400.0
+        );
+    }
+    html.push_str(".</p><ul>");
+    for data in &card.data {
+        let _ = write!(
+            html,
+            "<li>{}: {} rows, {} bytes, checksum {}</li>",
+            escaped(&data.path),
+            data.rows,
+            data.bytes,
+            escaped(&data.hash)
+        );
+    }
+    html.push_str("</ul>");
+    html.push_str(&tables::estimators(&card.estimators));
+}
+
+/// Every picture of the page as files of its own; those with nothing to draw are left out.
+#[must_use]
+pub fn plots(facts: &Facts) -> Vec<Plot> {
+    let hours = Hours::of(&facts.course);
+    let mut plots = Vec::new();
+    let mut add = |name: String, chart: &Chart<'_>| plots.extend(Plot::of(name, chart));
+    for (axis, spread) in facts.course.axes.iter().zip(&facts.errors) {
+        let (errors, name) = (axis.errors(), &axis.name);
+        add(
+            format!("drift-{name}"),
+            &charts::drift(axis, &errors, facts),
+        );
+        add(format!("votes-{name}"), &charts::votes(axis, &hours));
+        if let Some(chart) = charts::weights(axis, &hours) {
+            add(format!("weights-{name}"), &chart);
+        }
+        for curves in curves::of(axis, facts) {
+            add(format!("{}-{name}", curves.kind), &curves.chart());
+        }
+        for (kind, chart) in charts::errors(axis, spread) {
+            add(format!("{kind}-{name}"), &chart);
+        }
+    }
+    if let Some(worth) = &facts.worth {
+        let several = !worth.others.is_empty();
+        for light in worth.lights() {
+            let named = light.loss.as_ref().filter(|_| several);
+            let name = named.map_or("loss".to_owned(), |node| format!("loss-{node}"));
+            if let Some(chart) = charts::loss(light, &hours) {
+                add(name, &chart);
+            }
+        }
+    }
+    plots
+}

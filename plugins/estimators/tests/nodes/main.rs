@@ -1,0 +1,5 @@
+//! Estimators: the rules that every node keeps.
+
+#![allow(clippy::unwrap_used)]
+
+mod conformance;

@@ -1,0 +1,8 @@
+//! Logs of all kinds are read whole, and written as they are read.
+
+#![allow(clippy::unwrap_used)]
+
+mod any_bytes;
+mod shared_data;
+mod time_in_two_columns;
+mod zones;

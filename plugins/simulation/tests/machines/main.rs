@@ -1,0 +1,7 @@
+//! Simulated machines: the rules that every machine keeps, the same bytes for a seed, drift of the published size.
+
+#![allow(clippy::unwrap_used)]
+
+mod conformance;
+mod determinism;
+mod drift;

@@ -1,0 +1,180 @@
+//! What is told of data that make an answer worth less than it looks: that they are those of the fit, that a correction moved them,
+//! that none of them is new.
+
+use std::fmt::Write as _;
+
+use crate::workbench::{Scratch, athermal, athermal_on};
+
+/// A drift by one temperature: of which signal or node it is the slope, and in which unit time is. `RATE` stands for what is integrated.
+fn graph(position: &str, time: &str) -> String {
+    format!(
+        r#"
+schema = 1
+name = "stage"
+time.column = "time"
+time.unit = "{time}"
+[signals.temperature]
+unit = "Cel"
+channels = ["t"]
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+max_age = "1min"
+[signals.applied]
+unit = "nm"
+channels = ["Z"]
+column = "applied"
+optional = ["Z"]
+max_age = "1min"
+[nodes.free]
+type = "uncorrected"
+inputs.position = "position"
+inputs.applied = "applied"
+until_first = "zero"
+[nodes.drift]
+type = "slope"
+inputs.signal = "{position}"
+windows = ["5min"]
+unit = "nm/min"
+[nodes.gradient]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["5min"]
+unit = "mK/min"
+[nodes.thermal]
+type = "linear"
+inputs.features = "gradient"
+inputs.truth = "drift.Z"
+ahead = "150s"
+[nodes.vote]
+type = "auto_weighted"
+inputs.voters = ["thermal"]
+inputs.truth = "drift.Z"
+memory = "15min"
+[nodes.correction]
+type = "compensate"
+inputs.rate = "RATE"
+range = "50 um"
+max_rate = "1000 nm/min"
+max_slew = "50 nm/s"
+[outputs]
+predicted = "vote"
+correction = "correction"
+"#
+    )
+}
+
+/// Six hours, one row a minute, from an instant in min on; its time as seconds or as a date of 2026.
+fn log(from: i64, rows: i64, dated: bool) -> String {
+    let mut text = String::from("time,t,Z\n");
+    for minute in from..from + rows {
+        let t = 20.0 + (minute as f64 / 40.0).sin();
+        let noise = ((minute * 7919) % 13) as f64;
+        let time = if dated {
+            let (day, of_day) = (1 + minute / 1440, minute % 1440);
+            format!("2026-03-{day:02}T{:02}:{:02}:00Z", of_day / 60, of_day % 60)
+        } else {
+            (60 * minute).to_string()
+        };
+        let _ = writeln!(text, "{time},{t:.4},{:.1}", 500.0 * t + noise);
+    }
+    text
+}
+
+#[test]
+fn a_correction_that_goes_by_positions_which_it_moves_is_told_of_by_who_runs_and_reports() {
+    let scratch = Scratch::new("told-feedback");
+    let data = scratch.file("log.csv", log(0, 360, false));
+    let told = "the correction goes by past drifts of position.Z, which on a machine that is being corrected";
+    for (position, rate, moved) in [
+        ("position", "vote", true),
+        ("position", "thermal", false),
+        ("free", "vote", false),
+    ] {
+        let text = graph(position, "s").replace("RATE", rate);
+        let (graph, model) = (scratch.file("graph.toml", text), scratch.path("model.json"));
+        athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+        let run = athermal(&[&"run", &model, &"-i", &data]).ended(0);
+        let report = athermal_on("report", &model, &data, &[]).ended(0);
+        for command in [run, report] {
+            assert_eq!(
+                command.told.contains(told),
+                moved,
+                "{position} {rate}: {}",
+                command.told
+            );
+        }
+    }
+}
+
+#[test]
+fn dated_data_of_the_time_of_the_fit_are_told_to_be_that() {
+    let scratch = Scratch::new("told-overlap");
+    let graph = scratch.file(
+        "graph.toml",
+        graph("position", "rfc3339").replace("RATE", "thermal"),
+    );
+    let model = scratch.path("model.json");
+    let data = scratch.file("log.csv", log(0, 360, true));
+    athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    let told = "the data of the fit are of the time from 2026-03-01T04:00:00Z to 2026-03-01T05:59:00Z too: there it is told how well \
+                it fits, not how well it predicts";
+    let grown = scratch.file("grown.csv", log(240, 400, true));
+    for command in ["evaluate", "report"] {
+        athermal_on(command, &model, &grown, &[])
+            .ended(0)
+            .tells(&[told]);
+    }
+    let compared = athermal_on("compare", &graph, &data, &[&"--on", &grown]).ended(0);
+    compared.tells(&["the data of the fit are of the time from 2026-03-01T04:"]);
+    let compared = athermal_on("compare", &graph, &data, &[&"--on", &data]).ended(0);
+    compared.tells(&["log.csv: the graphs are fitted on this file and scored on it"]);
+    let later = scratch.file("later.csv", log(400, 360, true));
+    let scored = athermal_on("evaluate", &model, &later, &[]).ended(0);
+    assert!(!scored.told.contains("the time of"), "{}", scored.told);
+}
+
+#[test]
+fn a_run_that_goes_on_with_nothing_new_says_so() {
+    let scratch = Scratch::new("told-nothing-new");
+    let text = graph("position", "s").replace("RATE", "thermal");
+    let (graph, model) = (scratch.file("graph.toml", text), scratch.path("model.json"));
+    let days = ["one.csv", "two.csv"].map(|name| scratch.file(name, log(0, 360, false)));
+    athermal_on("fit", &graph, &days[0], &[&"-o", &model]).ended(0);
+    let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+    let run =
+        |day| athermal(&[&"run", &model, &"-i", day, &"-o", &out, &"--state", &state]).ended(0);
+    run(&days[0]);
+    run(&days[1]).tells(&["no row is after what the run before saw last: nothing was predicted"]);
+}
+
+#[test]
+fn a_run_of_which_nothing_comes_out_says_so_and_where_it_ends() {
+    let scratch = Scratch::new("nothing-comes-out");
+    let graph = scratch.file(
+        "graph.toml",
+        "schema = 1\n[time]\ncolumn = \"time_s\"\n[signals.position]\nunit = \"nm\"\nchannels = [\"Z\"]\nmax_age = \"1min\"\n\
+         [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"5min\"]\nunit = \"nm/min\"\n\
+         [nodes.calm]\ntype = \"moving\"\ninputs.signal = \"drift\"\nwindows = [\"5min\"]\n[outputs]\ncalm = \"calm\"\n",
+    );
+    let rows = |apart: u32| -> String {
+        let rows = (0..200).map(|row| format!("{},{}\n", row * apart, row % 7));
+        std::iter::once("time_s,Z\n".to_owned())
+            .chain(rows)
+            .collect()
+    };
+    // In milliseconds, as if they were seconds.
+    let (far, near) = (
+        scratch.file("far.csv", rows(10_000)),
+        scratch.file("near.csv", rows(10)),
+    );
+    let out = scratch.path("out.csv");
+    let run = |log: &std::path::Path| {
+        athermal(&[&"run", &graph, &"--input", &log, &"--output", &out]).ended(0)
+    };
+    run(&far).tells(&[
+        "no output has a value in any of 200 rows, which are 2.78 h apart; the first to lack one is drift",
+    ]);
+    assert!(!run(&near).told.contains("no output"));
+}

@@ -1,0 +1,248 @@
+//! What a newcomer does first, with the program as it is built: demo, simulate, init, show.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::workbench::Folder;
+use athermal::Model;
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::machine::{Setup, Simulated, machine, machines};
+use athermal::core::score::{ScoreOptions, score};
+
+impl Folder {
+    /// Runs and expects success; gives standard output and standard error.
+    fn fine(&self, arguments: &[&str]) -> (String, String) {
+        let output = self.run(arguments);
+        let [out, err] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert!(output.status.success(), "{arguments:?}\n{out}\n{err}");
+        (out, err)
+    }
+
+    /// Runs and expects a request to be refused, in one line.
+    fn refused(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}\n{told}");
+        assert_eq!(told.trim_end().lines().count(), 1, "{told}");
+        told
+    }
+}
+
+fn graph(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("graphs")
+        .join(name)
+}
+
+#[test]
+fn the_demo_fits_scores_and_names_commands_that_run() {
+    let folder = Folder::new("demo");
+    let (out, err) = folder.fine(&["demo"]);
+    let figures = |name: &str| -> Vec<f64> {
+        let line = out.lines().find(|line| line.starts_with(name)).unwrap();
+        let cells = line[name.len()..].split_whitespace();
+        cells.map(|cell| cell.parse().unwrap()).collect()
+    };
+    let (nothing, vote) = (figures("no model"), figures("vote of the three"));
+    assert_eq!((nothing.len(), vote.len()), (6, 6));
+    assert!(
+        nothing
+            .iter()
+            .zip(&vote)
+            .all(|(nothing, vote)| vote < nothing)
+    );
+    for line in out.lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    let (_, commands) = err.split_once("Try next:\n").unwrap();
+    let (commands, _) = commands.split_once("and with a log").unwrap();
+    let script = format!("set -e\n{commands}");
+    let mut shell = Command::new("sh");
+    let ran = shell.args(["-c", &script]).current_dir(&folder.0).output();
+    let ran = ran.unwrap();
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success(), "{script}\n{said}");
+}
+
+#[test]
+fn the_demo_comes_again_to_its_own_folder_but_never_over_work_in_it() {
+    let folder = Folder::new("again");
+    folder.fine(&["demo", "d", "--quiet"]);
+    folder.fine(&["demo", "d", "--quiet"]);
+    let edited = folder.0.join("d/die-tester.toml");
+    let text = std::fs::read_to_string(&edited).unwrap() + "# mine\n";
+    std::fs::write(&edited, &text).unwrap();
+    let told = folder.refused(&["demo", "d"]);
+    assert!(
+        told.contains("has been changed since a demo wrote it"),
+        "{told}"
+    );
+    assert_eq!(std::fs::read_to_string(&edited).unwrap(), text);
+}
+
+#[test]
+fn the_machines_of_this_program_are_these() {
+    let names: Vec<&str> = machines().keys().copied().collect();
+    assert_eq!(names, ["die-tester", "linear-axis"]);
+}
+
+#[test]
+fn a_simulation_has_the_same_bytes_in_a_file_and_in_a_pipe() {
+    let folder = Folder::new("simulate");
+    let asked = [
+        "simulate",
+        "linear-axis",
+        "--days",
+        "0.05",
+        "--seed",
+        "3",
+        "--truth",
+    ];
+    let (piped, _) = folder.fine(&[&asked[..], &["-o", "-"]].concat());
+    folder.fine(&[&asked[..], &["-o", "a.csv"]].concat());
+    let written = std::fs::read_to_string(folder.0.join("a.csv")).unwrap();
+    assert_eq!(piped, written);
+    assert!(
+        written
+            .lines()
+            .next()
+            .unwrap()
+            .ends_with("Z_drift_true_nm_per_min")
+    );
+    let (other, _) = folder.fine(&["simulate", "linear-axis", "--days", "0.05", "--truth"]);
+    assert_ne!(other, written);
+}
+
+#[test]
+fn csv_and_json_lines_of_a_simulation_say_the_same() {
+    let folder = Folder::new("formats");
+    for file in ["a.csv", "a.jsonl"] {
+        folder.fine(&["simulate", "die-tester", "--days", "0.01", "-o", file]);
+    }
+    let csv = std::fs::read_to_string(folder.0.join("a.csv")).unwrap();
+    let json = std::fs::read_to_string(folder.0.join("a.jsonl")).unwrap();
+    let header: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let mut values = 0;
+    for (row, object) in csv.lines().skip(1).zip(json.lines()) {
+        let object: serde_json::Value = serde_json::from_str(object).unwrap();
+        for (name, cell) in header.iter().zip(row.split(',')) {
+            assert_eq!(object[name].as_f64(), cell.parse().ok(), "{name} {row}");
+            values += usize::from(!cell.is_empty());
+        }
+    }
+    assert_eq!(csv.lines().count() - 1, json.lines().count());
+    assert!(values > 500);
+}
+
+#[test]
+fn a_schedule_and_a_fault_change_a_simulation() {
+    let folder = Folder::new("faults");
+    std::fs::write(folder.0.join("s.csv"), "time_min,chuck_degC\n0,25\n10,60\n").unwrap();
+    let asked = ["simulate", "die-tester", "--days", "0.05", "-o", "-"];
+    let fault = "temperature.room=missing,from=10min,for=5min";
+    let (text, _) = folder.fine(&[&asked[..], &["--schedule", "s.csv", "--fault", fault]].concat());
+    let rows: Vec<Vec<&str>> = text
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').collect())
+        .collect();
+    // Rows are 10 s apart; `room` is the fifth temperature, `chuck` the sixth.
+    let missing = rows.iter().filter(|row| row[5].is_empty()).count();
+    assert_eq!(missing, 5 * 6);
+    let chuck = |minute: usize| rows[minute * 6][6].parse::<f64>().unwrap();
+    assert!(chuck(9) < 26.0 && chuck(20) > 50.0);
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_the_next_step() {
+    let folder = Folder::new("refused");
+    let told = folder.refused(&["simulate", "die-teser", "-o", "-"]);
+    assert!(told.contains("did you mean `die-tester`?"), "{told}");
+    let told = folder.refused(&["simulate", "die-tester", "--days", "0", "-o", "-"]);
+    assert!(told.contains("must be above 0"), "{told}");
+    let fault = ["--fault", "temperature.rom=stuck"];
+    let told = folder.refused(&[&["simulate", "die-tester", "-o", "-"][..], &fault].concat());
+    assert!(told.contains("did you mean `temperature.room`?"), "{told}");
+}
+
+#[test]
+fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
+    let known = machine("linear-axis").unwrap();
+    let recording = |seed| {
+        let setup = Setup {
+            days: 1.0,
+            seed,
+            schedule: None,
+        };
+        Simulated::new(known.machine, setup)
+    };
+    let mut model = Model::load(graph("linear-axis-sensor.toml")).unwrap();
+    let (fitted, _) = fit(
+        &model.plan,
+        &recording(1),
+        &FitOptions::default(),
+        &mut |_| {},
+    )
+    .unwrap();
+    model.fitted = fitted;
+    let options = ScoreOptions::default();
+    let faults = vec!["temperature.t1=offset,size=100 mK,from=6h".parse().unwrap()];
+    let rmse = |recording: &Simulated| {
+        let scores = score(&model.plan, &model.fitted, recording, &options, &mut |_| {}).unwrap();
+        let vote = scores.scores.iter().find(|score| score.output == "vote.X");
+        let vote = vote.unwrap();
+        (vote.rmse.unwrap(), vote.baseline_zero.unwrap())
+    };
+    let (sound, nothing) = rmse(&recording(2));
+    assert!(sound < 0.6 * nothing, "{sound} of {nothing}");
+    assert!(rmse(&recording(2).with_faults(faults)).0 > sound);
+}
+
+#[test]
+fn a_graph_that_measures_something_else_is_told_what_the_machine_has() {
+    let known = machine("linear-axis").unwrap();
+    let model = Model::load(graph("z-probe.toml")).unwrap();
+    let recording = Simulated::new(known.machine, Setup::default());
+    let refused = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {});
+    let told = refused.map(|_| ()).unwrap_err().to_string();
+    assert!(
+        told.contains("does not measure temperature.bed, temperature.chamber, temperature.extruder, position.z; it measures temperature.t1"),
+        "{told}"
+    );
+}
+
+#[test]
+fn every_graph_of_the_project_is_shown_in_every_form() {
+    let folder = Folder::new("show");
+    let graphs = std::fs::read_dir(graph("")).unwrap();
+    let mut shown = 0;
+    for path in graphs.map(|entry| entry.unwrap().path()) {
+        if path.is_dir() {
+            continue;
+        }
+        let path = path.to_str().unwrap();
+        for form in ["plan", "mermaid", "dot", "svg", "json"] {
+            for expand in [&[][..], &["--expand"]] {
+                // Of graphs with kinds that this program does not have, only the reason is shown.
+                let output = folder.run(&[&["show", path, "--format", form][..], expand].concat());
+                if output.status.success() {
+                    assert!(output.stdout.len() > 100, "{path} {form}");
+                    shown += 1;
+                } else {
+                    assert_eq!(output.status.code(), Some(2), "{path} {form}");
+                }
+            }
+        }
+    }
+    assert!(shown >= 50, "{shown}");
+}
+
+#[test]
+fn shells_get_their_completions() {
+    let folder = Folder::new("completions");
+    for shell in ["bash", "zsh", "fish"] {
+        let (script, _) = folder.fine(&["completions", shell]);
+        assert!(script.contains("simulate"), "{shell}");
+    }
+}

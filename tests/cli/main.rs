@@ -1,0 +1,42 @@
+//! The program as a user calls it: its commands, their files, messages and exit codes. No kind of node is registered here, so
+//! that those linked are those shipped.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "../workbench/mod.rs"]
+mod workbench;
+
+mod command_line;
+mod compare;
+mod data_warnings;
+mod diagnose;
+mod doubtful_fits;
+mod evaluation_modes;
+mod every_estimator;
+mod evidence;
+mod explain;
+mod faulty_logs;
+mod first_minutes;
+mod fit_json;
+mod graph_file_page;
+mod init_refuses;
+mod init_warnings;
+mod json_messages;
+mod json_page;
+mod kept_runs;
+mod language_commands;
+mod named_models;
+mod not_files;
+mod nothing_to_score;
+mod orders;
+mod plugin_crates;
+mod report;
+mod report_graphs;
+mod restarted_pipes;
+mod schema;
+mod shipped_graphs;
+mod starter_graphs;
+mod stopped_runs;
+mod swap_commands;
+mod trials;
+mod watched_runs;

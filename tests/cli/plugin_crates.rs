@@ -1,0 +1,342 @@
+//! Crates of one's own: what `new plugin` writes, and what `build` says before it builds anything. That the crates build, keep
+//! the rules of every node and end up in a binary is tried by `.ci/template`, which takes minutes.
+
+use std::path::Path;
+
+use crate::workbench::{Scratch, athermal};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A folder with a crate that depends on the core as it is told to.
+fn with_core(scratch: &Scratch, name: &str, core: &str) -> String {
+    let folder = scratch.path(name);
+    std::fs::create_dir_all(folder.join("src")).unwrap();
+    std::fs::write(folder.join("src/lib.rs"), "").unwrap();
+    let manifest = format!(
+        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n{core}\n\n[workspace]\n"
+    );
+    std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    format!("path:{}", folder.display())
+}
+
+/// Each role, the files that it has beside those that all have, and what the author is told to type.
+const ROLES: [(&str, &[&str], &str); 6] = [
+    ("feature", &["tests/conformance.rs"], "build --with path:."),
+    (
+        "estimator",
+        &["tests/conformance.rs"],
+        "build --with path:.",
+    ),
+    ("combiner", &["tests/conformance.rs"], "build --with path:."),
+    (
+        "source",
+        &["tests/live.rs", "examples/run.rs"],
+        "--example run",
+    ),
+    (
+        "sink",
+        &["tests/live.rs", "examples/run.rs"],
+        "--example run",
+    ),
+    ("machine", &["tests/conformance.rs"], "build --with path:."),
+];
+
+/// Every file under a folder, as paths from there.
+fn files_in(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let inside = path.strip_prefix(folder).unwrap();
+                found.push(inside.to_str().unwrap().replace('\\', "/"));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names_and_nothing_else() {
+    for (role, own, told) in ROLES {
+        let scratch = Scratch::new(&format!("new-{role}"));
+        let folder = scratch.path("room-lag");
+        let wrote = athermal(&[
+            &"new",
+            &"plugin",
+            &"room-lag",
+            &"--role",
+            &role,
+            &"-o",
+            &folder,
+        ]);
+        wrote.ended(0).tells(&["wrote", "cargo test", told]);
+        let shared = [
+            ".gitignore",
+            "Cargo.lock",
+            "Cargo.toml",
+            "README.md",
+            "graphs/room-lag.toml",
+            "src/lib.rs",
+        ];
+        let mut expected: Vec<&str> = shared.iter().chain(own).copied().collect();
+        expected.sort_unstable();
+        assert_eq!(files_in(&folder), expected, "{role}");
+        let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap();
+        assert!(read("src/lib.rs").contains("pub struct RoomLag"), "{role}");
+        assert!(read("graphs/room-lag.toml").contains("[[tests]]"), "{role}");
+        for file in expected.iter().filter(|file| **file != "Cargo.lock") {
+            let text = read(file);
+            for left in ["my-node", "my_node", "MyNode", "CORE", "ATHERMAL"] {
+                assert!(!text.contains(left), "{left} in {file} of a {role}");
+            }
+        }
+        let core = Path::new(ROOT)
+            .canonicalize()
+            .unwrap()
+            .join("core/framework");
+        assert!(read("Cargo.toml").contains(&core.display().to_string()));
+    }
+}
+
+#[test]
+fn what_was_written_is_told_to_programs_too() {
+    let scratch = Scratch::new("new-json");
+    for (role, kind) in [("feature", "\"room_lag\""), ("machine", "null")] {
+        let folder = scratch.path(role);
+        let wrote = athermal(&[
+            &"--format",
+            &"json",
+            &"new",
+            &"plugin",
+            &"room-lag",
+            &"--role",
+            &role,
+            &"-o",
+            &folder,
+        ]);
+        let wrote = wrote.ended(0);
+        let told: serde_json::Value = serde_json::from_str(&wrote.out).unwrap();
+        assert_eq!(told["role"], role);
+        assert_eq!(told["kind"].to_string(), kind);
+        assert_eq!(
+            told["files"].as_array().unwrap().len(),
+            files_in(&folder).len()
+        );
+    }
+}
+
+#[test]
+fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
+    for (name, role, reason) in [
+        ("Room Lag", "feature", "begin with a small letter"),
+        (
+            "slope",
+            "feature",
+            "a node type `slope` already, from athermal-features",
+        ),
+        (
+            "linear-axis",
+            "machine",
+            "a machine `linear-axis` already, from athermal-simulation",
+        ),
+        ("votes", "feature", "means something else already"),
+        ("frame", "sink", "means something else already"),
+        ("async", "source", "means something else already"),
+    ] {
+        athermal(&[&"new", &"plugin", &name, &"--role", &role])
+            .ended(2)
+            .tells(&[reason]);
+    }
+    let scratch = Scratch::new("new-refused");
+    scratch.file("there.txt", "");
+    athermal(&[&"new", &"plugin", &"room-lag", &"-o", &scratch.path("")])
+        .ended(2)
+        .tells(&["not empty"]);
+    // What is no node has no name in graphs that could be taken.
+    let folder = scratch.path("slope");
+    athermal(&[
+        &"new", &"plugin", &"slope", &"--role", &"source", &"-o", &folder,
+    ])
+    .ended(0);
+}
+
+#[test]
+fn sources_that_are_not_there_are_asked_for() {
+    let scratch = Scratch::new("new-without-sources");
+    let nowhere = format!("path:{}", scratch.path("nowhere").display());
+    let folder = scratch.path("room-lag");
+    athermal(&[
+        &"new",
+        &"plugin",
+        &"room-lag",
+        &"-o",
+        &folder,
+        &"--athermal",
+        &nowhere,
+    ])
+    .ended(3)
+    .tells(&["nowhere", "not on crates.io yet", "--athermal path:DIR"]);
+    assert!(!folder.exists(), "nothing is written before all is known");
+    athermal(&[
+        &"new",
+        &"plugin",
+        &"room-lag",
+        &"-o",
+        &folder,
+        &"--athermal",
+        &"1.0",
+    ])
+    .ended(2)
+    .tells(&["path:DIR"]);
+}
+
+#[test]
+fn a_crate_that_is_not_made_for_this_athermal_is_refused_before_anything_is_built() {
+    let scratch = Scratch::new("build-refused");
+    let binary = scratch.path("ours");
+    let other = scratch.path("other-core");
+    std::fs::create_dir_all(other.join("src")).unwrap();
+    let manifest = "[package]\nname = \"athermal-core\"\nversion = \"0.1.0\"\nedition = \"2024\"\n";
+    std::fs::write(other.join("Cargo.toml"), manifest).unwrap();
+    std::fs::write(other.join("src/lib.rs"), "").unwrap();
+    let cases = [
+        (
+            with_core(&scratch, "old-nodes", "athermal-core = \"^99.1\""),
+            2,
+            [
+                "old-nodes is made for athermal-core ^99.1",
+                "this program is athermal",
+            ],
+        ),
+        (
+            with_core(
+                &scratch,
+                "other-nodes",
+                &format!(
+                    "athermal-core = {{ path = {:?} }}",
+                    other.display().to_string()
+                ),
+            ),
+            2,
+            [
+                "two copies do not know each other's nodes",
+                "--athermal path:DIR",
+            ],
+        ),
+        (
+            with_core(&scratch, "no-nodes", ""),
+            2,
+            ["no-nodes does not depend on athermal-core", "no node type"],
+        ),
+        (
+            with_core(
+                &scratch,
+                "tested-nodes",
+                &format!(
+                    "athermal-core = {{ path = {:?}, features = [\"testkit\"] }}",
+                    format!("{ROOT}/core/framework")
+                ),
+            ),
+            2,
+            [
+                "tested-nodes has athermal-core with the feature `testkit` under `[dependencies]`",
+                "`[dev-dependencies]`",
+            ],
+        ),
+        (
+            format!("path:{}", scratch.path("nothing").display()),
+            3,
+            ["there is no crate in", "nothing"],
+        ),
+        ("a crate".to_owned(), 2, ["names no crate", "path:DIR"]),
+        (
+            "nodes@latest".to_owned(),
+            2,
+            ["`latest` is no version", "nodes"],
+        ),
+    ];
+    for (with, status, told) in cases {
+        let built = athermal(&[&"build", &"--with", &with, &"-o", &binary, &"--offline"]);
+        built.ended(status).tells(&told);
+    }
+    assert!(!binary.exists() && !scratch.path("ours-project").exists());
+}
+
+#[test]
+fn a_project_of_somebody_else_is_not_written_over() {
+    let scratch = Scratch::new("build-project");
+    let with = with_core(
+        &scratch,
+        "our-nodes",
+        &format!(
+            "athermal-core = {{ path = {:?} }}",
+            format!("{ROOT}/core/framework")
+        ),
+    );
+    let project = scratch.path("our-nodes");
+    let built = athermal(&[
+        &"build",
+        &"--with",
+        &with,
+        &"-o",
+        &scratch.path("ours"),
+        &"--project",
+        &project,
+        &"--offline",
+    ]);
+    built.ended(2).tells(&["did not write", "--project"]);
+    let absent = athermal(&[
+        &"build",
+        &"--with",
+        &with,
+        &"-o",
+        &scratch.path("ours"),
+        &"--vendored",
+        &scratch.path("vendor"),
+    ]);
+    absent.ended(3).tells(&["no vendored crates in"]);
+}
+
+/// A cargo that notes how it is called to build, and builds nothing.
+#[cfg(unix)]
+#[test]
+fn cargo_is_as_quiet_as_the_program_is_asked_to_be() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let scratch = Scratch::new("build-quiet");
+    let core = format!("{ROOT}/core/framework");
+    let with = with_core(
+        &scratch,
+        "quiet-nodes",
+        &format!("athermal-core = {{ path = {core:?} }}"),
+    );
+    let called = scratch.path("called");
+    let script = format!(
+        "#!/bin/sh\nif [ \"$1\" = build ]; then echo \"$@\" >> {called:?}; exit 1; fi\nexec {:?} \"$@\"\n",
+        env!("CARGO")
+    );
+    let cargo = scratch.file("cargo", script);
+    std::fs::set_permissions(&cargo, std::fs::Permissions::from_mode(0o755)).unwrap();
+    for quiet in [false, true] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .args(["build", "--with", &with, "--offline", "-o"])
+            .arg(scratch.path("ours"))
+            .args(quiet.then_some("-q"))
+            .env("CARGO", &cargo)
+            .output()
+            .unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(told.contains("cargo could not build"), "{told}");
+    }
+    let called = std::fs::read_to_string(called).unwrap();
+    let quiet: Vec<bool> = called
+        .lines()
+        .map(|line| line.contains("--quiet"))
+        .collect();
+    assert_eq!(quiet, [false, true], "{called}");
+}

@@ -1,0 +1,14 @@
+//! A graph is replaced while it runs: nothing is lost, repeated or reordered, and reports tell the truth.
+
+mod allocation;
+mod blending;
+mod course;
+mod failures;
+mod model;
+mod planted;
+mod properties;
+mod random_graph;
+mod snapshots;
+mod standing;
+mod threads;
+mod versions;
