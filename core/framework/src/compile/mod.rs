@@ -34,8 +34,8 @@ mod steps;
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
-pub(crate) use keys::EstimatorKeys;
 pub use gate::Misordered;
+pub(crate) use keys::EstimatorKeys;
 pub use kind_fault::KindFault;
 pub use plan::{
     AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
