@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use athermal::Model;
 use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Recording;
+use athermal::core::recording::{Recording, Samples};
 use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use athermal_numerics::{Direction, Folds, GramBlocks, LeastSquares, Search, Standardization};
@@ -179,10 +179,10 @@ fn read_csv(bencher: Bencher) {
     bencher.counter(BytesCount::new(bytes)).bench_local(|| {
         let data = dataset(&path);
         let mut rows = data.open(&plan).expect("the file can be read");
-        let mut values = vec![f64::NAN; plan.sources.len()];
+        let mut samples = Samples::default();
         let mut count = 0_u64;
         while rows
-            .next(&mut values)
+            .next(&mut samples)
             .expect("the file can be read")
             .is_some()
         {

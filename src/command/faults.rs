@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use athermal::Instant;
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
@@ -125,7 +125,7 @@ fn ends(leaps: &Leaps, stuck: &Standstill) -> bool {
 }
 
 impl Recording for FaultWatch<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let rows = self.recording.open(plan)?;
         let mut state = self.state.borrow_mut();
         if let State::Read(_) = *state {
@@ -282,16 +282,16 @@ impl Looked {
 }
 
 struct Looking<'a> {
-    rows: Box<dyn Rows + 'a>,
+    rows: Box<dyn Source + 'a>,
     state: &'a RefCell<State>,
 }
 
-impl Rows for Looking<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
-        let event = self.rows.next(values)?;
+impl Source for Looking<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = self.rows.next(samples)?;
         if let State::Read(looks) = &mut *self.state.borrow_mut() {
             match event {
-                Some(Event::Row(now)) => looks.row(now, values),
+                Some(Event::Row(now)) => looks.row(now, &samples.values),
                 Some(Event::Segment) => looks.interrupt(),
                 None => {}
             }

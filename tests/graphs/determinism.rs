@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::workbench::{Scratch, athermal, athermal_fed, graph, simulated};
 use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Recording, Table};
+use athermal::core::recording::{Event, Recording, Samples, Table};
 use athermal::files::{Dataset, Options};
 use athermal::{Engine, Model};
 
@@ -298,13 +298,13 @@ fn a_model_read_back_runs_with_the_same_bits() {
     let bits = |mut engine: Engine| {
         let plan = Arc::clone(engine.plan());
         let mut rows = table.open(&plan).unwrap();
-        let mut values = vec![f64::NAN; plan.sources.len()];
+        let mut samples = Samples::default();
         let mut bits = Vec::new();
-        while let Some(event) = rows.next(&mut values).unwrap() {
+        while let Some(event) = rows.next(&mut samples).unwrap() {
             if let Event::Row(now) = event {
                 bits.extend(
                     engine
-                        .step(now, &values)
+                        .step(now, &samples.values)
                         .unwrap()
                         .iter()
                         .map(|value| value.to_bits()),

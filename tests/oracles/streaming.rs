@@ -6,7 +6,7 @@ use crate::workbench::plan;
 use athermal::Instant;
 use athermal::core::compile::Plan;
 use athermal::core::fit::{FitOptions, Outcome, fit};
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 
 /// Temperatures that wander, once a second, and a drift that follows two of them.
 struct Wandering {
@@ -21,7 +21,7 @@ struct Wander {
 }
 
 impl Recording for Wandering {
-    fn open(&self, _plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, _plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         Ok(Box::new(Wander {
             left: self.rows,
             second: 0,
@@ -41,8 +41,8 @@ impl Wander {
     }
 }
 
-impl Rows for Wander {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
+impl Source for Wander {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
         if self.left == 0 {
             return Ok(None);
         }
@@ -52,8 +52,11 @@ impl Rows for Wander {
             let step = 0.01 * self.uniform() - 1e-4 * (self.temperatures[sensor] - 21.0);
             self.temperatures[sensor] += step;
         }
-        values[..4].copy_from_slice(&self.temperatures);
-        values[4] = 3.0 * (values[0] - 21.0) - 2.0 * (values[2] - 21.0) + self.uniform();
+        let [first, _, third, _] = self.temperatures;
+        let drift = 3.0 * (first - 21.0) - 2.0 * (third - 21.0) + self.uniform();
+        samples.values.clear();
+        samples.values.extend(self.temperatures);
+        samples.values.push(drift);
         Ok(Some(Event::Row(Instant::from_ns(
             self.second * 1_000_000_000,
         ))))

@@ -81,7 +81,7 @@
 //! | the same, learned from a truth: an encoder | [`node::Feature`] with [`node::Encoder`] |
 //! | a prediction, fitted on history | [`node::Estimator`] |
 //! | one prediction of several | [`node::Combiner`] |
-//! | where samples come from | [`live::Source`] |
+//! | where samples come from | [`recording::Source`] |
 //! | where outputs go | [`live::Sink`] |
 //! | a simulated machine | [`machine::Machine`] |
 //!

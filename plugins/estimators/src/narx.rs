@@ -1,11 +1,11 @@
 //! The estimator with products of past drift and temperatures.
 
-use athermal_core::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, Figures, InputPort, Mistake, Of, Predictor, Regressor,
     Regressors, SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
     TruthLags,
 };
+use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
 use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
 use schemars::JsonSchema;

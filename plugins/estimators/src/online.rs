@@ -1,9 +1,9 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
-use athermal_core::model::{number, number_or_none, numbers};
 use athermal_core::node::{
     Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };
+use athermal_core::node::{number, number_or_none, numbers};
 use athermal_core::time::Instant;
 use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,10 @@
 //! The estimator with squares and products of features.
 
-use athermal_core::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
+use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
 use athermal_numerics::Standardizer;
 use schemars::JsonSchema;

@@ -1,10 +1,10 @@
 //! What the linear estimators share: how rows become a fitted model and a report; which regressors there are is theirs.
 
-use athermal_core::model::{number, numbers};
 use athermal_core::node::{
     Coefficients, LinearForm, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer,
     TrainingError, TrainingReport, TrainingSetup,
 };
+use athermal_core::node::{number, numbers};
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, PredictionVariance, Sgd,
     SgdOptions, Standardization,

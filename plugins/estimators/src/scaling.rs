@@ -1,8 +1,8 @@
 //! Decides how a fitted model brings regressors to a common scale, and what makes no scale.
 
 use athermal_core::diagnostic::count;
-use athermal_core::model::{number, numbers};
 use athermal_core::node::{Mistake, TrainingReport};
+use athermal_core::node::{number, numbers};
 use serde::{Deserialize, Serialize};
 
 /// What each regressor varies about and how far, as a model file has it.

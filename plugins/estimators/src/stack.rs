@@ -1,6 +1,6 @@
 //! One prediction of several, by weights that a fit has found.
 
-use athermal_core::model::numbers;
+use athermal_core::node::numbers;
 use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, InputPort, Mistake, Of, Predictor, Regressors, Term,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
-use athermal_core::recording::{self, RecordingError, Rows};
-use athermal_core::time::{Duration, Instant};
+use athermal_core::recording::{self, Samples, Source, SourceError};
+use athermal_core::time::Duration;
 
-use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, Row, TimeColumn, TimeForm};
+use crate::stream::read_into;
+use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -88,11 +89,10 @@ impl Dataset {
 }
 
 impl recording::Recording for Dataset {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let recording = Recording::join(&self.paths, layout(plan), self.options.clone())?;
         Ok(Box::new(Reading {
             recording,
-            row: Row::default(),
             reports: &self.reports,
         }))
     }
@@ -100,24 +100,19 @@ impl recording::Recording for Dataset {
 
 struct Reading<'a> {
     recording: Recording,
-    row: Row,
     reports: &'a RefCell<Vec<(String, Report)>>,
 }
 
-impl Rows for Reading<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<recording::Event>, RecordingError> {
-        match self.recording.next_into(&mut self.row)? {
-            Event::Row => {
-                values.copy_from_slice(&self.row.values);
-                Ok(Some(recording::Event::Row(Instant::from_ns(
-                    self.row.time_ns,
-                ))))
-            }
-            Event::Segment => Ok(Some(recording::Event::Segment)),
+impl Source for Reading<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
+        let (event, time) = read_into(samples, |row| self.recording.next_into(row))?;
+        Ok(match event {
+            Event::Row => Some(recording::Event::Row(time)),
+            Event::Segment => Some(recording::Event::Segment),
             Event::End => {
                 *self.reports.borrow_mut() = self.recording.reports().to_vec();
-                Ok(None)
+                None
             }
-        }
+        })
     }
 }

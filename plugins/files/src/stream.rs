@@ -1,21 +1,30 @@
-//! Files as source and sink of a run: rows in, rows out; what a row looks like is decided by reader and writer.
+//! Files as source and sink of a run: rows in, rows out.
 
-use athermal_core::live::{Frame, Samples, Sink, SinkError, Source, SourceError};
-use athermal_core::recording::Event;
+use athermal_core::live::{Frame, Sink, SinkError};
+use athermal_core::recording::{Event, Samples, Source, SourceError};
 use athermal_core::time::Instant;
 
-use crate::{Reader, Row, Writer};
+use crate::{FileError, Reader, Row, Writer};
+
+/// Reads a row into the room that samples have.
+pub(crate) fn read_into<T>(
+    samples: &mut Samples,
+    read: impl FnOnce(&mut Row) -> Result<T, FileError>,
+) -> Result<(T, Instant), FileError> {
+    let mut row = Row {
+        time_ns: 0,
+        time_text: std::mem::take(&mut samples.time_text),
+        values: std::mem::take(&mut samples.values),
+    };
+    let read = read(&mut row)?;
+    (samples.time_text, samples.values) = (row.time_text, row.values);
+    Ok((read, Instant::from_ns(row.time_ns)))
+}
 
 impl Source for Reader {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        let mut row = Row {
-            time_ns: 0,
-            time_text: std::mem::take(&mut samples.time_text),
-            values: std::mem::take(&mut samples.values),
-        };
-        let more = self.next_into(&mut row)?;
-        (samples.time_text, samples.values) = (row.time_text, row.values);
-        Ok(more.then(|| Event::Row(Instant::from_ns(row.time_ns))))
+        let (more, time) = read_into(samples, |row| self.next_into(row))?;
+        Ok(more.then_some(Event::Row(time)))
     }
 }
 

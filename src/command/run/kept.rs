@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
-use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
-use athermal::core::recording::Event;
+use athermal::core::live::{Sink, SinkError};
+use athermal::core::recording::{Event, Samples, Source, SourceError};
 use athermal::files::Reader;
 use athermal::{Engine, Instant, Model};
 use serde_json::json;

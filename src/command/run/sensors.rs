@@ -3,8 +3,8 @@
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{Feed, Samples, Source, SourceError};
-use athermal::core::recording::Event;
+use athermal::core::live::Feed;
+use athermal::core::recording::{Event, Samples, Source, SourceError};
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 
 use serde_json::json;

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Recording, Table};
+use athermal::core::recording::{Event, Recording, Samples, Table};
 use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use athermal::{Engine, Instant};
@@ -210,13 +210,13 @@ fn pairs_at_the_same_tick(
     );
     let mut engine = Engine::new(Arc::clone(plan), fitted).unwrap();
     let mut rows = recording.open(plan).unwrap();
-    let mut values = vec![f64::NAN; plan.sources.len()];
+    let mut samples = Samples::default();
     let mut pairs = Vec::new();
-    while let Some(event) = rows.next(&mut values).unwrap() {
+    while let Some(event) = rows.next(&mut samples).unwrap() {
         let Event::Row(time) = event else {
             panic!("one segment")
         };
-        engine.step(time, &values).unwrap();
+        engine.step(time, &samples.values).unwrap();
         let pair = (engine.value(both), engine.value(drift));
         if !pair.0.is_nan() && !pair.1.is_nan() {
             pairs.push(pair);

@@ -3,10 +3,8 @@
 
 use athermal::core::compile::Plan;
 use athermal::core::fit::{FitError, FitOptions};
-use athermal::core::live::{
-    Frame, Refit, RunError, Samples, Sink, SinkError, Source, SourceError, StageError, run,
-};
-use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::core::live::{Frame, Refit, RunError, Sink, SinkError, StageError, run};
+use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 
 use super::course::live;
 use super::model::{model, s};
@@ -66,7 +64,7 @@ fn what_was_put_out_before_a_source_fails_lasts() {
 struct Panicking;
 
 impl Recording for Panicking {
-    fn open(&self, _plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, _plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         panic!("this node has a mistake")
     }
 }

@@ -10,7 +10,7 @@ use athermal_core::compile::Plan;
 use athermal_core::engine::Fitted;
 use athermal_core::fit::{FitError, FitOptions, fit};
 use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording, RecordingError, Rows};
+use athermal_core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal_core::score::{PredictionTrace, Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
@@ -392,7 +392,7 @@ struct SomeDays<'a> {
 }
 
 struct SomeRows<'a> {
-    rows: Box<dyn Rows + 'a>,
+    rows: Box<dyn Source + 'a>,
     of: &'a SomeDays<'a>,
     segment: u32,
     given: bool,
@@ -402,7 +402,7 @@ struct SomeRows<'a> {
 }
 
 impl Recording for SomeDays<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         Ok(Box::new(SomeRows {
             rows: self.recording.open(plan)?,
             of: self,
@@ -414,13 +414,13 @@ impl Recording for SomeDays<'_> {
     }
 }
 
-impl Rows for SomeRows<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
+impl Source for SomeRows<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
         if let Some((at, row)) = self.waiting.take() {
-            values.copy_from_slice(&row);
+            samples.values = row;
             return Ok(Some(Event::Row(at)));
         }
-        while let Some(event) = self.rows.next(values)? {
+        while let Some(event) = self.rows.next(samples)? {
             let Event::Row(at) = event else {
                 self.segment += 1;
                 self.broken = self.given;
@@ -432,7 +432,7 @@ impl Rows for SomeRows<'_> {
             }
             self.given = true;
             if std::mem::take(&mut self.broken) {
-                self.waiting = Some((at, values.to_vec()));
+                self.waiting = Some((at, samples.values.clone()));
                 return Ok(Some(Event::Segment));
             }
             return Ok(Some(event));

@@ -4,7 +4,8 @@
 use athermal_core::compile::{PlannedNode, PlannedRole, TrainingLimits};
 use athermal_core::engine::{Engine, Pairing};
 use athermal_core::fit::FitError;
-use athermal_core::model::{Model, number_or_none};
+use athermal_core::model::Model;
+use athermal_core::node::number_or_none;
 use athermal_core::node::{Of, Predictor};
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::trace;

@@ -7,7 +7,7 @@ use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording, RecordingError, Rows};
+use athermal_core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal_core::score::{PredictionTrace, Trace, trace};
 use serde::Serialize;
 
@@ -143,7 +143,7 @@ struct AtRest<'a> {
 }
 
 struct RowsAtRest<'a> {
-    rows: Box<dyn Rows + 'a>,
+    rows: Box<dyn Source + 'a>,
     source: usize,
     mean: f64,
     /// By how much the next value lies from the mean.
@@ -151,7 +151,7 @@ struct RowsAtRest<'a> {
 }
 
 impl Recording for AtRest<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         Ok(Box::new(RowsAtRest {
             rows: self.recording.open(plan)?,
             source: self.source,
@@ -161,9 +161,10 @@ impl Recording for AtRest<'_> {
     }
 }
 
-impl Rows for RowsAtRest<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
-        let event = self.rows.next(values)?;
+impl Source for RowsAtRest<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = self.rows.next(samples)?;
+        let values = &mut samples.values;
         if matches!(event, Some(Event::Row(_))) && !values[self.source].is_nan() {
             values[self.source] = self.mean + self.next;
             self.next = -self.next;

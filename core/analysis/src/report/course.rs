@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use athermal_control::Stability;
 use athermal_core::compile::{Entry, Plan, PlannedRole};
-use athermal_core::engine::{Engine, EngineError};
+use athermal_core::engine::Engine;
 use athermal_core::model::{Model, Period};
 use athermal_core::quantity::Quantity;
-use athermal_core::recording::{Event, Recording};
+use athermal_core::recording::{Event, Recording, pass};
 use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
@@ -142,25 +142,14 @@ pub(super) fn follow(
         axes,
         ..Course::default()
     };
-    let mut rows = recording.open(&plan)?;
-    let mut values = vec![f64::NAN; plan.sources.len()];
     // Segments may start their clocks again; here they follow each other.
     let (mut shift, mut last, mut begins) = (Duration::ZERO, None::<Instant>, false);
-    while let Some(event) = rows.next(&mut values)? {
-        let time = match event {
-            Event::Segment => {
-                engine.segment();
-                course.sensors.iter_mut().for_each(SensorFacts::segment);
-                begins = true;
-                continue;
-            }
-            Event::Row(time) => time,
+    pass(&mut engine, recording, |engine, event, samples| {
+        let Event::Row(time) = event else {
+            course.sensors.iter_mut().for_each(SensorFacts::segment);
+            begins = true;
+            return;
         };
-        match engine.step(time, &values) {
-            Ok(_) => {}
-            Err(EngineError::NotAfter { .. }) => continue,
-            Err(error) => return Err(Box::new(error)),
-        }
         if begins && let Some(last) = last {
             shift = (last + Duration::from_ns(3_600_000_000_000)) - time;
         }
@@ -170,17 +159,17 @@ pub(super) fn follow(
         course.ticks += 1;
         let (from, _) = course.period_s.unwrap_or((now_s, now_s));
         course.period_s = Some((from, now_s));
-        for (sensor, &value) in course.sensors.iter_mut().zip(&values) {
-            sensor.look(now_s, value, &engine);
+        for (sensor, &value) in course.sensors.iter_mut().zip(&samples.values) {
+            sensor.look(now_s, value, engine);
         }
         for (axis, places) in course.axes.iter_mut().zip(&of_axes) {
-            axis.look(places, &engine, now_s);
+            axis.look(places, engine, now_s);
         }
         if !track.axes.is_empty() {
-            track.look(&corrected, &engine, now, begins);
+            track.look(&corrected, engine, now, begins);
         }
         begins = false;
-    }
+    })?;
     for sensor in &mut course.sensors {
         sensor.finish(model.sample_ranges());
     }

@@ -2,7 +2,7 @@
 
 use super::{FaultSpec, Faults};
 use crate::compile::Plan;
-use crate::recording::{Event, Recording, RecordingError, Rows};
+use crate::recording::{Event, Recording, Samples, Source, SourceError};
 use crate::unit::Unit;
 
 /// A recording whose sensors fail, the same way each time that it is opened. Faults count from the first row of each segment.
@@ -25,7 +25,7 @@ impl<'a> WithFaults<'a> {
 }
 
 impl Recording for WithFaults<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let channels: Vec<(&str, &Unit)> = plan
             .sources
             .iter()
@@ -42,15 +42,15 @@ impl Recording for WithFaults<'_> {
 }
 
 struct FaultyRows<'a> {
-    rows: Box<dyn Rows + 'a>,
+    rows: Box<dyn Source + 'a>,
     faults: Faults,
 }
 
-impl Rows for FaultyRows<'_> {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
-        let event = self.rows.next(values)?;
+impl Source for FaultyRows<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = self.rows.next(samples)?;
         match event {
-            Some(Event::Row(time)) => self.faults.apply(time.as_ns(), values),
+            Some(Event::Row(time)) => self.faults.apply(time.as_ns(), &mut samples.values),
             Some(Event::Segment) => self.faults.restart(),
             None => {}
         }
@@ -85,11 +85,11 @@ mod tests {
             rows: Box::new(table.events().iter()),
             faults: Faults::new(faults, 1, 1).unwrap(),
         };
-        let mut value = [0.0];
+        let mut samples = Samples::default();
         let mut seen = Vec::new();
-        while let Some(event) = rows.next(&mut value).unwrap() {
+        while let Some(event) = rows.next(&mut samples).unwrap() {
             if event != Event::Segment {
-                seen.push(value[0].is_nan());
+                seen.push(samples.values[0].is_nan());
             }
         }
         assert_eq!(seen, [false, true, true, false, false, true, true, false]);

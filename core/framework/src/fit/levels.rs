@@ -5,13 +5,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::collect::{Collector, Share, Trainee};
-use super::drive::{Passed, drive};
 use super::progress::{FitProgress, Listener};
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
 use crate::engine::{Engine, Fitted, When, naming_one};
-use crate::recording::{Event, Recording};
+use crate::recording::{Event, Passed, Recording, pass};
 
 /// A fit under way.
 pub(super) struct Fitting<'a> {
@@ -148,7 +147,7 @@ impl<'a> Fitting<'a> {
     pub(super) fn run(mut self) -> Result<(Fitted, FitReport), FitError> {
         if self.levels.is_empty() {
             let mut engine = Engine::new(Arc::clone(self.plan), &Fitted::new())?;
-            let passed = drive(&mut engine, self.recording, |_, _| {})?;
+            let passed = pass(&mut engine, self.recording, |_, _, _| {})?;
             self.note(&engine, passed);
             return Ok((Fitted::new(), self.report));
         }
@@ -305,7 +304,7 @@ impl<'a> Fitting<'a> {
             tell(*stepped);
             let (truths, counted) = (&self.truths, &mut self.counted);
             *counted = Counted::default();
-            let passed = drive(&mut engine, self.recording, |engine, event| {
+            let passed = pass(&mut engine, self.recording, |engine, event, _| {
                 collector.look(
                     engine,
                     event,

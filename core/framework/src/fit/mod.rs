@@ -5,7 +5,6 @@ mod between;
 mod candidates;
 mod collect;
 mod doubt;
-mod drive;
 mod levels;
 mod progress;
 mod report;
@@ -15,8 +14,6 @@ use std::sync::Arc;
 
 pub use progress::FitProgress;
 pub use report::{Dropped, EstimatorFit, FitError, FitReport, Outcome};
-
-pub(crate) use drive::drive;
 
 use crate::compile::Plan;
 use crate::engine::Fitted;

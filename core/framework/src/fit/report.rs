@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::engine::{EngineError, SampleRange};
 use crate::node::{TrainingError, TrainingReport};
-use crate::recording::RecordingError;
+use crate::recording::SourceError;
 use crate::time::Instant;
 
 /// Why a fit could not be run.
 #[derive(Debug)]
 pub enum FitError {
     /// The recording cannot be read.
-    Recording(RecordingError),
+    Recording(SourceError),
     /// The engine cannot be built.
     Engine(EngineError),
     /// A node panicked.
@@ -35,8 +35,8 @@ impl fmt::Display for FitError {
 
 impl std::error::Error for FitError {}
 
-impl From<RecordingError> for FitError {
-    fn from(error: RecordingError) -> Self {
+impl From<SourceError> for FitError {
+    fn from(error: SourceError) -> Self {
         Self::Recording(error)
     }
 }

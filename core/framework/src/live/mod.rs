@@ -1,4 +1,4 @@
-//! Decides how a graph is run from a [`Source`] to a [`Sink`], and how a running one is replaced: staged, watched in the shadow,
+//! Decides how a graph is run from a [`Source`](crate::recording::Source) to a [`Sink`], and how a running one is replaced: staged, watched in the shadow,
 //! handed over between two ticks, taken back; not where samples come from or go.
 //!
 //! [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
@@ -21,7 +21,6 @@ mod retained;
 mod run;
 mod shadow;
 mod sink;
-mod source;
 mod stage_error;
 mod staged;
 mod stepper;
@@ -32,7 +31,6 @@ pub use refit::Refit;
 pub use run::{RunError, run, run_keeping};
 pub use shadow::{Compared, Shadow, Verdict};
 pub use sink::{Frame, Sink, SinkError};
-pub use source::{Samples, Source, SourceError};
 pub use stage_error::StageError;
 pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};

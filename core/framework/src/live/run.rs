@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use super::{Frame, Samples, Sink, SinkError, Source, SourceError};
+use super::{Frame, Sink, SinkError};
 use crate::engine::{Engine, EngineError};
-use crate::recording::Event;
+use crate::recording::{Event, Source, SourceError, drive};
 
 /// Steps an engine through all that a source gives, and puts out what comes of it.
 ///
@@ -45,27 +45,20 @@ fn run_to_the_end(
     keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
 ) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
-    let mut samples = Samples::default();
-    while let Some(event) = source.next(&mut samples).map_err(RunError::Source)? {
+    drive(engine, source, |engine, event, samples| {
         let Event::Row(time) = event else {
-            engine.segment();
-            continue;
-        };
-        let outputs = match engine.step(time, &samples.values) {
-            Ok(outputs) => outputs,
-            Err(EngineError::NotAfter { .. }) => continue,
-            Err(error) => return Err(RunError::Engine(error)),
+            return Ok(());
         };
         let frame = Frame {
             time,
             time_text: &samples.time_text,
             revision: &revision,
-            outputs,
+            outputs: engine.outputs(),
         };
         sink.put(&frame).map_err(RunError::Sink)?;
-        keep(engine, sink).map_err(RunError::Keep)?;
-    }
-    Ok(())
+        keep(engine, sink).map_err(RunError::Keep)
+    })
+    .map(drop)
 }
 
 /// Why a run ended before its source did.
@@ -91,3 +84,15 @@ impl fmt::Display for RunError {
 }
 
 impl std::error::Error for RunError {}
+
+impl From<SourceError> for RunError {
+    fn from(error: SourceError) -> Self {
+        Self::Source(error)
+    }
+}
+
+impl From<EngineError> for RunError {
+    fn from(error: EngineError) -> Self {
+        Self::Engine(error)
+    }
+}

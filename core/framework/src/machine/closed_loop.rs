@@ -3,6 +3,7 @@
 use super::recording::unit_of;
 use super::{Machine, MachineError, Row, Simulation};
 use crate::engine::Engine;
+use crate::recording::{Event, Samples, Steps};
 use crate::time::Instant;
 use crate::unit::Unit;
 
@@ -18,7 +19,7 @@ pub struct ClosedLoop {
     feeds: Vec<Option<Feed>>,
     /// Which output asks for which axis, and how many nm its unit has.
     asks: Vec<(usize, usize, f64)>,
-    samples: Vec<f64>,
+    samples: Samples,
     asked: Vec<f64>,
     /// In force while the last row was measured, and from then on.
     applied: Vec<f64>,
@@ -108,7 +109,7 @@ impl ClosedLoop {
         }
         Ok(Self {
             simulation,
-            samples: vec![f64::NAN; feeds.len()],
+            samples: Samples::default(),
             feeds,
             asks,
             engine,
@@ -143,22 +144,21 @@ impl Simulation for ClosedLoop {
         if !self.simulation.next(row) {
             return false;
         }
-        for (sample, feed) in self.samples.iter_mut().zip(&self.feeds) {
-            *sample = feed.as_ref().map_or(f64::NAN, |feed| {
-                let value = match feed.from {
-                    Origin::Channel(nth) => row.values[nth],
-                    Origin::Applied(nth) => self.applied[nth],
-                };
-                feed.machine.convert(value, &feed.graph).unwrap_or(f64::NAN)
-            });
-        }
+        let sample = |feed: &Option<Feed>| {
+            let Some(feed) = feed else { return f64::NAN };
+            let value = match feed.from {
+                Origin::Channel(nth) => row.values[nth],
+                Origin::Applied(nth) => self.applied[nth],
+            };
+            feed.machine.convert(value, &feed.graph).unwrap_or(f64::NAN)
+        };
+        self.samples.values.clear();
+        self.samples.values.extend(self.feeds.iter().map(sample));
+        let event = Event::Row(Instant::from_ns(row.time_ns));
         // A row that the engine refuses leaves everything as it is, as on a machine.
-        if let Ok(outputs) = self
-            .engine
-            .step(Instant::from_ns(row.time_ns), &self.samples)
-        {
+        if let Ok(true) = self.engine.take(event, &self.samples) {
             for &(output, axis, factor) in &self.asks {
-                self.asked[axis] = outputs[output] * factor;
+                self.asked[axis] = self.engine.outputs()[output] * factor;
             }
             self.simulation.correct(&self.asked, &mut self.next);
         }

@@ -5,7 +5,7 @@ use std::fmt;
 use super::{Faulty, Machine, Row, Setup, SetupError, Simulation};
 use crate::compile::Plan;
 use crate::fault::{FaultError, FaultSpec, Faults};
-use crate::recording::{Event, Recording, RecordingError, Rows};
+use crate::recording::{Event, Recording, Samples, Source, SourceError};
 use crate::time::Instant;
 use crate::unit::Unit;
 
@@ -69,7 +69,7 @@ impl<'a> Simulated<'a> {
 }
 
 impl Recording for Simulated<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
         let channels = self.machine.channels();
         let mut picks = Vec::with_capacity(plan.sources.len());
         let mut missing = Vec::new();
@@ -122,12 +122,13 @@ struct Running {
     picks: Picks,
 }
 
-impl Rows for Running {
-    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
+impl Source for Running {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
         if !self.simulation.next(&mut self.row) {
             return Ok(None);
         }
-        for (value, pick) in values.iter_mut().zip(&self.picks) {
+        samples.values.resize(self.picks.len(), f64::NAN);
+        for (value, pick) in samples.values.iter_mut().zip(&self.picks) {
             *value = match pick {
                 None => f64::NAN,
                 Some((index, from, to)) => {

@@ -4,9 +4,6 @@ mod card;
 mod error;
 mod file;
 mod named;
-pub mod number;
-pub mod number_or_none;
-pub mod numbers;
 mod problem;
 
 pub use card::{Card, DataCard, EstimatorCard, Period};

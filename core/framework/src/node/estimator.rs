@@ -282,14 +282,14 @@ pub struct TrainingReport {
     /// Condition number of the standardised design.
     #[serde(
         default,
-        with = "crate::model::number_or_none",
+        with = "crate::node::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub condition: Option<f64>,
     /// Root mean square error over the rows of the fit, in the unit of the truth.
     #[serde(
         default,
-        with = "crate::model::number_or_none",
+        with = "crate::node::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub in_sample_rmse: Option<f64>,
@@ -297,7 +297,7 @@ pub struct TrainingReport {
     /// pull the fit, which is then not judged by its root mean square error.
     #[serde(
         default,
-        with = "crate::model::number_or_none",
+        with = "crate::node::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub robust_error: Option<f64>,
@@ -418,16 +418,16 @@ pub struct TriedOrder {
     /// How many coefficients it has. AIC, AICc and BIC count the variance of what is left beside them, FPE does not.
     pub coefficients: usize,
     /// Akaike's information criterion.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub aic: f64,
     /// The same, corrected for few rows.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub aicc: f64,
     /// The Bayesian information criterion.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub bic: f64,
     /// The final prediction error, in the square of the truth's unit.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub fpe: f64,
 }
 
@@ -440,10 +440,10 @@ pub struct SelectionStep {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub removed: bool,
     /// The cross-validation score after the step: the mean over the folds.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub score: f64,
     /// The score of each fold.
-    #[serde(default, with = "crate::model::numbers")]
+    #[serde(default, with = "crate::node::numbers")]
     pub folds: Vec<f64>,
     /// What was tried at this step, the best first; this one is among them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -465,6 +465,6 @@ pub struct CandidateScore {
     /// Its name.
     pub name: String,
     /// The score that the step would have had with it.
-    #[serde(with = "crate::model::number")]
+    #[serde(with = "crate::node::number")]
     pub score: f64,
 }

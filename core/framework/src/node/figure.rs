@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::model::number::Exact;
-use crate::model::numbers;
+use crate::node::number::Exact;
+use crate::node::numbers;
 
 /// What a fit found, by name.
 pub type Figures = BTreeMap<String, Figure>;

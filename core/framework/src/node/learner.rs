@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use super::{LinearForm, Mistake, Restored, State};
-use crate::model::numbers;
+use crate::node::numbers;
 use crate::time::{Duration, Instant};
 
 /// Whether an estimator goes on learning while it runs.

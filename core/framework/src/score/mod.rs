@@ -19,9 +19,9 @@ pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
-use crate::fit::{FitError, drive};
+use crate::fit::FitError;
 use crate::quantity::Quantity;
-use crate::recording::Recording;
+use crate::recording::{Recording, pass};
 
 /// How predictions are scored.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +56,7 @@ pub fn score(
     engine.predict_in(options.mode);
     let mut watch = Watch::new(plan, options.mode);
     let mut stepped = 0;
-    let passed = drive(&mut engine, recording, |engine, event| {
+    let passed = pass(&mut engine, recording, |engine, event, _| {
         watch.look(engine, event);
         stepped += 1;
         if stepped % 4096 == 0 {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::{Lack, Mode, ScoreOptions, Watch, evidence};
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted, SampleRange};
-use crate::fit::{FitError, drive};
-use crate::recording::{Event, Recording};
+use crate::fit::FitError;
+use crate::recording::{Event, Recording, pass};
 use crate::time::{Duration, Instant};
 
 /// Every truth of a recording, and what was predicted of it.
@@ -89,7 +89,7 @@ pub fn trace_as(
     let mut watch = Watch::new(plan, options.mode);
     let mut times = vec![Vec::new(); watch.truths.len()];
     let mut segment = 0;
-    let passed = drive(&mut engine, recording, |engine, event| {
+    let passed = pass(&mut engine, recording, |engine, event, _| {
         watch.look(engine, event);
         match event {
             Event::Segment => segment += 1,

@@ -188,7 +188,7 @@ impl Rule {
                  `Estimator::keeps_range` says that there is none"
             }
             Self::Models => {
-                "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \
+                "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::node::number` where \
                  one may be infinite or NaN"
             }
             Self::Linear => {

@@ -8,8 +8,8 @@ use super::observed::Observed;
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
 use crate::fault::{FaultError, WithFaults};
-use crate::fit::{FitError, drive};
-use crate::recording::{Event, Recording};
+use crate::fit::FitError;
+use crate::recording::{Event, Recording, pass};
 use crate::time::Duration;
 
 /// The seed of the spikes and noise of faults.
@@ -53,7 +53,7 @@ pub fn run(
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
     let mut observed = Observed::new(plan, trial);
     let (mut first, mut length) = (None, Duration::ZERO);
-    let passed = drive(&mut engine, data, |engine, event| {
+    let passed = pass(&mut engine, data, |engine, event, _| {
         observed.look(engine, event);
         match event {
             Event::Row(at) => length = length.max(at - *first.get_or_insert(at)),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::compile::Plan;
 use crate::prng::Prng;
-use crate::recording::{RecordingError, Rows, Table};
+use crate::recording::{Event, Recording, Samples, Source, SourceError, Table};
 use crate::time::{Duration, Instant};
 
 /// Made-up measurements of one channel, in its unit.
@@ -109,31 +109,23 @@ impl Synthetic {
     }
 }
 
-impl crate::recording::Recording for Synthetic {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
-        Ok(Box::new(OwnedRows {
-            events: self.table(plan),
-            next: 0,
-        }))
+impl Recording for Synthetic {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
+        let table = self.table(plan);
+        Ok(Box::new(Replay { table, next: 0 }))
     }
 }
 
-struct OwnedRows {
-    events: Table,
+struct Replay {
+    table: Table,
     next: usize,
 }
 
-impl Rows for OwnedRows {
-    fn next(
-        &mut self,
-        values: &mut [f64],
-    ) -> Result<Option<crate::recording::Event>, RecordingError> {
-        let Some((event, row)) = self.events.events().get(self.next) else {
-            return Ok(None);
-        };
-        self.next += 1;
-        values[..row.len()].copy_from_slice(row);
-        Ok(Some(*event))
+impl Source for Replay {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = Source::next(&mut self.table.events()[self.next..].iter(), samples)?;
+        self.next += usize::from(event.is_some());
+        Ok(event)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What an identified model consists of; not how it is told, nor how it is followed.
 
-use athermal_core::model::numbers;
+use athermal_core::node::numbers;
 use athermal_core::time::Duration;
 use athermal_numerics::{Beginning, Polynomials};
 use serde::{Deserialize, Serialize};

@@ -3,8 +3,7 @@
 use super::super::compared::{Course, course};
 use super::Subject;
 use crate::engine::Engine;
-use crate::fit::drive;
-use crate::recording::{Event, Table};
+use crate::recording::{Event, Samples, Table, pass};
 use crate::time::{Duration, Instant};
 
 pub(super) fn deterministic(subject: &Subject<'_>) -> Result<(), String> {
@@ -41,12 +40,12 @@ pub(super) fn long_run(subject: &Subject<'_>) -> Result<(), String> {
 
 fn in_one_piece(subject: &Subject<'_>) -> Result<Course, String> {
     let mut course = Course::default();
-    let look = |engine: &Engine, event: Event| {
+    let look = |engine: &Engine, event: Event, _: &Samples| {
         if let Event::Row(now) = event {
             course.note(&subject.fixture, engine, now);
         }
     };
-    drive(&mut subject.engine(), &subject.table, look).map_err(|error| error.to_string())?;
+    pass(&mut subject.engine(), &subject.table, look).map_err(|error| error.to_string())?;
     Ok(course)
 }
 

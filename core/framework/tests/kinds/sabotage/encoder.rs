@@ -115,7 +115,7 @@ fn share_of(inputs: &Inputs) -> Vec<OutputPort> {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Largest {
     uses: Vec<String>,
-    #[serde(with = "athermal_core::model::number")]
+    #[serde(with = "athermal_core::node::number")]
     largest: f64,
 }
 

@@ -1,22 +1,20 @@
-//! Decides what the author of a source implements: samples in; not what is done with them.
+//! What the author of a source implements: samples in.
 
 use std::error::Error;
 
-use crate::recording::Event;
+use crate::time::Instant;
 
 /// Where samples come from: a file, a bus, a broker, a controller.
 ///
 /// A source is asked for the next samples and may wait for them. It gives them as they were measured: one call, one instant, NaN
-/// where a channel has no new value. Ranges, ages and absence are looked after by the graph, instants that do not rise are
-/// refused and counted by the engine. It ends when there will be nothing more.
+/// where a channel has no new value. The graph checks ranges, ages and absence. The engine refuses and counts instants that do not
+/// rise. A source ends when there will be nothing more.
 ///
-/// What it must know of a graph, it is told when it is made: [`Plan::sources`](crate::compile::Plan::sources) says which channels,
-/// in which order and in which columns, [`Plan::time`](crate::compile::Plan::time) how time is given. A whole source, which reads a
-/// counter once a second:
+/// What it needs of a graph, it takes when it is made: [`Plan::sources`](crate::compile::Plan::sources) has the channels, in order and
+/// with their columns, [`Plan::time`](crate::compile::Plan::time) the form of time. A whole source, which reads a counter once a second:
 ///
 /// ```
-/// use athermal_core::live::{Samples, Source, SourceError};
-/// use athermal_core::recording::Event;
+/// use athermal_core::recording::{Event, Samples, Source, SourceError};
 /// use athermal_core::time::{Duration, Instant};
 ///
 /// /// Counts from 0 to below its end, one number a second.
@@ -58,6 +56,15 @@ pub trait Source {
 
 /// What went wrong with a source; its text says what, where and what to do.
 pub type SourceError = Box<dyn Error + Send + Sync>;
+
+/// What comes next from a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// A row.
+    Row(Instant),
+    /// The rows that follow belong to another segment, whose times may start again.
+    Segment,
+}
 
 /// What was measured at an instant.
 #[derive(Debug, Clone, Default, PartialEq)]
