@@ -45,30 +45,6 @@ pub(super) fn meant_input(instance: &Declared<'_>, given: &str) -> Option<&'stat
 }
 
 impl Resolver<'_> {
-    /// Reports inputs that the kind does not have.
-    pub(super) fn known_inputs(&mut self, declared: &Declared<'_>) {
-        let ports = (declared.kind.inputs)();
-        let strange = |port: &str| !ports.iter().any(|known| known.name == port);
-        for input in declared
-            .decl
-            .inputs
-            .iter()
-            .filter(|input| strange(&input.port))
-        {
-            let problem = CompileProblem::UnknownInput {
-                kind: declared.kind.name,
-                input: input.port.clone(),
-                meant: meant_input(declared, &input.port),
-                known: ports.iter().map(|port| port.name).collect(),
-            };
-            self.diagnostics.report(input.place, problem);
-            // What it reads is looked at all the same.
-            for (text, place) in &input.references {
-                self.look_up(text, *place);
-            }
-        }
-    }
-
     /// Looks up what an input refers to: slots in order, none for an optional input left out.
     pub(crate) fn slots(
         &mut self,

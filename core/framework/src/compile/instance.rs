@@ -328,6 +328,14 @@ impl Declared<'_> {
         }
     }
 
+    /// Whether an input such as `inputs.signal` or a parameter such as `selection.folds` is given.
+    pub(super) fn states(&self, way: &str) -> bool {
+        match way.strip_prefix("inputs.") {
+            Some(port) => self.input(port).is_some(),
+            None => self.parameter(way).all(|inner| inner.is_some()),
+        }
+    }
+
     /// The values on the way to a parameter, up to the first that is not given.
     fn parameter<'v>(&'v self, path: &'v str) -> impl Iterator<Item = Option<&'v Value>> {
         path.split('.')

@@ -30,6 +30,7 @@ mod row;
 mod scope;
 mod slot_set;
 mod steps;
+mod survey;
 
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,

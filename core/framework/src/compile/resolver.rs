@@ -125,7 +125,10 @@ impl<'g> Resolver<'g> {
                     let declared = Declared { node, decl, kind };
                     let instance = Instance { declared, read };
                     let before = self.nodes.len();
-                    if self.guarded(&instance, closes).is_none() {
+                    let resolved = self.guarded(Some(kind), (node, decl), |resolver| {
+                        resolver.instance(&instance, closes)
+                    });
+                    if resolved.is_none() {
                         self.scopes.get_mut(&node.name).broken = true;
                     }
                     if closes && self.nodes.len() > before {
@@ -133,7 +136,10 @@ impl<'g> Resolver<'g> {
                     }
                 } else {
                     self.scopes.get_mut(&node.name).broken = true;
-                    self.look_through(node, decl, kind);
+                    self.guarded(kind, (node, decl), |resolver| {
+                        resolver.survey(node, decl, kind, parts);
+                        Some(())
+                    });
                 }
                 self.diagnostics.scope(outer);
             }
@@ -149,16 +155,6 @@ impl<'g> Resolver<'g> {
         }
         if has_loops {
             self.follow_loops();
-        }
-    }
-
-    /// Looks at the inputs of an instance of which something else is wrong.
-    fn look_through(&mut self, node: &NodeDecl, decl: &InstanceDecl, kind: Option<&'static Kind>) {
-        if let Some(kind) = kind {
-            self.known_inputs(&Declared { node, decl, kind });
-        }
-        for (text, place) in decl.inputs.iter().flat_map(|input| &input.references) {
-            self.look_up(text, *place);
         }
     }
 
@@ -210,12 +206,22 @@ impl<'g> Resolver<'g> {
         }
     }
 
-    /// Resolves one instance; a panic in the code of its kind is reported.
-    fn guarded(&mut self, instance: &Instance<'_>, closes: bool) -> Option<()> {
-        let declared = (instance.node, instance.decl);
-        let panics = self.panics;
-        let resolved = panics.caught(instance.kind, declared, || self.instance(instance, closes));
-        resolved.unwrap_or_else(|fault| self.sound(instance, [fault]))
+    /// Does what takes code of a kind, for an instance of a node; nothing comes of it where that panics, which is reported.
+    fn guarded(
+        &mut self,
+        kind: Option<&'static Kind>,
+        (node, decl): (&NodeDecl, &InstanceDecl),
+        work: impl FnOnce(&mut Self) -> Option<()>,
+    ) -> Option<()> {
+        let Some(kind) = kind else {
+            return work(self);
+        };
+        let done = self.panics.caught(kind, (node, decl), || work(self));
+        done.unwrap_or_else(|fault| {
+            self.diagnostics
+                .report(node.place, CompileProblem::of_kind(kind, fault));
+            None
+        })
     }
 
     /// Tells what is wrong with a kind itself, at a node of it; none where nothing is.
