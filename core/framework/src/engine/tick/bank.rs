@@ -101,7 +101,7 @@ impl<'a> Linear<'a> {
             node,
             slot: *slot,
             trigger: *trigger,
-            learns: !estimate.is_plain(),
+            learns: estimate.learning.is_some(),
             form,
             shared,
             own,

@@ -45,17 +45,6 @@ impl TickContext<'_> {
                 }
             }
             NodeRunner::Estimate {
-                estimate: Some(estimate),
-                trigger,
-                slot,
-                ..
-            } if estimate.is_plain() => {
-                if trigger.is_none_or(|gather| self.gathered[gather].fresh) {
-                    let (value, stamp) = estimate.predict(self.gathered, self.row, self.now);
-                    self.slots.set(*slot, value, stamp);
-                }
-            }
-            NodeRunner::Estimate {
                 estimate,
                 trigger,
                 slot,
@@ -127,7 +116,7 @@ impl TickContext<'_> {
         }
     }
 
-    /// An estimator that does more than predict by its fit, or has none.
+    /// Lets an estimator learn, then predict.
     #[inline(never)]
     fn estimate(
         &mut self,
