@@ -4,12 +4,12 @@ use std::cell::RefCell;
 
 use athermal::Instant;
 use athermal::core::compile::{Plan, SourceChannel};
-use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
 use athermal::diagnosis::{health_reasons, of_truths};
+use athermal::run::live::Feed;
+use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
 
 use serde::Serialize;
 use serde_json::{Value, json};

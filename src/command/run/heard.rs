@@ -2,7 +2,7 @@
 
 use athermal::Instant;
 use athermal::core::engine::Engine;
-use athermal::core::live::{Frame, Sink, SinkError};
+use athermal::run::live::{Frame, Sink, SinkError};
 use serde_json::json;
 
 use crate::message::Message;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
-use athermal::core::live::{Sink, SinkError};
-use athermal::core::recording::{Event, Samples, Source, SourceError};
 use athermal::files::Reader;
+use athermal::run::live::{Sink, SinkError};
+use athermal::run::recording::{Event, Samples, Source, SourceError};
 use athermal::{Engine, Instant, Model};
 use serde_json::json;
 
@@ -300,7 +300,7 @@ impl Source for Rest<'_> {
 
 #[cfg(test)]
 mod tests {
-    use athermal::core::live::Frame;
+    use athermal::run::live::Frame;
 
     use super::*;
 

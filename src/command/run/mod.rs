@@ -16,13 +16,13 @@ use std::path::PathBuf;
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
 use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{self, Frame, LiveOptions, RunError, Sink, pair_from};
-use athermal::core::recording::{Event, Samples, Source};
 use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
     layout,
 };
+use athermal::run::live::{self, Frame, LiveOptions, RunError, Sink, pair_from};
+use athermal::run::recording::{Event, Samples, Source};
 use athermal::{Engine, Model};
 use clap::Args;
 use serde_json::json;

@@ -3,8 +3,8 @@
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Samples, Source, SourceError};
+use athermal::run::live::Feed;
+use athermal::run::recording::{Event, Samples, Source, SourceError};
 
 use athermal::{Duration, Instant};
 use serde_json::json;

@@ -3,9 +3,9 @@
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Samples, Source, SourceError};
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
+use athermal::run::live::Feed;
+use athermal::run::recording::{Event, Samples, Source, SourceError};
 
 use serde_json::json;
 

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
-use athermal::core::live::{Control, Feed, StageError, Staged};
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
+use athermal::run::live::{Control, Feed, StageError, Staged};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 

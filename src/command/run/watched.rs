@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk, FileReader};
-use athermal::core::model::named_model;
+use athermal::run::model::named_model;
 
 /// When a file was written, and how long it is; none where there is no file.
 type Written = Option<(SystemTime, u64)>;

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use athermal::core::diagnostic::panic_text;
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Recording;
-use athermal::core::trial::{self, DataSet, Finding, On};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Recording;
+use athermal::trial::{self, DataSet, Finding, On};
 
 use super::suite::Suite;
 use crate::command::data::of_files;

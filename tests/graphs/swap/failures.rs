@@ -2,9 +2,9 @@
 //! put out lasts.
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitError, FitOptions};
-use athermal::core::live::{Frame, Refit, RunError, Sink, SinkError, StageError, run};
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal::run::fit::{FitError, FitOptions};
+use athermal::run::live::{Frame, Refit, RunError, Sink, SinkError, StageError, run};
+use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
 
 use super::course::live;
 use super::model::{model, s};

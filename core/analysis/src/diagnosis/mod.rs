@@ -32,11 +32,11 @@ pub use rest::Untold;
 use std::collections::BTreeMap;
 
 use athermal_core::compile::{Plan, PlannedNode};
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::Recording;
-use athermal_core::score::Lack;
 use athermal_core::time::Duration;
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::Recording;
+use athermal_run::score::Lack;
 use serde::Serialize;
 
 use observation::main_prediction;

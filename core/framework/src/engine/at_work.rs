@@ -8,7 +8,7 @@ use crate::time::Instant;
 
 /// When a node is at work.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum When {
+pub enum When {
     /// At a tick, or the end of a segment.
     Tick(Instant),
     /// In its fit.
@@ -41,7 +41,7 @@ pub(crate) fn naming<T>(plan: &Plan, when: When, work: impl FnOnce(&mut AtWork) 
 }
 
 /// The same for the code of one node, by its number.
-pub(crate) fn naming_one<T>(plan: &Plan, node: usize, when: When, work: impl FnOnce() -> T) -> T {
+pub fn naming_one<T>(plan: &Plan, node: usize, when: When, work: impl FnOnce() -> T) -> T {
     naming(plan, when, |at_work| {
         at_work.is(node);
         work()

@@ -7,7 +7,7 @@ mod at_work;
 mod error;
 #[cfg(feature = "testkit")]
 mod idle;
-pub(crate) mod learning;
+mod learning;
 mod sample_range;
 mod state;
 mod tick;
@@ -15,16 +15,19 @@ mod tick;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
+pub use at_work::{When, naming_one};
 pub use error::EngineError;
-pub use learning::{Mode, Pair, Pairing};
+pub use learning::{Mode, Pair, Pairing, StepLength, times};
 pub use sample_range::SampleRange;
-pub use state::{Carry, EngineState, Fnv1a, NodeCarry, RestoreError, fnv_1a, revision};
+pub use state::{
+    Carry, EngineState, Fnv1a, NodeCarry, RestoreError, StateTransfer, fnv_1a, revision,
+};
 pub use tick::{Cursor, History};
 
-pub(crate) use at_work::{When, naming, naming_one};
 #[cfg(feature = "testkit")]
-pub(crate) use idle::Answer;
-pub(crate) use state::StateTransfer;
+pub use idle::Answer;
+
+pub(crate) use at_work::naming;
 pub(crate) use tick::{Gathered, Given};
 
 use crate::channel::Extremes;
@@ -50,8 +53,8 @@ pub struct Engine {
     histories: Vec<Option<History>>,
     /// The slots that have a history.
     recorded: Vec<usize>,
-    /// The nodes that are told truths after all outputs, and the slots of these.
-    told: Vec<(usize, usize)>,
+    /// The nodes that are given truths after all outputs, and the slots of these.
+    truths: Vec<(usize, usize)>,
     nodes: Vec<NodeRunner>,
     work: Box<[Work]>,
     last: Instant,
@@ -82,7 +85,7 @@ impl Engine {
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
-            told: nodes
+            truths: nodes
                 .iter()
                 .enumerate()
                 .filter_map(|(node, running)| Some((node, running.truth()?)))
@@ -201,7 +204,7 @@ impl Engine {
     }
 
     /// Whether a tick at this instant would be taken.
-    pub(crate) fn takes(&self, time: Instant) -> bool {
+    pub fn takes(&self, time: Instant) -> bool {
         time > self.last
     }
 
@@ -239,7 +242,7 @@ impl Engine {
 
     /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
     /// where no past truth changes what it predicts in the mode of the engine.
-    pub(crate) fn step_of(&self, node: usize) -> Option<Option<Duration>> {
+    pub fn step_of(&self, node: usize) -> Option<Option<Duration>> {
         match self.nodes.get(node) {
             Some(NodeRunner::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
             _ => None,
@@ -389,8 +392,8 @@ impl Engine {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 
-    /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
-    pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+    /// How many truths a combiner has seen, and how many of them it goes by; none for other nodes.
+    pub fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
         let NodeRunner::Vote(vote) = &self.nodes[node] else {
             return None;
         };
@@ -412,7 +415,7 @@ impl Engine {
         }
     }
 
-    /// Writes down what later ticks will ask for, and tells truths, now that all outputs of the tick are there.
+    /// Writes down what later ticks will ask for, and hands truths over, now that all outputs of the tick are there.
     fn remember(&mut self, now: Instant) {
         for &slot in &self.recorded {
             if let Some(history) = &mut self.histories[slot]
@@ -429,7 +432,7 @@ impl Engine {
                 feedback.observe(self.slots.values[slot], self.slots.given[slot].stamp, now);
             }
         }
-        for &(node, slot) in &self.told {
+        for &(node, slot) in &self.truths {
             if !self.slots.fresh(slot) {
                 continue;
             }

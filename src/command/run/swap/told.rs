@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use athermal::core::engine::Carry;
-use athermal::core::live::{Notice, StageError, Staged, Verdict};
+use athermal::run::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
 use crate::command::run::watched::{Watched, Went};

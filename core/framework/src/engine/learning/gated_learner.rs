@@ -1,9 +1,9 @@
-//! Decides what an estimator learns from while it runs, and what it is kept from; how it learns is the learner's.
+//! What an estimator learns from while it runs, and what it is kept from.
 
 use std::sync::Arc;
 
 use super::embargo::{DueTruth, Embargo};
-use super::mode::{Mode, Step};
+use super::mode::{Mode, StepLength};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
 use crate::engine::state::NodeState;
 use crate::engine::tick::Gathered;
@@ -18,7 +18,7 @@ pub(crate) struct GatedLearner {
     gate: Gate,
     freeze: Option<usize>,
     mode: Mode,
-    step: Step,
+    step: StepLength,
     /// Whether a run knows of the truth of its own tick.
     at_once: bool,
     /// Whether it may predict otherwise than when it was asked last.
@@ -27,7 +27,7 @@ pub(crate) struct GatedLearner {
     nothing: Vec<f64>,
 }
 
-/// What became of a truth that the embargo let through, as the port `learning` tells it.
+/// What became of a truth that the embargo let through, as the port `learning` gives it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum LearnOutcome {
@@ -71,18 +71,18 @@ impl GatedLearner {
                 own,
             },
             mode: Mode::OneStep,
-            step: Step::new(truth.ahead.max(truth.span)),
+            step: StepLength::new(truth.ahead.max(truth.span)),
             nothing: vec![f64::NAN; width],
         })
     }
 
-    /// Learns as late as a mode says.
+    /// Learns as late as a mode wants.
     pub(crate) fn predict_in(&mut self, mode: Mode) {
         self.mode = mode;
     }
 
     /// How long a step was planned to be; none where it is as long as the time between truths.
-    pub(crate) fn step(&self) -> Option<Duration> {
+    pub fn step(&self) -> Option<Duration> {
         self.step.planned()
     }
 
@@ -164,7 +164,7 @@ impl GatedLearner {
         self.withheld.observe(truth, now, frozen);
     }
 
-    /// Learns from what the embargo lets through at `now`; tells what became of the newest, and when it had arrived.
+    /// Learns from what the embargo lets through at `now`; gives the outcome of the newest, and when it had arrived.
     pub(crate) fn release(
         &mut self,
         now: Instant,
@@ -174,16 +174,16 @@ impl GatedLearner {
         let frozen = self.frozen(gathered, on);
         let newest = self.newest(now);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
-        let mut news = None;
+        let mut newest_outcome = None;
         let free = self.mode == Mode::FreeRun;
         self.withheld.release(newest, |released| {
             if free && learner.is_settled() {
                 return;
             }
-            news = Some((gate.offer(learner, released, frozen), released.arrived));
+            newest_outcome = Some((gate.offer(learner, released, frozen), released.arrived));
         });
-        self.changed |= news.is_some();
-        news
+        self.changed |= newest_outcome.is_some();
+        newest_outcome
     }
 
     /// The segment has ended with this tick.
@@ -238,7 +238,7 @@ impl GatedLearner {
         let became = if !on && !self.learner.tracks_state() {
             LearnOutcome::FrozenOnCommand
         } else if channels.any(|&value| value != 0.0) {
-            // NaN too: where nobody says that learning may go on, it does not.
+            // NaN too: without a clear 0, learning does not go on.
             LearnOutcome::FrozenByChannel
         } else {
             LearnOutcome::Learned

@@ -11,6 +11,6 @@ mod rows;
 pub(crate) use embargo::{DueTruth, Embargo, EmbargoState};
 pub(crate) use feedback::Feedback;
 pub(crate) use gated_learner::GatedLearner;
-pub use mode::Mode;
-pub(crate) use mode::{Step, times};
+pub use mode::{Mode, StepLength, times};
+
 pub use pairing::{Pair, Pairing};

@@ -1,4 +1,4 @@
-//! Decides by which past truths predictions may be made in an evaluation; not how they are scored.
+//! By which past truths predictions may be made in an evaluation.
 
 use std::num::NonZeroU32;
 
@@ -20,8 +20,8 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// How much earlier than in one step the newest truth must have arrived that is told at all.
-    pub(crate) fn earlier(self, step: Duration) -> Duration {
+    /// How much earlier than in one step the newest truth must have arrived that counts at all.
+    pub fn earlier(self, step: Duration) -> Duration {
         match self {
             Self::OneStep | Self::FreeRun => Duration::ZERO,
             Self::Steps(steps) => times(step, i64::from(steps.get()) - 1),
@@ -29,21 +29,22 @@ impl Mode {
     }
 }
 
-/// So many steps, as long as that can be told.
-pub(crate) fn times(step: Duration, count: i64) -> Duration {
+/// So many steps; the longest duration where they are longer.
+pub fn times(step: Duration, count: i64) -> Duration {
     Duration::from_ns(step.as_ns().saturating_mul(count))
 }
 
 /// The length of a step: as it was planned, or where that is nothing the time between the last two truths.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Step {
+pub struct StepLength {
     planned: Duration,
     last: Option<crate::time::Instant>,
     between: Duration,
 }
 
-impl Step {
-    pub(crate) fn new(planned: Duration) -> Self {
+impl StepLength {
+    /// A step that was planned, or [`Duration::ZERO`] where none was.
+    pub fn new(planned: Duration) -> Self {
         Self {
             planned,
             last: None,
@@ -52,7 +53,7 @@ impl Step {
     }
 
     /// Takes the instant of a truth.
-    pub(crate) fn truth(&mut self, at: crate::time::Instant) {
+    pub fn truth(&mut self, at: crate::time::Instant) {
         if let Some(last) = self.last
             && at > last
         {
@@ -61,17 +62,19 @@ impl Step {
         self.last = Some(at);
     }
 
-    pub(crate) fn length(&self) -> Duration {
+    /// As it was planned, else as it was between the last two truths.
+    pub fn length(&self) -> Duration {
         self.planned().unwrap_or(self.between)
     }
 
     /// As it was planned, where that is anything.
-    pub(crate) fn planned(&self) -> Option<Duration> {
+    pub fn planned(&self) -> Option<Duration> {
         // A lag of one sample is written as the shortest there is.
         Some(self.planned).filter(|&planned| planned > Duration::from_ns(1))
     }
 
-    pub(crate) fn segment(&mut self) {
+    /// Begins another segment: the next truth has none before it.
+    pub fn segment(&mut self) {
         self.last = None;
     }
 }

@@ -1,4 +1,4 @@
-//! Decides which run of a node a truth belongs to; not what is done with the pair.
+//! Which run of a node a truth belongs to.
 
 use super::rows::Rows;
 use crate::compile::TruthLink;
@@ -83,12 +83,12 @@ impl Pairing {
     }
 
     /// The run that the last truth was paired with.
-    pub(crate) fn last(&self) -> &[f64] {
+    pub fn last(&self) -> &[f64] {
         self.runs.row(self.past)
     }
 
     /// The number of the run that the last truth was paired with.
-    pub(crate) fn last_number(&self) -> u64 {
+    pub fn last_number(&self) -> u64 {
         self.number
     }
 

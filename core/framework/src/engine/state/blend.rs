@@ -1,4 +1,4 @@
-//! Decides how an output passes from an old graph's value to a new one's without a step.
+//! How an output passes from an old graph's value to a new one's without a step.
 
 use serde::{Deserialize, Serialize};
 
@@ -72,7 +72,7 @@ impl Blending {
     }
 
     /// Takes over from another graph, both having been stepped to the same tick.
-    pub(crate) fn hand_over(&mut self, from: &Self) {
+    pub fn hand_over(&mut self, from: &Self) {
         let own = self.own;
         *self = *from;
         self.own = own;

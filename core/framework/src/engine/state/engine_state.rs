@@ -1,4 +1,4 @@
-//! Decides what of a running engine is kept, and in which form; who keeps it and when is decided elsewhere.
+//! The state of an engine and its form in bytes. [`snapshot`](super::snapshot) takes it down.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -33,7 +33,8 @@ pub struct EngineState {
     pub(crate) extremes: BTreeMap<String, Extremes>,
     pub(crate) slots: BTreeMap<String, SlotState>,
     pub(crate) histories: BTreeMap<String, History>,
-    pub(crate) nodes: BTreeMap<String, NodeState>,
+    /// What each node keeps.
+    pub nodes: BTreeMap<String, NodeState>,
     pub(crate) blending: BTreeMap<String, Blending>,
     /// Whether learning has been frozen on command.
     pub(crate) frozen: bool,
@@ -49,8 +50,8 @@ pub(crate) struct SlotState {
 
 /// What a node knows. Its own state is kept as bytes, so that one that nobody understands spoils no other.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(crate) struct NodeState {
-    pub(crate) own: Option<Vec<u8>>,
+pub struct NodeState {
+    pub own: Option<Vec<u8>>,
     pub(crate) learning: Option<EmbargoState>,
     /// The recent error of an estimator that learns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -90,7 +91,7 @@ pub enum RestoreError {
     Damaged,
     /// The form is one that this program does not know.
     Unreadable {
-        /// What the reader says.
+        /// The message of the reader.
         reason: String,
     },
     /// The snapshot belongs to another graph or fit.
@@ -135,7 +136,7 @@ impl fmt::Display for RestoreError {
 impl std::error::Error for RestoreError {}
 
 impl EngineState {
-    /// The state as bytes: a name, a checksum, and the state as MessagePack, which says itself what is what.
+    /// The state as bytes: a name, a checksum, and the state as MessagePack with names.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let payload = rmp_serde::to_vec_named(self)

@@ -11,5 +11,5 @@ pub(crate) use blend::{Blending, rate};
 pub(crate) use engine_state::NodeState;
 pub use engine_state::{EngineState, RestoreError};
 pub use revision::{Fnv1a, fnv_1a, revision};
-pub(crate) use transfer::StateTransfer;
-pub use transfer::{Carry, NodeCarry};
+
+pub use transfer::{Carry, NodeCarry, StateTransfer};

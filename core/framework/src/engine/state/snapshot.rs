@@ -1,4 +1,4 @@
-//! Decides how an engine tells all that it knows, and goes on from what it or another one knew.
+//! The state of an engine taken down, and restored in the same or in another engine.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one}
 use crate::node::Restored;
 
 impl Engine {
-    /// All that the engine knows, as bytes that say themselves what they are.
+    /// All that the engine knows, as self-describing bytes.
     ///
     /// An engine of the same graph and fit that is given them goes on with the same bits.
     #[must_use]
@@ -51,7 +51,7 @@ impl Engine {
     ///
     /// # Errors
     /// When a node does not take its own state back.
-    pub(crate) fn twin(&self) -> Result<Self, RestoreError> {
+    pub fn twin(&self) -> Result<Self, RestoreError> {
         let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)
             .expect("what was fitted belongs to the plan, or there would be no engine to copy");
         twin.revision.clone_from(&self.revision);
@@ -72,7 +72,7 @@ impl Engine {
 
     /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
     /// each follows, and what is frozen on command stays so.
-    pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
+    pub fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
         self.outputs.take_over(&before.outputs, from);
         self.refused = before.refused;
         // Whoever made this engine ready may have missed the command.
@@ -148,10 +148,10 @@ impl Engine {
         })
     }
 
-    /// Goes on from a state of this or another graph, as far as the transfer says.
+    /// Goes on from a state of this or another graph, as far as the transfer goes.
     ///
-    /// `warmed` says whether this engine has been stepped over the past, so that what is not carried is not cold.
-    pub(crate) fn adopt(
+    /// `warmed`: whether this engine has been stepped over the past, so that what is not carried is not cold.
+    pub fn adopt(
         &mut self,
         state: &EngineState,
         transfer: &StateTransfer,

@@ -1,4 +1,4 @@
-//! Decides which nodes of a new graph go on from what those of the old one know.
+//! Which nodes of a new graph go on from the state of the old one.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::engine::{Engine, Fitted};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
-pub(crate) struct StateTransfer {
+pub struct StateTransfer {
     /// How each node begins.
     pub(crate) nodes: Vec<Begin>,
     /// Whether each slot goes on as it was: nothing that it hangs on has changed.
@@ -20,7 +20,7 @@ pub(crate) struct StateTransfer {
 
 /// How a node begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Begin {
+pub enum Begin {
     /// As it was.
     AsItWas,
     /// The old state is offered to it.
@@ -75,7 +75,7 @@ pub enum Carry {
 
 impl StateTransfer {
     /// All of a plan, in itself.
-    pub(crate) fn all(plan: &Plan) -> Self {
+    pub fn all(plan: &Plan) -> Self {
         Self {
             nodes: vec![Begin::AsItWas; plan.nodes.len()],
             slots: vec![true; plan.channels.len()],
@@ -85,7 +85,7 @@ impl StateTransfer {
 
     /// What goes on from one engine in another. With `learned`, a node is offered its old state although it, or what it
     /// reads, has been fitted anew.
-    pub(crate) fn between(old: &Engine, new: &Engine, learned: bool) -> Self {
+    pub fn between(old: &Engine, new: &Engine, learned: bool) -> Self {
         let (was, plan) = (&**old.plan(), &**new.plan());
         let diff = diff(was, plan);
         let changes: HashMap<_, _> = diff
@@ -204,7 +204,7 @@ enum Own {
     New,
     Type,
     Inputs,
-    /// What was learned for another one says nothing of this.
+    /// What was learned for another one is of no use for this.
     Horizon,
     Parameters,
     Unit,

@@ -1,4 +1,4 @@
-//! Decides what one node does at a tick: whether it runs, what it reads and where its outputs go; not in which order nodes do.
+//! What one node does at a tick: whether it runs, what it reads and where its outputs go.
 
 use std::ops::Range;
 
@@ -103,7 +103,7 @@ impl TickContext<'_> {
         operator.step(&tick, &mut outputs);
     }
 
-    /// Lets an estimator learn before it runs; what became of the newest truth is told beside its prediction.
+    /// Lets an estimator learn before it runs; the outcome of the newest truth stands beside its prediction.
     #[inline]
     pub(crate) fn learn(&mut self, learning: &mut GatedLearner, slot: usize) {
         let (now, on) = (self.now, !self.frozen);

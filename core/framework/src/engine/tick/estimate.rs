@@ -1,4 +1,4 @@
-//! Decides how a fitted estimator is run: which regressors it is given, and when it gives nothing.
+//! A fitted estimator at work: which regressors it is given, and when it gives nothing.
 
 use std::sync::Arc;
 
@@ -70,9 +70,9 @@ pub(crate) struct Estimate {
     /// Whether nothing is asked of it but its prediction, from what was measured; it may learn.
     plain: bool,
     takes_absent: bool,
-    /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
+    /// What goes on learning, where the plan wants it: it then predicts in place of the predictor.
     pub(crate) learning: Option<Box<GatedLearner>>,
-    /// What is read in place of measured past truths, in an evaluation that says so.
+    /// What is read in place of measured past truths, in an evaluation of several steps.
     feedback: Option<Box<Feedback>>,
 }
 
@@ -151,7 +151,7 @@ impl Estimate {
 
     /// How long a step of it was planned to be, which is none where it is as long as the time between truths; none of either where
     /// no past truth changes what it predicts in the mode that it is in.
-    pub(crate) fn step(&self) -> Option<Option<Duration>> {
+    pub fn step(&self) -> Option<Option<Duration>> {
         let read = self.feedback.as_ref().map(|feedback| feedback.step());
         let followed = self.learning.as_ref().map(|learning| learning.step());
         read.max(followed)
@@ -293,7 +293,7 @@ impl Estimate {
 
     /// Asks for the prediction from any values.
     #[cfg(feature = "testkit")]
-    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+    pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);
         self.predict(&row, Instant::from_ns(0));

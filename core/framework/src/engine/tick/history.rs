@@ -1,4 +1,4 @@
-//! Decides what a channel held at an earlier instant; not who asks.
+//! What a channel held at an earlier instant.
 
 use std::collections::VecDeque;
 
@@ -106,7 +106,7 @@ impl History {
     }
 
     /// Lets a cursor go back, so that an instant before the one asked last may be asked for.
-    pub(crate) fn go_back(&self, at: Instant, cursor: &mut Cursor) {
+    pub fn go_back(&self, at: Instant, cursor: &mut Cursor) {
         while let Some(last) = cursor.checked_sub(1)
             && self.entry(last).is_some_and(|past| past.at > at)
         {
@@ -184,7 +184,7 @@ mod tests {
 
     /// A reader that asks again only when it must sees what one sees that always asks.
     #[test]
-    fn an_answer_stays_as_it_is_until_it_was_said_to() {
+    fn an_answer_stays_as_it_is_until_its_end() {
         let (lag, max_age) = (d(30), d(12));
         let mut past = History::new(lag);
         let (mut always, mut seldom) = (0, 0);

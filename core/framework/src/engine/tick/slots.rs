@@ -1,4 +1,4 @@
-//! Decides where the values of a plan lie between its steps.
+//! Where the values of a plan lie between its steps.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use crate::time::Instant;
 
 /// One arena for all values of a plan, by slot number.
 #[derive(Debug, Clone)]
-pub(crate) struct Slots {
+pub struct Slots {
     /// The last value given; NaN where the last run gave none.
     pub(crate) values: Vec<f64>,
     /// When it was.
@@ -18,7 +18,7 @@ pub(crate) struct Slots {
 
 /// When a slot was given its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Given {
+pub struct Given {
     /// The stamp of the value.
     pub(crate) stamp: Instant,
     /// The number of the tick at which the slot was last given something, be it nothing.

@@ -1,9 +1,0 @@
-//! Kinds of nodes as authors write them, with mistakes: what the macros, the compiler, the engine and the conformance kit find.
-
-#![allow(clippy::unwrap_used)]
-
-mod faulty_kinds;
-mod misuse;
-mod names;
-mod panics;
-mod sabotage;
