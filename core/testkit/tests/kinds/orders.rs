@@ -32,7 +32,9 @@ fn orders(steps: &[Step]) -> Vec<Vec<Step>> {
     let first = |at: usize| {
         let rest = [&steps[..at], &steps[at + 1..]].concat();
         let first = steps[at];
-        orders(&rest).into_iter().map(move |rest| [&[first], &rest[..]].concat())
+        orders(&rest)
+            .into_iter()
+            .map(move |rest| [&[first], &rest[..]].concat())
     };
     (0..steps.len()).flat_map(first).collect()
 }
