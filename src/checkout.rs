@@ -1,4 +1,4 @@
-//! Decides where the sources of athermal are that other crates build on; they are not on a registry yet.
+//! The sources of athermal that other crates build on; they are not on a registry yet.
 
 use std::path::{Path, PathBuf};
 

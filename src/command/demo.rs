@@ -42,7 +42,7 @@ pub struct Demo {
 }
 
 impl Demo {
-    /// Simulates, fits, scores and tells.
+    /// Simulates, fits, scores and prints.
     ///
     /// # Errors
     /// When the folder is somebody's, or cannot be written.

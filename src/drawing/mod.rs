@@ -1,4 +1,4 @@
-//! Decides what a picture of a graph shows: boxes, what stands in them, and arrows; not how they are drawn.
+//! Pictures of a graph: boxes, what stands in them, and arrows.
 
 pub mod dot;
 mod layout;
@@ -32,7 +32,7 @@ pub struct Box {
     pub title: String,
     /// What it is.
     pub class: Class,
-    /// What is to be said of it, line by line.
+    /// The text in it, line by line.
     pub lines: Vec<String>,
 }
 

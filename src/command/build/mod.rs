@@ -101,7 +101,7 @@ impl Build {
         })
     }
 
-    /// Tells what the new binary has.
+    /// Prints what the new binary has.
     fn tell(
         &self,
         terminal: &Terminal,
@@ -256,11 +256,11 @@ mod tests {
             "node type",
             &[of("one", "a"), of("one", "b"), of("two", "a")],
         );
-        let Err(Failure::Request(told)) = refused else {
+        let Err(Failure::Request(message)) = refused else {
             panic!("{refused:?}")
         };
         assert_eq!(
-            told,
+            message,
             "the node type `a` is in one 0.1.0 and in two 0.1.0: no graph could tell which is meant; leave one of them out, or rename it"
         );
     }
@@ -270,9 +270,9 @@ mod tests {
         let core = |path: &str| json!({ "name": "athermal-core", "version": "0.1.0", "manifest_path": path });
         assert!(one_core(&json!({ "packages": [core("/a")] }), &[]).is_ok());
         let refused = one_core(&json!({ "packages": [core("/a"), core("/b")] }), &[]);
-        let Err(Failure::Request(told)) = refused else {
+        let Err(Failure::Request(message)) = refused else {
             panic!("{refused:?}")
         };
-        assert!(told.contains("0.1.0 in /a, 0.1.0 in /b"), "{told}");
+        assert!(message.contains("0.1.0 in /a, 0.1.0 in /b"), "{message}");
     }
 }

@@ -113,7 +113,7 @@ impl Plugin {
         Ok(names)
     }
 
-    /// Refuses the name of what this program has already, and could not tell from the new one.
+    /// Refuses the name of what this program has already.
     fn free(&self, names: &Names) -> Result<(), Failure> {
         let kind = kinds().get(names.kind.as_str()).and_then(|all| all.first());
         let machine = machines()

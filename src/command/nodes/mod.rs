@@ -137,7 +137,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
 }
 
-/// The output ports that nodes of a kind may have, and what each says.
+/// The output ports that nodes of a kind may have, each with its meaning.
 fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
     let settings = settings(kind);
     let specs: Vec<Role<'_>> = settings.iter().map(|spec| spec.role()).collect();
@@ -189,7 +189,7 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                 port("weights", "the weight of each voter, by its name", weighs),
                 port(
                     "reason",
-                    "the number of why it does what it does, as told above",
+                    "the number of its reason, as listed above",
                     |spec| matches!(spec, Role::Combiner(of) if of.has_reason()),
                 ),
                 port("lower", "where the interval begins", covers),

@@ -308,19 +308,18 @@ impl Run {
             opened => opened?,
         };
         let terminal = *terminal;
-        reader.tell_first(move |first| {
+        reader.report_first(move |first| {
             let told = match first {
                 FileError::MissingColumns { .. } => {
                     let words = format_args!("{first} (missing until a line has it)");
                     refused::message(first, None, words)
                 }
-                FileError::TimeStaysBehind { .. }
-                | FileError::StaysUnreadable { .. }
-                | FileError::HeaderAgain { moved: true, .. } => {
+                FileError::StillRefused { .. } | FileError::HeaderAgain { moved: true, .. } => {
                     refused::message(first, None, first)
                 }
                 _ => {
-                    let words = format_args!("{}; others like it are counted", first.taken());
+                    let words =
+                        format_args!("{}; others like it are counted", first.without_advice());
                     refused::message(first, None, words)
                 }
             };

@@ -1,4 +1,4 @@
-//! Decides how graph files become plans with tests; all mistakes of all files are told together.
+//! Graph files as plans with tests; all mistakes of all files are reported together.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

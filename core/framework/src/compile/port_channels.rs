@@ -6,8 +6,9 @@ use std::sync::Arc;
 use indexmap::IndexMap;
 
 use super::CompileProblem;
-use super::reference::{Pattern, Reference, alternatives, is_pattern};
+use super::reference::{Reference, alternatives, is_pattern};
 use crate::diagnostic::Names;
+use crate::document::Pattern;
 
 /// The channels of a port, each with its slot.
 #[derive(Debug, Default, Clone)]

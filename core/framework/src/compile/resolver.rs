@@ -450,6 +450,7 @@ impl<'g> Resolver<'g> {
         let mut plan = Plan {
             name: self.graph.name.clone(),
             time: self.graph.time.clone(),
+            table: self.graph.table.clone(),
             sources: self.sources,
             channels: self.channels,
             gathers: self.gathers.into_iter().collect(),

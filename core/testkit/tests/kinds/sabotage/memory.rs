@@ -2,16 +2,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{
-    Combine, Combiner, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach,
-    Restored, State, Tick, Votes,
-};
-use athermal_core::time::{Duration, Instant};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{breaks, breaks_only};
+use super::*;
 
 /// The mean of each channel over a window.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -219,7 +210,7 @@ athermal_core::register!(Unbiased, Combiner, "sabotaged_errors");
 #[test]
 fn a_combiner_that_never_forgets_says_so() {
     let says = |word: &str| Case::new(format!("says = \"{word}\""));
-    let broken = |word| athermal_testkit::broken::<Unbiased>(&[says(word)]);
+    let broken = |word| broken::<Unbiased>(&[says(word)]);
     let rules = |word| -> Vec<Rule> { broken(word).iter().map(|broken| broken.rule).collect() };
     assert!(!rules("endless").contains(&Rule::Memory));
     assert!(rules("nothing").contains(&Rule::Memory));

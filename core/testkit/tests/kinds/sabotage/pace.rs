@@ -1,15 +1,6 @@
 //! A feature that is sound, and needs many ticks or quick ones to have anything to say.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
-};
-use athermal_core::time::{Duration, Instant};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{breaks, breaks_only};
+use super::*;
 
 /// Passes its input on after so many ticks, where the last is not longer ago than that.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]

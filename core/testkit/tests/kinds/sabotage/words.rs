@@ -1,13 +1,6 @@
 //! Parameters that go wrong only at a default, a word or a switch that no case states.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
-};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::breaks_only;
+use super::*;
 
 /// Passes its input on by a factor.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -107,16 +100,16 @@ const BY_DEFAULT: &str = "`factor` is 2.0 by default, which the schema does not 
 #[test]
 fn a_default_out_of_its_own_range_is_found_though_no_case_leaves_it_out() {
     breaks_only::<Gain>(Case::new("factor = 0.5"), &[Rule::Ranges]);
-    let broken = athermal_testkit::broken::<Gain>(&[Case::new("factor = 0.5")]);
+    let broken = broken::<Gain>(&[Case::new("factor = 0.5")]);
     for part in [BY_DEFAULT, "left out, `factor` is 2.0, which is refused: "] {
         assert!(broken[0].found.contains(part), "{broken:#?}");
     }
     let [one, two] = ["factor = 0.5", "factor = 0.6"].map(Case::new);
-    let broken = athermal_testkit::broken::<Gain>(&[one, two]);
-    let told = broken
+    let both = super::broken::<Gain>(&[one, two]);
+    let told = both
         .iter()
         .filter(|broken| broken.found.contains(BY_DEFAULT));
-    assert_eq!(told.count(), 1, "{broken:#?}");
+    assert_eq!(told.count(), 1, "{both:#?}");
 }
 
 #[test]
@@ -126,9 +119,7 @@ fn a_word_a_switch_and_a_tagged_table_that_no_case_tries_are_tried() {
         ("strict", "`strict = true`"),
         ("ends", "`ends = { type = \"cut\" }`"),
     ] {
-        let broken = athermal_testkit::broken::<Gain>(&[Case::new(format!(
-            "factor = 0.5\nfault = \"{fault}\""
-        ))]);
+        let broken = broken::<Gain>(&[Case::new(format!("factor = 0.5\nfault = \"{fault}\""))]);
         let told = format!("with {value} it panics: not written yet");
         assert!(broken[0].found.contains(&told), "{broken:#?}");
     }

@@ -1,4 +1,7 @@
-//! What is told where the name of a state or predictor is taken twice: no graph uses a node of either crate.
+//! What is reported where the name of a state or predictor is taken twice: no graph uses a node of either crate. It has a process of
+//! its own, since names taken twice stop every graph of a process.
+
+#![allow(clippy::unwrap_used)]
 
 use athermal_core::node::{
     Feature, InputPort, Inputs, Kind, Mistake, Operator, OutputPort, Outputs, RoleName, Tick,
