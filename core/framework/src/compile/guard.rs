@@ -39,7 +39,7 @@ impl Panics {
                     message: said,
                 }));
             }
-            KindFault::Panics { said }
+            KindFault::panics(&said)
         })
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::guard::Panics;
 use super::keys::EstimatorKeys;
 use super::misplaced::{INPUTS, misplaced};
-use super::problem::CompileProblem;
+use super::problem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
     Data, Decoded, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value,
@@ -111,7 +111,7 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
             .iter()
             .filter_map(|mistake| Some((mistake.code, mistake.place?)))
             .filter(|(code, place)| {
-                faulty.open.contains(place) || diagnostics.is_told(code, *place)
+                faulty.open.contains(place) || diagnostics.is_known(code, *place)
             })
             .collect();
         diagnostics.extend_where(own, |mistake| {
@@ -129,7 +129,7 @@ fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'sta
             let Some((of, name, packages)) = taken_twice(kind.package) else {
                 return Some(*kind);
             };
-            let problem = CompileProblem::WrittenTwice {
+            let problem = problem::WrittenTwice {
                 kind: kind.name.to_owned(),
                 of,
                 name,
@@ -140,10 +140,10 @@ fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'sta
         Some(several) => {
             let packages = several.iter().map(|kind| kind.package).collect();
             let kind = name.to_owned();
-            diagnostics.report(place, CompileProblem::KindTwice { kind, packages });
+            diagnostics.report(place, problem::KindTwice { kind, packages });
         }
         None => {
-            let problem = CompileProblem::UnknownKind {
+            let problem = problem::UnknownKind {
                 kind: name.to_owned(),
                 known: kinds().keys().copied().collect(),
             };
@@ -198,7 +198,7 @@ fn read_instance(
             Some((spec, closes_loops))
         });
         let read = read.unwrap_or_else(|fault| {
-            diagnostics.report(node.place, CompileProblem::of_kind(kind, fault));
+            diagnostics.report(node.place, problem::FaultyKind::new(kind, fault));
             None
         });
         let (spec, closes_loops) = read.filter(|_| is_whole).unzip();

@@ -5,11 +5,10 @@ mod coefficients;
 mod error;
 mod file;
 mod named;
-mod problem;
+pub mod problem;
 
 pub use card::{Card, DataCard, EstimatorCard, Period, content_of};
 pub use coefficients::{Coefficient, EstimatorParts, FittedEstimator, ProductFactor};
 pub use error::ModelError;
 pub use file::Model;
 pub use named::named_model;
-pub use problem::NamedModelProblem;

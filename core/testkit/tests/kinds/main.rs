@@ -4,7 +4,6 @@
 
 mod faulty_kinds;
 mod misuse;
-mod names;
 mod orders;
 mod panics;
 mod sabotage;
