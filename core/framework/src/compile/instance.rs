@@ -13,7 +13,7 @@ use crate::document::{
     Data, Decoded, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value,
     decode_rest,
 };
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -190,6 +190,17 @@ fn read_instance(
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
         let read = panics.caught(kind, (node, instance), || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
+            if spec.as_whole().is_some() {
+                let wrong = out_of_range((kind.schema)(), &parameters);
+                let sound = wrong.is_empty();
+                for (place, message) in wrong {
+                    let help = None;
+                    diagnostics.report(place, problem::Parameter { message, help });
+                }
+                if !sound {
+                    return None;
+                }
+            }
             let spec = spec.map(Arc::<dyn NodeSpec>::from);
             let closes_loops = spec.as_whole().is_some_and(|spec| match spec.role() {
                 Role::Feature(feature) => feature.closes_loops(),
@@ -321,8 +332,7 @@ impl Declared<'_> {
             Some(("inputs", port)) => (self.kind.inputs)().iter().any(|own| own.name == port),
             way => {
                 let first = way.map_or(at, |(first, _)| first);
-                let schema = serde_json::Value::from((self.kind.schema)());
-                !schema["properties"][first].is_null()
+                !(self.kind.schema)()["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
         }
