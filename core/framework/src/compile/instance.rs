@@ -155,12 +155,11 @@ fn read_instance(
             }
         }
     }
-    let context = context(node, instance);
-    diagnostics.within(context.clone(), |diagnostics| {
+    diagnostics.within(context(node, instance), |diagnostics| {
         let is_whole = take_inputs(kind, &mut parameters, diagnostics);
         let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
-        let read = panics.caught(kind, &context, || {
+        let read = panics.caught(kind, (node, instance), || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
             let wrong = out_of_range((kind.schema)(), &parameters);
             let is_sound = wrong.is_empty();
@@ -189,6 +188,14 @@ fn read_instance(
             closes_loops: closes_loops.unwrap_or_default(),
         }
     })
+}
+
+/// The name of an instance: `thermal.Z1`.
+pub(super) fn instance_name(node: &str, member: Option<&str>) -> String {
+    match member {
+        Some(member) => format!("{node}.{member}"),
+        None => node.to_owned(),
+    }
 }
 
 /// Takes inputs out of the parameters among which they stand, and reports them; false if there are any.
