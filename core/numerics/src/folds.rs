@@ -220,7 +220,8 @@ mod tests {
     #[test]
     fn a_refusal_tells_whether_rows_or_blocks_or_what_is_left_out_are_the_cause() {
         let three = Folds::contiguous(3);
-        let refusal = |refused: Result<Vec<FoldRows>, NumericsError>| refused.unwrap_err().to_string();
+        let refusal =
+            |refused: Result<Vec<FoldRows>, NumericsError>| refused.unwrap_err().to_string();
         assert!(
             refusal(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
         );

@@ -84,7 +84,8 @@ impl FreeResponses {
             for rows in residuals {
                 let rows = free.lasting(rows);
                 if !free.determined.contains_key(&rows) {
-                    free.determined.insert(rows, free.determined_by(rows, counted));
+                    free.determined
+                        .insert(rows, free.determined_by(rows, counted));
                 }
             }
         }
