@@ -311,7 +311,7 @@ impl Survey {
                     "{many} of {} cannot be read{the_first} {example}",
                     count(cells)
                 );
-                column.warn(format!("{many}, and is taken as missing"));
+                column.warn(format!("{many}; taken as missing"));
             }
         }
     }
