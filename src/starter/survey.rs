@@ -4,7 +4,7 @@ use std::path::Path;
 
 use athermal::core::document::{TableBase, TableFormat};
 use athermal::files::{
-    ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
+    CellFault, ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -60,20 +60,22 @@ pub struct Unreadable {
 
 impl Unreadable {
     fn of(error: &FileError) -> Option<Self> {
-        let (found, line, mark) = match error {
-            FileError::BadCell { found, place, .. } => (found, place.line, None),
-            FileError::MixedMarks {
-                found,
-                place,
-                mark,
-                since,
-                ..
-            } => (found, place.line, Some((*mark, *since))),
-            _ => return None,
+        let FileError::BadCell {
+            found,
+            place,
+            fault,
+            ..
+        } = error
+        else {
+            return None;
+        };
+        let mark = match fault {
+            CellFault::OtherMark { mark, since } => Some((*mark, *since)),
+            _ => None,
         };
         let found = found.replace(char::is_control, "\u{fffd}");
         Some(Self {
-            example: format!("`{found}` in line {line}"),
+            example: format!("`{found}` in line {}", place.line),
             found,
             mark,
         })

@@ -317,7 +317,7 @@ impl CsvRows {
         if let Some(error) = unusable {
             ledger.refuse_header(error)?;
             if cells >= self.names.len() && !columns.agree_with(&self.columns) {
-                // Rows have no time until the columns are named so that they can be told apart.
+                // Rows have no time until names say which columns are which.
                 self.columns.time.fill(None);
             }
             return Ok(true);

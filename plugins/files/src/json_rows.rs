@@ -171,7 +171,7 @@ impl Cells for JsonRows {
                 })?,
             }
         }
-        // Of what never ends whoever asked was told at the first object, and another may have them when it goes on.
+        // Of what never ends that was reported at the first object, and another may have them when it goes on.
         match self.never_seen() {
             Some(error) if ledger.on_first.is_none() => Err(error),
             _ => Ok(false),

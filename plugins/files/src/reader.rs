@@ -15,7 +15,9 @@ use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
 use crate::long::Long;
-use crate::{Again, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn};
+use crate::{
+    Again, CellFault, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn,
+};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -455,7 +457,10 @@ impl Reading {
             if read.is_none() && rows.take_header(ledger)? {
                 return Ok(None);
             }
-            ledger.refuse_row(|| no_instant(time, read, rows.place(), cell::trim(rows.time())))?;
+            ledger.refuse_row(|| {
+                let (cell, fault) = (cell::trim(rows.time()), no_instant(time, read));
+                bad_cell(rows.place(), &time.columns.to_string(), cell, fault)
+            })?;
             return Ok(None);
         };
         if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
@@ -466,7 +471,10 @@ impl Reading {
         } else if self.commas.times
             && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
         {
-            ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
+            ledger.refuse_row(|| {
+                let column = time.columns.to_string();
+                bad_cell(rows.place(), &column, cell, other_mark(mark))
+            })?;
             return Ok(None);
         }
         Ok(Some(at.as_ns()))
@@ -510,50 +518,46 @@ impl Reading {
                 if self.commas.values
                     && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
             {
-                ledger.bad_cell(index, || mixed(rows.place(), column, cell, mark))?;
+                ledger.bad_cell(index, || {
+                    bad_cell(rows.place(), column, cell::trim(cell), other_mark(mark))
+                })?;
             }
             Some(value) => return Ok(value),
-            None => ledger.bad_cell(index, || FileError::BadCell {
-                place: rows.place(),
-                column: column.clone(),
-                found: excerpt(cell::trim(cell)),
+            None => ledger.bad_cell(index, || {
+                bad_cell(rows.place(), column, cell::trim(cell), CellFault::NoNumber)
             })?,
         }
         Ok(f64::NAN)
     }
 }
 
+/// A cell that is not taken.
+fn bad_cell(place: Place, column: &str, cell: &[u8], fault: CellFault) -> FileError {
+    FileError::BadCell {
+        place,
+        column: column.to_owned(),
+        found: excerpt(cell),
+        fault,
+    }
+}
+
 /// What is wrong with a time that is no instant, read as this.
-fn no_instant(time: &TimeColumn, read: Option<Civil>, place: Place, cell: &[u8]) -> FileError {
-    let (column, found) = (time.columns.to_string(), excerpt(cell));
+fn no_instant(time: &TimeColumn, read: Option<Civil>) -> CellFault {
     match (read, &time.zone) {
-        (Some(Civil::Skipped { offset_s }), Some(zone)) => FileError::TimeSkipped {
-            place,
-            column,
-            found,
+        (Some(Civil::Skipped { offset_s }), Some(zone)) => CellFault::TimeSkipped {
             zone: zone.to_string(),
             offset_s,
         },
-        (Some(_), _) => FileError::TimeBeyond {
-            place,
-            column,
-            found,
-        },
-        (None, _) => FileError::BadTime {
-            place,
-            column,
-            found,
+        (Some(_), _) => CellFault::TimeBeyond,
+        (None, _) => CellFault::NoTime {
             expected: time.form.expected(),
         },
     }
 }
 
 /// What is wrong with a number that has another decimal mark than those since that line.
-fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, Option<u64>)) -> FileError {
-    FileError::MixedMarks {
-        place,
-        column: column.to_owned(),
-        found: excerpt(cell::trim(cell)),
+fn other_mark((mark, since): (u8, Option<u64>)) -> CellFault {
+    CellFault::OtherMark {
         mark: char::from(mark),
         since,
     }

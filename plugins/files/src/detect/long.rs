@@ -73,7 +73,7 @@ impl LongFormat {
         let names = all.clone().filter(is_text).find(|&column| {
             let different: BTreeSet<&str> = cells(column).collect();
             let is_called = called(column, &NAMES) && all.clone().any(|column| is_value(&column));
-            different.len() > 1 && (is_called || cells(column).any(is_wanted))
+            is_called || different.len() > 1 && cells(column).any(is_wanted)
         })?;
         let values = all
             .clone()
@@ -87,18 +87,6 @@ impl LongFormat {
             names: columns[names].clone(),
             values: columns[values].clone(),
         })
-    }
-
-    /// The column of names, and the name, where columns are called as in long format and all rows have one name.
-    pub(crate) fn of_one_name(columns: &[String], rows: &[Vec<String>]) -> Option<(usize, String)> {
-        let called = |known: &[&str]| {
-            let mut names = columns.iter();
-            names.position(|name| known.contains(&&*name.to_lowercase()))
-        };
-        let (names, _) = (called(&NAMES)?, called(&VALUES)?);
-        let mut cells = rows.iter().filter_map(|row| row.get(names));
-        let first = cells.next().filter(|first| !is_number(first))?;
-        (columns.len() <= WIDEST && cells.all(|cell| cell == first)).then(|| (names, first.clone()))
     }
 }
 
@@ -131,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_for_each_value_is_seen_by_its_names_and_told_with_a_way_out() {
+    fn a_row_for_each_value_is_seen_by_its_names_and_refused_with_a_way_out() {
         let long = of("time;tag;value\n0;plate;21,5\n0;Z;3\n1;plate;21,6\n", "").unwrap();
         assert_eq!(
             long.to_string(),
@@ -150,6 +138,6 @@ mod tests {
     #[test]
     fn a_column_of_text_beside_others_makes_no_long_format() {
         assert_eq!(of("time;state;Z_nm\n0;on;1\n1;off;2\n", "Z_nm"), None);
-        assert_eq!(of("time;name;value\n0;A;1\n1;A;2\n", ""), None);
+        assert_eq!(of("time;name;level\n0;A;1\n1;A;2\n", ""), None);
     }
 }
