@@ -74,6 +74,8 @@ struct Reading {
     layout: Layout,
     ledger: Ledger,
     commas: Commas,
+    /// The text of the time of the row that was read last.
+    time: Vec<u8>,
     /// Which cell says the segment of a row, after those of the channels.
     segment_cell: Option<usize>,
     /// The segment of the row that was read last.
@@ -114,16 +116,6 @@ struct Stamped {
     row: Row,
     cell: Vec<u8>,
     place: Place,
-}
-
-impl Stamped {
-    fn new<C: Cells>(row: &Row, rows: &C) -> Self {
-        Self {
-            row: row.clone(),
-            cell: cell::trim(rows.time()).to_vec(),
-            place: rows.place(),
-        }
-    }
 }
 
 impl Reader {
@@ -209,6 +201,7 @@ impl Reader {
                 layout,
                 ledger,
                 commas: Commas::of(table, separator),
+                time: Vec::new(),
                 segment_cell,
                 segment: Vec::new(),
                 long,
@@ -336,16 +329,25 @@ impl Reading {
         match self.read(rows, row)? {
             None => return Ok(false),
             Some(Follows::Leaping) => {
-                let doubted = Stamped::new(row, rows);
+                let doubted = self.stamped(row, rows);
                 return self.next_doubted(rows, doubted, row);
             }
             Some(Follows::Again) => {}
             Some(_) => {
-                let cell = cell::trim(rows.time());
-                self.ledger.take(row.time_ns, cell, row.begins_segment);
+                self.ledger
+                    .take(row.time_ns, &self.time, row.begins_segment);
             }
         }
         Ok(true)
+    }
+
+    /// The row that was read last.
+    fn stamped<C: Cells>(&self, row: &Row, rows: &C) -> Stamped {
+        Stamped {
+            row: row.clone(),
+            cell: self.time.clone(),
+            place: rows.place(),
+        }
     }
 
     /// How a row follows the last one that was taken; the first of a segment follows none.
@@ -366,7 +368,7 @@ impl Reading {
     ) -> Result<bool, FileError> {
         while self.follows(&doubted.row) == Follows::Leaping {
             let next = match self.read(rows, row) {
-                Ok(Some(_)) => Stamped::new(row, rows),
+                Ok(Some(_)) => self.stamped(row, rows),
                 Ok(None) if !self.ledger.knows_leaps() => break,
                 end => {
                     self.ledger.refuse_leap(&doubted.cell, doubted.place, None);
@@ -418,11 +420,10 @@ impl Reading {
             });
             let follows = self.follows(row);
             if self.ledger.refuses(follows) {
-                let cell = cell::trim(rows.time());
                 if self.long.is_some() && follows == Follows::Behind {
-                    return Err(self.ledger.out_of_order(cell, rows.place()));
+                    return Err(self.ledger.out_of_order(&self.time, rows.place()));
                 }
-                self.ledger.refuse(follows, cell, || rows.place());
+                self.ledger.refuse(follows, &self.time, || rows.place());
                 continue;
             }
             self.read_values(rows, &mut row.values)?;
@@ -441,9 +442,11 @@ impl Reading {
         rows: &mut C,
         text: &mut String,
     ) -> Result<Option<i64>, FileError> {
-        let cell = cell::trim(rows.time());
         text.clear();
         let (time, ledger) = (&self.layout.time, &mut self.ledger);
+        time.columns
+            .join(&mut self.time, |column| cell::trim(rows.time(column)));
+        let cell = self.time.as_slice();
         let read = std::str::from_utf8(cell).ok().and_then(|cell| {
             text.push_str(cell);
             if self.commas.times
@@ -458,8 +461,8 @@ impl Reading {
                 return Ok(None);
             }
             ledger.refuse_row(|| {
-                let (cell, fault) = (cell::trim(rows.time()), no_instant(time, read));
-                bad_cell(rows.place(), &time.columns.to_string(), cell, fault)
+                let column = time.columns.to_string();
+                bad_cell(rows.place(), &column, cell, no_instant(time, read))
             })?;
             return Ok(None);
         };
