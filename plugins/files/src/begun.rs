@@ -45,7 +45,11 @@ impl Begun {
         };
         // Only a part of the file is read, whose lines are counted from where it begins.
         let of_line = |line: &str, error: FileError| {
-            let message = error.to_string();
+            let message = match (&error, format) {
+                (FileError::Empty { .. }, Format::Csv) => "it names no columns".to_owned(),
+                (FileError::Empty { .. }, Format::JsonLines) => "it is no JSON object".to_owned(),
+                _ => error.to_string(),
+            };
             let place = error.place().map(|place| format!("{place}: "));
             let what = place.and_then(|place| message.strip_prefix(&place));
             other(format!("{line}: {}", what.unwrap_or(&message)))
