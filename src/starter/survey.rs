@@ -282,14 +282,15 @@ impl Survey {
             {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
-                    Some((mark, Some(since))) => format!(
-                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write all numbers of a \
-                         file with one mark"
-                    ),
-                    Some((mark, None)) => format!(
-                        "it has numbers such as {example}, but the decimal mark of the others is `{mark}`; write all numbers of a file \
-                         with one mark"
-                    ),
+                    Some((mark, since)) => {
+                        let of_others = match since {
+                            Some(line) => format!("since line {line} the decimal mark is"),
+                            None => "the decimal mark of the others is".to_owned(),
+                        };
+                        format!(
+                            "it has numbers such as {example}, but {of_others} `{mark}`; write all numbers of a file with one mark"
+                        )
+                    }
                     None if first.is_some_and(|first| has_clock(&first.found)) => {
                         format!("it has other times, such as {example}")
                     }
@@ -305,15 +306,15 @@ impl Survey {
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));
             } else if series.unreadable > 0 {
-                let (many, the_first) = match series.unreadable {
-                    1 => ("1 cell".to_owned(), ""),
-                    more => (counted(more, "cell"), ", the first"),
+                let (cells, all) = (counted(series.unreadable, "cell"), count(cells));
+                let such = if series.unreadable > 1 {
+                    ", the first"
+                } else {
+                    ""
                 };
-                let many = format!(
-                    "{many} of {} cannot be read{the_first} {example}",
-                    count(cells)
-                );
-                column.warn(format!("{many}; taken as missing"));
+                column.warn(format!(
+                    "{cells} of {all} cannot be read{such} {example}; taken as missing"
+                ));
             }
         }
     }
