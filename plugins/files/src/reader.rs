@@ -486,24 +486,17 @@ impl Reading {
     fn read_values<C: Cells>(&mut self, rows: &C, values: &mut Vec<f64>) -> Result<(), FileError> {
         values.clear();
         let channels = self.layout.channels.len();
-        match self.long.take() {
-            None => {
-                for index in 0..channels {
-                    let value = self.read_value(rows, index, rows.channel(index))?;
-                    values.push(value);
-                }
+        if self.long.is_none() {
+            for index in 0..channels {
+                let value = self.read_value(rows, index, rows.channel(index))?;
+                values.push(value);
             }
-            Some(long) => {
-                values.resize(channels, f64::NAN);
-                let channels = long.channels().iter();
-                let read = channels.map(|&index| {
-                    values[index] = self.read_value(rows, index, rows.channel(1))?;
-                    Ok(())
-                });
-                let read = read.collect();
-                self.long = Some(long);
-                return read;
-            }
+            return Ok(());
+        }
+        values.resize(channels, f64::NAN);
+        let of_row = |long: &Long| long.channels().to_vec();
+        for index in self.long.as_ref().map_or(Vec::new(), of_row) {
+            values[index] = self.read_value(rows, index, rows.channel(1))?;
         }
         Ok(())
     }
