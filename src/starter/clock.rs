@@ -25,24 +25,14 @@ pub struct Clock {
     pub(super) other: Option<TimeFormat>,
 }
 
-const NAMES: [&str; 16] = [
-    "time",
-    "timestamp",
-    "datetime",
-    "date",
-    "utc",
-    "epoch",
-    "ts",
-    "t",
-    "datum",
-    "zeit",
-    "uhrzeit",
-    "clock",
-    "elapsed",
-    "sample",
-    "index",
-    "n",
-];
+/// What a time is called, the likeliest first.
+const NAMES: &str =
+    "time timestamp datetime date utc epoch ts t datum zeit uhrzeit clock elapsed sample index n";
+
+/// The place of a word among the names of a time.
+fn place_of(word: &str) -> Option<usize> {
+    NAMES.split(' ').position(|name| name == word)
+}
 
 /// A unit of a time column's name, as a graph file names it, in nanoseconds.
 type Unit = (&'static str, &'static str, i64);
@@ -141,8 +131,7 @@ pub fn find(
     let rank = |index: usize| {
         let name = described.columns[index].to_lowercase();
         let first = words_of_time(&name).into_iter().next().unwrap_or_default();
-        let known = NAMES.iter().position(|known| *known == first);
-        known.unwrap_or(NAMES.len())
+        place_of(first).unwrap_or(usize::MAX)
     };
     let likely = (0..described.columns.len()).filter(may_be);
     let likely = likely.map(|index| (rank(index), Texts::of(described, index)));
@@ -154,7 +143,7 @@ pub fn find(
     // Beside what is meant to be a time, no other column that happens to grow is one.
     let mut found = likely
         .iter()
-        .filter(|(rank, _)| unread.is_none() || *rank < NAMES.len())
+        .filter(|(rank, _)| unread.is_none() || *rank < usize::MAX)
         .filter_map(|(_, texts)| clock(texts));
     match (found.next(), unread) {
         (Some(clock), _) => Ok(clock),
@@ -162,7 +151,7 @@ pub fn find(
         (None, None)
             if let Some(back) = likely
                 .iter()
-                .find(|(rank, texts)| *rank < NAMES.len() && goes_back(texts)) =>
+                .find(|(rank, texts)| *rank < usize::MAX && goes_back(texts)) =>
         {
             Err(no_clock(&back.1, format))
         }
@@ -242,7 +231,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         pairs.filter(|pair| is(&pair[1], &pair[0])).count()
     };
     let (all, advance) = (numbers.len() - 1, steps(f64::gt));
-    let is_called = parts.first().is_some_and(|first| NAMES.contains(first));
+    let is_called = parts.first().is_some_and(|first| place_of(first).is_some());
     let stands = is_called && steps(f64::ge) * 100 >= all * 95 && advance * 10 >= all;
     if advance * 100 < all * 95 && !stands {
         return None;

@@ -82,37 +82,16 @@ impl Unreadable {
     }
 }
 
-/// What programs write where they have no value, in small letters.
-const NO_VALUES: [&str; 23] = [
-    "-",
-    "--",
-    "---",
-    "?",
-    "*",
-    "na",
-    "n/a",
-    "n.a.",
-    "k.a.",
-    "#n/a",
-    "#nv",
-    "#wert!",
-    "#value!",
-    "#num!",
-    "#div/0!",
-    "none",
-    "bad",
-    "no data",
-    "nodata",
-    "no value",
-    "overrange",
-    "i/o timeout",
-    "1.#qnan",
-];
+/// What programs write where they have no value, in small letters, between bars.
+const NO_VALUES: &str = "-|--|---|?|*|na|n/a|n.a.|k.a.|#n/a|#nv|#wert!|#value!|#num!|#div/0!|none|bad|no data|nodata|no value|overrange|i/o timeout|1.#qnan";
 
 impl Unreadable {
     /// Whether it is what stands for no value.
     fn is_none(&self) -> bool {
-        NO_VALUES.contains(&&*self.found.to_lowercase())
+        {
+            let found = self.found.to_lowercase();
+            NO_VALUES.split('|').any(|none| none == found)
+        }
     }
 }
 

@@ -19,35 +19,8 @@ pub struct LongFormat {
 }
 
 /// How such columns are usually called.
-const NAMES: [&str; 16] = [
-    "tag",
-    "tagname",
-    "name",
-    "variable",
-    "varname",
-    "signal",
-    "channel",
-    "sensor",
-    "parameter",
-    "point",
-    "item",
-    "metric",
-    "variable_name",
-    "tag_name",
-    "kanal",
-    "messstelle",
-];
-const VALUES: [&str; 9] = [
-    "value",
-    "val",
-    "values",
-    "data",
-    "reading",
-    "varvalue",
-    "wert",
-    "messwert",
-    "measurement",
-];
+const NAMES: &str = "tag tagname name variable varname signal channel sensor parameter point item metric variable_name tag_name kanal messstelle";
+const VALUES: &str = "value val values data reading varvalue wert messwert measurement";
 
 /// A wider table is none.
 const WIDEST: usize = 8;
@@ -63,16 +36,18 @@ impl LongFormat {
             let cells = rows.iter().filter_map(move |row| row.get(column));
             cells.map(String::as_str).filter(|cell| !cell.is_empty())
         };
-        let called =
-            |column: usize, known: &[&str]| known.contains(&&*columns[column].to_lowercase());
+        let called = |column: usize, known: &str| {
+            let name = columns[column].to_lowercase();
+            known.split(' ').any(|of| of == name)
+        };
         let all = 0..columns.len();
         let is_text =
             |&column: &usize| !cells(column).any(|cell| is_number(cell) || has_clock(cell));
-        let is_value = |&column: &usize| called(column, &VALUES) && cells(column).any(is_number);
+        let is_value = |&column: &usize| called(column, VALUES) && cells(column).any(is_number);
         let numbers = |&column: &usize| cells(column).any(is_number);
         let names = all.clone().filter(is_text).find(|&column| {
             let different: BTreeSet<&str> = cells(column).collect();
-            let is_called = called(column, &NAMES) && all.clone().any(|column| is_value(&column));
+            let is_called = called(column, NAMES) && all.clone().any(|column| is_value(&column));
             is_called || different.len() > 1 && cells(column).any(is_wanted)
         })?;
         let values = all
