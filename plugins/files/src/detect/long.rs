@@ -1,5 +1,5 @@
-//! Whether a table is in long format, a row for each value, and what its columns then are. It is not read: whoever wrote it knows best
-//! which rows belong to one instant.
+//! Whether a table is in long format, a row for each value, and what its columns then are. It is read where it is
+//! declared.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -74,9 +74,9 @@ impl fmt::Display for LongFormat {
         } = self;
         write!(
             f,
-            "the log is in long format: `{names}` says of each row what its `{values}` is, where a column for each signal is expected, and \
-             a row for each time; pivot it, in pandas by `.pivot(index=\"{time}\", columns=\"{names}\", values=\"{values}\")`, and \
-             give the result"
+            "the log is in long format: `{names}` says of each row what its `{values}` is; declare that in `[table]` by `layout = \"long\"`, \
+             `name = \"{names}\"` and `value = \"{values}\"`, or pivot it to a column for each signal, in pandas by \
+             `.pivot(index=\"{time}\", columns=\"{names}\", values=\"{values}\")`"
         )
     }
 }
@@ -98,8 +98,9 @@ mod tests {
         let long = of("time;tag;value\n0;plate;21,5\n0;Z;3\n1;plate;21,6\n", "").unwrap();
         assert_eq!(
             long.to_string(),
-            "the log is in long format: `tag` says of each row what its `value` is, where a column for each signal is expected, and a row \
-             for each time; pivot it, in pandas by `.pivot(index=\"time\", columns=\"tag\", values=\"value\")`, and give the result"
+            "the log is in long format: `tag` says of each row what its `value` is; declare that in `[table]` by `layout = \"long\"`, \
+             `name = \"tag\"` and `value = \"value\"`, or pivot it to a column for each signal, in pandas by \
+             `.pivot(index=\"time\", columns=\"tag\", values=\"value\")`"
         );
         let otherwise = "wann;was;wieviel\n2026-03-01 12:00;plate;21\n2026-03-01 12:00;Z;3\n";
         assert_eq!(of(otherwise, "room"), None);
