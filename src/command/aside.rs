@@ -1,4 +1,4 @@
-//! Decides how a whole file comes to be at a path: aside first, then by its name; not what is in it.
+//! Writing whole files: beside their place first, then renamed, so that a reader never sees half of one.
 
 use std::fs;
 use std::io::{self, Write};
@@ -78,7 +78,7 @@ pub fn not_written(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}", path.display())
 }
 
-/// The same for who tells of an error otherwise.
+/// The same with the bare error.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -120,7 +120,7 @@ fn put(
     make(&aside)
         .and_then(|()| fs::rename(&aside, path))
         .inspect_err(|_| {
-            // Half a file is of no use, and on a disk that is full it takes the room of the next. What went wrong is told already.
+            // Half a file is of no use, and on a full disk it takes the room of the next.
             let _ = fs::remove_file(&aside);
         })
 }

@@ -1,4 +1,4 @@
-//! Decides what programs are told of rows and cells that a reader does not take; in what words people are told, its errors say.
+//! Rows and cells that a reader does not take, as events for programs.
 
 use athermal::files::{CellFault, FileError};
 use serde_json::{Value, json};

@@ -19,6 +19,7 @@ mod rest;
 pub mod sensor;
 pub mod silence;
 pub mod standstill;
+pub mod watch;
 pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
@@ -58,7 +59,7 @@ pub struct Diagnosis {
     pub designs: Vec<regressor::Design>,
     /// What each sensor contributes.
     pub contributions: Vec<sensor::Contribution>,
-    /// What could not be told of sensors, and which node gave nothing.
+    /// What could not be found of sensors, and which node gave nothing.
     pub untold: Vec<Untold>,
     /// Combiners that went by fewer truths than they take, whichever predictions are asked for.
     pub lacks: Vec<Lack>,
@@ -117,7 +118,7 @@ impl Diagnosis {
     }
 }
 
-/// Diagnoses a model on a recording. `progress` is told how many fits of how many are done.
+/// Diagnoses a model on a recording. `progress` gets the number of fits done, and of all.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.
@@ -166,7 +167,7 @@ pub fn diagnose(
     Ok((diagnosis, observation))
 }
 
-/// The slots from which others follow, these included, where `reads` tells those that a node goes by.
+/// The slots from which others follow, these included, where `reads` gives those that a node goes by.
 fn upstream(
     plan: &Plan,
     mut waiting: Vec<usize>,

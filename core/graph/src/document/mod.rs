@@ -11,7 +11,7 @@ mod json;
 mod lacks;
 mod merge;
 mod pattern;
-mod problem;
+pub mod problem;
 mod read;
 mod salvage;
 mod slip;
