@@ -36,8 +36,8 @@ outside failed, such as reading a file.";
 pub fn command_line() -> ExitCode {
     let arguments = Arguments::parse();
     let mut terminal = terminal::Terminal::new(&arguments.terminal);
-    terminal.events = terminal.format == Format::Json && arguments.command.tells_programs();
-    told_in_a_line();
+    terminal.events = terminal.format == Format::Json && arguments.command.writes_events();
+    report_panics_in_a_line();
     match caught(|| arguments.command.run(&terminal)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
@@ -64,7 +64,7 @@ fn caught(command: impl FnOnce() -> Result<Answer, Failure>) -> Result<Answer, F
 }
 
 /// Reports a panic in one line, unless `RUST_BACKTRACE` asks for the way to it.
-fn told_in_a_line() {
+fn report_panics_in_a_line() {
     let in_full = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
         if std::env::var_os("RUST_BACKTRACE").is_some_and(|wanted| wanted != "0") {
@@ -76,10 +76,10 @@ fn told_in_a_line() {
 }
 
 fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
-    let said = said(panic.payload());
+    let message = said(panic.payload());
     match panic.location() {
-        Some(place) => format!("panic at {place}: {said}"),
-        None => format!("panic: {said}"),
+        Some(place) => format!("panic at {place}: {message}"),
+        None => format!("panic: {message}"),
     }
 }
 

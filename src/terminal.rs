@@ -80,13 +80,13 @@ impl Terminal {
     /// Notes something that the user should know beside the result.
     pub fn note(&self, message: impl Into<Message>) {
         if !self.quiet {
-            self.tell("note", None, &message.into());
+            self.write("note", None, &message.into());
         }
     }
 
     /// Warns of what is not as it should be, but did not stop the work.
     pub fn warning(&self, message: impl Into<Message>) {
-        self.tell("warning", Some("\x1b[1;33m"), &message.into());
+        self.write("warning", Some("\x1b[1;33m"), &message.into());
     }
 
     /// Reports why the program gives up.
@@ -111,10 +111,10 @@ impl Terminal {
                 diagnostics,
                 sources,
             } => self.diagnostics(diagnostics, sources),
-            Failure::Told(_) => {}
+            Failure::Exit(_) => {}
             Failure::Request(text) | Failure::Outside(text) => {
                 let message = Message::new("error", Value::Null, text);
-                self.tell("error", Some("\x1b[1;31m"), &message);
+                self.write("error", Some("\x1b[1;31m"), &message);
             }
         }
     }
@@ -145,10 +145,10 @@ impl Terminal {
             for of in all["diagnostics"].as_array().into_iter().flatten() {
                 let text = |key: &str| of[key].as_str().unwrap_or_default();
                 let message = Message::new("diagnostic", of.clone(), text("message"));
-                self.say(message.line(text("severity")));
+                self.print(message.line(text("severity")));
             }
         } else if !diagnostics.is_empty() {
-            self.say(diagnostics.render(sources, self.colour, 100).trim_end());
+            self.print(diagnostics.render(sources, self.colour, 100).trim_end());
         }
     }
 
@@ -178,21 +178,21 @@ impl Terminal {
     }
 
     /// Writes an event for programs or a line for people, with a label of this colour where it is graver than a note.
-    fn tell(&self, level: &str, colour: Option<&str>, message: &Message) {
+    fn write(&self, level: &str, colour: Option<&str>, message: &Message) {
         match colour {
-            _ if self.events => self.say(message.line(level)),
+            _ if self.events => self.print(message.line(level)),
             Some(colour) if self.colour => {
-                self.say(format_args!(
+                self.print(format_args!(
                     "{colour}{level}\x1b[0m\x1b[1m:\x1b[0m {message}"
                 ));
             }
-            Some(_) => self.say(format_args!("{level}: {message}")),
-            None => self.say(message),
+            Some(_) => self.print(format_args!("{level}: {message}")),
+            None => self.print(message),
         }
     }
 
     /// A reader of standard error that has gone away is no reason to stop.
-    fn say(&self, text: impl fmt::Display) {
+    fn print(&self, text: impl fmt::Display) {
         let _ = writeln!(std::io::stderr(), "{text}");
     }
 }
@@ -206,7 +206,7 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
     out.write_all(bytes)
         .and_then(|()| out.flush())
         .map_err(|error| match error.kind() {
-            std::io::ErrorKind::BrokenPipe => Failure::Told(0),
+            std::io::ErrorKind::BrokenPipe => Failure::Exit(0),
             _ => Failure::Outside(format!("cannot write to standard output: {error}")),
         })
 }
@@ -221,7 +221,7 @@ pub struct Progress {
 
 impl Progress {
     /// Shows how many have been done so far.
-    pub fn tell(&mut self, done: u64) {
+    pub fn set(&mut self, done: u64) {
         self.bar.set_position(done);
         if self.waits && self.bar.elapsed() >= Duration::from_secs(1) {
             self.waits = false;
@@ -274,7 +274,7 @@ pub enum Failure {
     /// Something outside did not work.
     Outside(String),
     /// It was reported before; the program ends with this status.
-    Told(u8),
+    Exit(u8),
 }
 
 impl Failure {
@@ -285,7 +285,7 @@ impl Failure {
             Self::Request(_) => 2,
             Self::Graph { diagnostics, .. } => status_of(diagnostics),
             Self::Outside(_) => 3,
-            Self::Told(code) => *code,
+            Self::Exit(code) => *code,
         })
     }
 }
@@ -321,7 +321,7 @@ impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         if error.is_closed_pipe() {
             // Whoever read our output has seen enough.
-            return Self::Told(0);
+            return Self::Exit(0);
         }
         match error {
             FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {

@@ -44,7 +44,7 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 
 /// Warns of them.
 /// Warns of them.
-pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
+pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
     for of in all {
         let words = format!(
             "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
@@ -65,7 +65,7 @@ pub fn is_beyond(usual: &SampleRange, sample: f64) -> bool {
 }
 
 /// Warns of the first such sample of a channel.
-pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
+pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
     if let Some(doubt) = doubt(usual, sample, sample) {
         let words = format!(
             "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",

@@ -117,7 +117,7 @@ impl Check {
             let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
             if let Some(machine) = machine {
-                unread::tell(terminal, path, &machine.graph);
+                unread::warn(terminal, path, &machine.graph);
                 fine.push((path, machine.plan));
             }
         }
@@ -144,7 +144,7 @@ impl Check {
             }
         }
         if diagnostics.has_errors() {
-            Err(Failure::Told(status_of(&diagnostics)))
+            Err(Failure::Exit(status_of(&diagnostics)))
         } else if self.strict && !diagnostics.is_empty() {
             Ok(Answer::No)
         } else {

@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 
 use self::table::{describe, is_one_of_several};
 use super::beyond;
-use super::data::{self, Data, FITS, recording, tell_overlap};
+use super::data::{self, Data, FITS, recording, warn_overlap};
 use super::doubts;
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
@@ -98,10 +98,10 @@ impl Once<'_> {
         }
     }
 
-    fn tell_beyond(&mut self, report: &FitReport, trace: &Trace) {
+    fn warn_beyond(&mut self, report: &FitReport, trace: &Trace) {
         let new = |range: &&SampleRange| beyond::usual(&self.in_fits, &range.channel).is_none();
         let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
-        beyond::tell(self.terminal, &beyond::beyond(&new, &trace.ranges));
+        beyond::warn(self.terminal, &beyond::beyond(&new, &trace.ranges));
         self.in_fits.extend(new);
     }
 }
@@ -134,7 +134,7 @@ impl Compare {
                 println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
             }
         }
-        tell(terminal, &comparisons, &fits);
+        warn(terminal, &comparisons, &fits);
         Ok(if failed(terminal, &fits) {
             Answer::No
         } else {
@@ -200,7 +200,7 @@ impl Compare {
             let mut look = |_: &Engine, _: Event| {
                 ticks += 1;
                 if ticks % 4096 == 0 {
-                    progress.tell(ticks);
+                    progress.set(ticks);
                 }
             };
             let trace = trace_as(&model.plan, &model.fitted, &watch, scored, &mut look)
@@ -210,9 +210,9 @@ impl Compare {
             let rejected = &trace.rejected;
             once.warn(data::doubts(&model.plan, &reports, trace.refused, rejected));
             once.note(data::without_zone(&reports));
-            once.tell_beyond(&report, &trace);
+            once.warn_beyond(&report, &trace);
             if fits.is_empty() && !report.estimators.is_empty() {
-                self.tell_fitted_on(terminal, &report, &trace);
+                self.warn_fitted_on(terminal, &report, &trace);
             }
             let faults = watch.found();
             once.warn(faults::messages(&fit.faults));
@@ -256,14 +256,14 @@ impl Compare {
         };
         let on = self.data.others(self.on.clone());
         let mut facts = json!({ "data": self.data.names(), "on": on.names() });
-        self.scored.tell(&mut facts);
+        self.scored.add_to(&mut facts);
         facts["graphs"] = fits.iter().map(of).collect();
         facts["comparisons"] = json!(comparisons);
         facts
     }
 
     /// Warns where graphs are scored on the data of their fit.
-    fn tell_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
+    fn warn_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
         let same = |on: &&PathBuf| {
             self.data
                 .paths()
@@ -285,7 +285,7 @@ impl Compare {
         let scored = times().min().zip(times().max());
         if let Some(((from, to), (first, last))) = report.period.zip(scored) {
             let fit = (seconds(from), seconds(to));
-            tell_overlap(terminal, fit, (seconds(first), seconds(last)));
+            warn_overlap(terminal, fit, (seconds(first), seconds(last)));
         }
     }
 }
@@ -311,12 +311,12 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
 }
 
 /// Warns of what makes scores say less than they seem to.
-fn tell(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
+fn warn(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
     if comparisons.is_empty() {
         terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
     }
     for comparison in comparisons {
-        tell_left_out(terminal, comparison);
+        warn_left_out(terminal, comparison);
     }
     for column in comparisons.iter().flat_map(|of| &of.truths) {
         if !column.otherwise.is_empty() {
@@ -329,14 +329,14 @@ fn tell(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
         }
     }
     for fit in fits {
-        for message in Lack::told(&fit.lacks) {
+        for message in Lack::warnings(&fit.lacks) {
             terminal.warning(format_args!("{}: {message}", fit.graph));
         }
     }
 }
 
 /// Warns where the scores hide what happens while a prediction has no value.
-fn tell_left_out(terminal: &Terminal, comparison: &Comparison) {
+fn warn_left_out(terminal: &Terminal, comparison: &Comparison) {
     for column in &comparison.truths {
         if let Some((left_out, row)) = column.left_out {
             let Row { graph, node, .. } = &comparison.rows[row];

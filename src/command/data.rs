@@ -140,7 +140,7 @@ impl Data {
 
     /// Warns of files on which the model was fitted, and of data from the time of its fit: scores on them say little. `period` is that
     /// of the data, in s.
-    pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
+    pub fn warn_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
         let cards = model.card.iter().flat_map(|card| &card.data);
         let seen = |path: &&Path| cards.clone().any(|card| card.is_of(path));
         let mut again = false;
@@ -153,7 +153,7 @@ impl Data {
         }
         let of_fit = model.card.as_ref().and_then(|card| card.period);
         if !again && let Some((fit, data)) = of_fit.zip(period) {
-            tell_overlap(terminal, (fit.from_s, fit.to_s), data);
+            warn_overlap(terminal, (fit.from_s, fit.to_s), data);
         }
     }
 
@@ -181,7 +181,7 @@ impl Data {
 pub const FITS: &str = "the scores show how well it fits, not how well it predicts";
 
 /// Warns of dated data from the time of a fit, both in s.
-pub fn tell_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
+pub fn warn_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
     let shared = (fit.0.max(data.0), fit.1.min(data.1));
     let length = |(from, to): (f64, f64)| to - from;
     // Other times begin anew with each recording.
@@ -252,18 +252,18 @@ pub fn without_zone(reports: &[(String, Report)]) -> Option<String> {
 
 /// Warns of rows and cells that were not taken, of rejected samples, of units that differ from those of the graph, of files that
 /// count more than once, and of dates without a zone.
-pub fn tell(
+pub fn warn(
     terminal: &Terminal,
     plan: &Plan,
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    tell_doubts(terminal, doubts(plan, reports, refused, rejected), reports);
+    warn_of(terminal, doubts(plan, reports, refused, rejected), reports);
 }
 
 /// The same with doubts that are known already.
-pub fn tell_doubts(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
+pub fn warn_of(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
     for message in doubts {
         terminal.warning(message);
     }

@@ -36,15 +36,15 @@ impl Doubts<'_> {
 
     /// Warns of them.
     pub fn warn(&self, terminal: &Terminal) {
-        data::tell(
+        data::warn(
             terminal,
             self.plan,
             &self.dataset.reports(),
             self.refused,
             self.rejected,
         );
-        beyond::tell(terminal, &self.outside_fit);
-        faults::tell(terminal, &self.faults);
+        beyond::warn(terminal, &self.outside_fit);
+        faults::warn(terminal, &self.faults);
     }
 }
 

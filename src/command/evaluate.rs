@@ -80,7 +80,7 @@ impl Evaluate {
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let mut progress = terminal.progress("evaluating");
         let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
-            progress.tell(ticks)
+            progress.set(ticks)
         })?;
         drop(progress);
         let doubts = Doubts {
@@ -96,7 +96,7 @@ impl Evaluate {
                 json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
             });
             let mut facts = json!({ "data": self.data.names() });
-            self.scored.tell(&mut facts);
+            self.scored.add_to(&mut facts);
             facts["each_on_its_own"] = self.each_on_its_own.into();
             facts["period"] = json!(period);
             facts["scores"] = json!(scores.scores);
@@ -109,9 +109,9 @@ impl Evaluate {
         }
         doubts.warn(terminal);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
-        self.data.tell_fitted_on(terminal, &model, period);
-        unscored::tell(terminal, &scores.unscored);
-        for message in Lack::told(&scores.lacks) {
+        self.data.warn_fitted_on(terminal, &model, period);
+        unscored::warn(terminal, &scores.unscored);
+        for message in Lack::warnings(&scores.lacks) {
             terminal.warning(message);
         }
         let none = |of: &Score| of.valid.is_some() && of.n == 0;

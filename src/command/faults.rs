@@ -14,7 +14,7 @@ use athermal_analysis::figures::{count, counted, instant, number};
 
 /// Warns of them.
 /// Warns of them.
-pub fn tell(terminal: &Terminal, all: &[ChannelFaults]) {
+pub fn warn(terminal: &Terminal, all: &[ChannelFaults]) {
     for message in messages(all) {
         terminal.warning(message);
     }
@@ -102,7 +102,7 @@ fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
     let usual = low..=high;
     if usual.contains(&leaps.first.from) && usual.contains(&leaps.first.to) {
         return format!(
-            "did the sensor fail? {then}: no `range` tells such samples from others, so leave these rows out"
+            "did the sensor fail? {then}: no `range` takes out such samples alone, so leave these rows out"
         );
     }
     format!(

@@ -99,8 +99,8 @@ impl Fit {
         let outcome = fit_on(&mut model, &self.data, &options, terminal)?;
         let failed = outcome.report.failed().count();
         if failed > 0 && failed == outcome.report.estimators.len() {
-            self.tell(terminal, &outcome);
-            self.tell_of_no_model(terminal);
+            self.report(terminal, &outcome);
+            self.warn_of_no_model(terminal);
             return Ok(Answer::No);
         }
         let text = model.to_text().map_err(|error| {
@@ -111,7 +111,7 @@ impl Fit {
         if !to_stdout {
             write_aside(&self.output, &text)?;
         }
-        self.tell(terminal, &outcome);
+        self.report(terminal, &outcome);
         if to_stdout {
             print!("{text}");
         } else if terminal.format == Format::Table {
@@ -122,7 +122,7 @@ impl Fit {
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
-    fn tell_of_no_model(&self, terminal: &Terminal) {
+    fn warn_of_no_model(&self, terminal: &Terminal) {
         let output = self.output.display();
         if self.output.is_file() {
             terminal.warning(format_args!(
@@ -164,7 +164,7 @@ impl Fit {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, outcome: &FitOutcome) {
+    fn report(&self, terminal: &Terminal, outcome: &FitOutcome) {
         let FitOutcome {
             dataset,
             report,
@@ -230,8 +230,8 @@ pub fn fit_on(
     let mut outcome = fit_without_card(model, data, options, terminal)?;
     let doubts = std::mem::take(&mut outcome.doubts);
     let (dataset, report) = (&outcome.dataset, &outcome.report);
-    data::tell_doubts(terminal, doubts, &dataset.reports());
-    faults::tell(terminal, &outcome.faults);
+    data::warn_of(terminal, doubts, &dataset.reports());
+    faults::warn(terminal, &outcome.faults);
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
@@ -270,7 +270,7 @@ pub fn fit_without_card(
                     1 => "fitting".to_owned(),
                     _ => format!("fitting {fit} of {of}"),
                 });
-                progress.tell(stepped);
+                progress.set(stepped);
             }
             FitProgress::Order { node, nth, of } => {
                 progress.doing(format!("fitting `{node}`, order {nth} of {of}"));
@@ -295,7 +295,7 @@ pub fn fit_without_card(
 }
 
 /// The line of a step of a selection.
-fn tell_step(
+fn write_step(
     text: &mut String,
     nth: &str,
     step: &SelectionStep,
@@ -320,7 +320,7 @@ fn tell_step(
 const BEST_ORDERS: usize = 8;
 
 /// The table of orders that were compared, the best first.
-fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
+fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
     let ranks = orders.ranked();
     let shown = if all {
@@ -354,7 +354,7 @@ fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
     text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
     if shown < ranks.len() {
         let more = ranks.len() - shown;
-        let _ = writeln!(text, "  and {more} more, which --candidates tells");
+        let _ = writeln!(text, "  and {more} more: see --candidates");
     }
 }
 
@@ -416,14 +416,14 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         } else {
             "not".to_owned()
         };
-        tell_step(&mut text, &nth, step, (width, candidates));
+        write_step(&mut text, &nth, step, (width, candidates));
     }
     if let Some(next) = report.refused.as_ref().filter(|_| !candidates) {
         let would = format!("{} would make it R² {:.4}", next.label(), next.score);
         text.push_str(&paragraph("  no more:", 6, &would));
     }
     if let Some(orders) = &report.orders {
-        tell_orders(&mut text, orders, candidates);
+        write_orders(&mut text, orders, candidates);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {

@@ -28,7 +28,7 @@ use athermal_analysis::figures::paragraph;
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log
-    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and -o to say where its graph goes"))]
+    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
     data: PathBuf,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]

@@ -71,7 +71,7 @@ commands! {
 impl Command {
     /// Whether reports beside the result are events for programs: the result is rows.
     #[must_use]
-    pub fn tells_programs(&self) -> bool {
+    pub fn writes_events(&self) -> bool {
         matches!(self, Self::Run(_))
     }
 }

@@ -60,7 +60,7 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
 }
 
 /// Warns of the nodes of a model whose fit failed.
-pub fn tell_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
+pub fn warn_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
     let nodes = model.unfitted();
     if !nodes.is_empty() {
         terminal.warning(format_args!(

@@ -68,18 +68,18 @@ impl Report {
             of_a_pass.map_or_else(outside, |error| Failure::from(*error))
         })?;
         let course = &facts.course;
-        data::tell(
+        data::warn(
             terminal,
             &model.plan,
             &dataset.reports(),
             course.refused,
             &course.rejected,
         );
-        self.data.tell_fitted_on(terminal, &model, course.period_s);
+        self.data.warn_fitted_on(terminal, &model, course.period_s);
         if let Some(message) = feedback::in_words(&model.plan) {
             terminal.warning(message);
         }
-        for message in Lack::told(&facts.lacks) {
+        for message in Lack::warnings(&facts.lacks) {
             terminal.warning(message);
         }
         for of in &facts.unjudged {

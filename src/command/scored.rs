@@ -88,7 +88,7 @@ impl Scored {
                 "--mode k-step needs the number of steps: `--steps 3`".to_owned(),
             )),
             (other, Some(_)) => Err(Failure::Request(format!(
-                "--steps says how far `--mode k-step` predicts, and the mode is {}",
+                "--steps is for `--mode k-step`, and the mode is {}",
                 other.name()
             ))),
         }
@@ -119,7 +119,7 @@ impl Scored {
     }
 
     /// For programs: adds all that could be asked for to an object.
-    pub fn tell(&self, facts: &mut Value) {
+    pub fn add_to(&self, facts: &mut Value) {
         let limit = self.abs_truth_below.as_ref().map(Quantity::to_string);
         facts["mode"] = self.mode.name().into();
         facts["steps"] = json!(self.steps);

@@ -215,7 +215,7 @@ pub fn write_recording(
     let failed = |error: io::Error| {
         if error.kind() == io::ErrorKind::BrokenPipe {
             // Whoever read our output has seen enough.
-            return Failure::Told(0);
+            return Failure::Exit(0);
         }
         Failure::Outside(not_written(output, &error))
     };
@@ -277,7 +277,7 @@ impl Watched {
 impl Simulation for Watched {
     fn next(&mut self, row: &mut Row) -> bool {
         let more = self.simulation.next(row);
-        self.progress.tell((row.time_ns as f64 / 86_400e6) as u64);
+        self.progress.set((row.time_ns as f64 / 86_400e6) as u64);
         more
     }
 

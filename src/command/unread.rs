@@ -18,7 +18,7 @@ const UNREAD: [(&str, &str, &str); 3] = [
 ];
 
 /// Warns of the sections of a machine file that are not read.
-pub fn tell(terminal: &Terminal, path: &Path, graph: &GraphFile) {
+pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
     let written = |(key, ..): &&(&str, &str, &str)| graph.deployment.contains_key(*key);
     let unread: Vec<_> = UNREAD.iter().filter(written).collect();
     if unread.is_empty() {

@@ -7,7 +7,7 @@ use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, stated};
 
 /// Warns of them, of those with one reason together.
-pub fn tell(terminal: &Terminal, unscored: &[Unscored]) {
+pub fn warn(terminal: &Terminal, unscored: &[Unscored]) {
     let mut groups: Vec<(Vec<String>, String)> = Vec::new();
     for of in unscored {
         let (output, why) = (of.output.clone(), why(of));

@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::LazyLock;
+
 use athermal_core::node::{
     Feature, InputPort, Inputs, Kind, Mistake, Operator, OutputPort, Outputs, RoleName, Tick,
     Written, WrittenName,
@@ -10,6 +12,7 @@ use athermal_core::node::{
 use athermal_testkit::{Case, broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// Gives nothing, and keeps what another crate keeps too.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -80,7 +83,10 @@ athermal_core::inventory::submit! {
         ports: || &[],
         inputs: Keeper::inputs,
         read: athermal_core::node::read::<Keeper>,
-        schema: || schemars::schema_for!(Keeper),
+        schema: || {
+            static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Keeper).into());
+            &SCHEMA
+        },
     }
 }
 

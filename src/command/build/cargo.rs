@@ -75,7 +75,7 @@ impl Cargo {
             return Ok(());
         }
         Err(Failure::Outside(format!(
-            "cargo could not build {}; what it said stands above",
+            "cargo could not build {}; its output stands above",
             folder.display()
         )))
     }

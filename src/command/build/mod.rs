@@ -89,7 +89,7 @@ impl Build {
         let machines = known(&built, "simulate", "machines")?;
         twice("machine", &machines)?;
         place(&built, &self.output)?;
-        self.tell(terminal, &wishes, &resolved, &kinds, &machines);
+        self.report(terminal, &wishes, &resolved, &kinds, &machines);
         Ok(Answer::Fine)
     }
 
@@ -102,7 +102,7 @@ impl Build {
     }
 
     /// Prints what the new binary has.
-    fn tell(
+    fn report(
         &self,
         terminal: &Terminal,
         wishes: &[Wish],
@@ -187,7 +187,7 @@ fn twice(what: &str, all: &[Known]) -> Result<(), Failure> {
     for (nth, known) in all.iter().enumerate() {
         if let Some(other) = all[..nth].iter().find(|other| other.name == known.name) {
             return Err(Failure::Request(format!(
-                "the {what} `{}` is in {} {} and in {} {}: no graph could tell which is meant; leave one of them out, or rename it",
+                "the {what} `{}` is in {} {} and in {} {}: a graph could mean either; leave one of them out, or rename it",
                 known.name, other.package, other.version, known.package, known.version
             )));
         }
@@ -261,7 +261,7 @@ mod tests {
         };
         assert_eq!(
             message,
-            "the node type `a` is in one 0.1.0 and in two 0.1.0: no graph could tell which is meant; leave one of them out, or rename it"
+            "the node type `a` is in one 0.1.0 and in two 0.1.0: a graph could mean either; leave one of them out, or rename it"
         );
     }
 

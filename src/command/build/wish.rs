@@ -180,7 +180,7 @@ fn made_for(package: &str, core: &Value, checkout: &Checkout) -> Result<(), Fail
     {
         return Err(Failure::Request(format!(
             "{package} builds on the athermal-core in {theirs}, and this binary on that in {}: two copies do not know \
-             each other's nodes. Change the path in its Cargo.toml, or say `--athermal path:DIR` for the other",
+             each other's nodes. Change the path in its Cargo.toml, or give `--athermal path:DIR` for the other",
             ours.display()
         )));
     }

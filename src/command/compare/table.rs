@@ -61,7 +61,7 @@ fn heading(comparison: &Comparison, mode: Mode, spans: bool) -> String {
     let few = 2 * BLOCKS;
     let few = match fewest {
         Some(fewest) if fewest < few as u64 => {
-            format!("fewer than {few} instants tell nothing of ±: which is best may be chance\n")
+            format!("fewer than {few} instants give no ±: which is best may be chance\n")
         }
         _ => String::new(),
     };

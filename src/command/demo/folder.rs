@@ -133,7 +133,7 @@ mod tests {
         let mut folder = Folder::open(&path, &["a", "b"]).unwrap();
         let stopped = folder.write("a", |path| {
             write_aside(path, "half")?;
-            Err::<(), _>(Failure::Told(1))
+            Err::<(), _>(Failure::Exit(1))
         });
         assert!(stopped.is_err());
         assert!(Folder::open(&path, &["a", "b"]).is_ok());

@@ -55,7 +55,7 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
     let most = days.count - 1;
     let verdict = match enough {
-        _ if most == 1 => "two are too few to tell",
+        _ if most == 1 => "two are too few",
         _ if !compares => "nothing to compare",
         Some(enough) => {
             let days = counted(enough as u64, "day");

@@ -96,7 +96,7 @@ impl Diagnose {
         let mut bar = None;
         let mut progress = |done: u64, total: u64| {
             bar.get_or_insert_with(|| terminal.progress_to("fitting", total))
-                .tell(done);
+                .set(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
@@ -121,14 +121,14 @@ impl Diagnose {
             print!("{}", tables.text());
         }
         doubts.warn(terminal);
-        for message in Lack::told(&diagnosis.lacks) {
+        for message in Lack::warnings(&diagnosis.lacks) {
             terminal.warning(message);
         }
-        self.tell(terminal, &diagnosis);
+        self.report(terminal, &diagnosis);
         if self.of.is_empty() && terminal.format == Format::Table {
-            tell_others(terminal, &model.plan, &diagnosis);
+            note_others(terminal, &model.plan, &diagnosis);
         }
-        tell_empty(terminal, &model.plan, &diagnosis, &observation);
+        warn_empty(terminal, &model.plan, &diagnosis, &observation);
         let drifts = window::any(&model.plan);
         if self.window && !drifts {
             terminal.note("--window shows nothing, since no truth is a slope");
@@ -144,9 +144,9 @@ impl Diagnose {
         Ok(Answer::Fine)
     }
 
-    fn tell(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
+    fn report(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
         if let Some(days) = &diagnosis.days {
-            Self::tell_dropped(terminal, days);
+            Self::warn_dropped(terminal, days);
         }
         if diagnosis.main.is_empty() {
             terminal.warning(
@@ -167,7 +167,7 @@ impl Diagnose {
     }
 
     /// Warns of what only some of the fits on parts of the data had, so that they differ by more than their days.
-    fn tell_dropped(terminal: &Terminal, days: &Days) {
+    fn warn_dropped(terminal: &Terminal, days: &Days) {
         let all = days.left_out.iter().flat_map(|day| &day.dropped);
         let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
         let names: BTreeSet<&String> = all.collect();
@@ -184,7 +184,7 @@ impl Diagnose {
                     format!("fits without day {}", without.join(", "))
                 };
                 terminal.warning(format_args!(
-                    "{name} has a value in too few rows for {which}, which do without it: that tells in their scores too"
+                    "{name} has a value in too few rows for {which}, which do without it; their scores suffer from that too"
                 ));
             }
         }
@@ -210,7 +210,7 @@ impl Diagnose {
 }
 
 /// Names predictions that the graph puts out beside those that are shown.
-fn tell_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
+fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
     let outputs = plan
         .outputs
         .iter()
@@ -229,7 +229,7 @@ fn tell_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
 }
 
 /// Warns of predictions without a residual.
-fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
+fn warn_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
     for main in &diagnosis.main {
         let residuals = diagnosis.residuals.iter();
         let mut of_main = residuals.filter(|of| of.prediction == main.prediction);

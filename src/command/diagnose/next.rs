@@ -111,7 +111,7 @@ impl Diagnose {
 fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
     let left = tables.main().filter_map(|main| {
         let features = tables.lags_of(main)?.features.iter();
-        let sure = features.filter(|of| of.residual.says_something());
+        let sure = features.filter(|of| of.residual.is_significant());
         let size = |of: &FeatureLags| of.residual.best.abs();
         let most = sure.max_by(|a, b| size(a).total_cmp(&size(b)))?;
         Some((main, most))

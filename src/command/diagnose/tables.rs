@@ -133,14 +133,14 @@ impl<'a> Tables<'a> {
                 let unknown = of.features.len() - features.clone().filter(known).count();
                 let mut found: Vec<_> = features
                     .filter(known)
-                    .filter(|of| all || side(of).says_something())
+                    .filter(|of| all || side(of).is_significant())
                     .collect();
                 found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
                 let more = found.len().saturating_sub(FEATURES);
                 let too_short = |of: &FeatureLags| side(of).bound >= 1.0;
                 let more = match (found.is_empty(), !all && more > 0) {
                     (true, _) if !all && of.features.iter().any(too_short) => {
-                        format!("  {title}: too short a recording to tell")
+                        format!("  {title}: the recording is too short")
                     }
                     (true, _) => format!("  {title}: nothing"),
                     (_, true) => format!("  {title}, and {} more", counted(more as u64, "feature")),
@@ -196,7 +196,7 @@ impl<'a> Tables<'a> {
         let mut text = String::from(
             "how well the data determine each estimator: condition number of its regressors,\n\
              and the largest variance inflation factor (VIF); beyond 10 the regressor is\n\
-             named: others tell nearly the same, its coefficient means little by itself;\n\
+             named: others are nearly the same, its coefficient means little by itself;\n\
              - of models that filter their inputs or past, which other columns determine\n",
         );
         let rows: Vec<Vec<String>> = shown

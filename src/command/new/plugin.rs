@@ -158,7 +158,7 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
         ),
         Role::Source | Role::Sink => (
             format!("a {}", role.word()),
-            "run a graph with it (README.md says more)",
+            "run a graph with it (see README.md)",
         ),
     };
     let graph = format!("graphs/{package}.toml");

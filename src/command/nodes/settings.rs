@@ -11,11 +11,11 @@ const DEEPEST: usize = 4;
 
 /// The specifications of a kind in these settings; none where no setting fits its schema.
 pub fn settings(kind: &Kind) -> Vec<Box<dyn NodeSpec>> {
-    let schema = Value::from((kind.schema)());
+    let schema = (kind.schema)();
     let values = Values {
         definitions: &schema["$defs"],
     };
-    let Some((usual, spec)) = values.usual(&schema, kind) else {
+    let Some((usual, spec)) = values.usual(schema, kind) else {
         return Vec::new();
     };
     let mut specs = vec![spec];

@@ -253,7 +253,7 @@ impl Rest<'_> {
     }
 
     /// Tells of an input that has come to its end while all of it was passed over: a clock may once have been ahead.
-    fn tell_of_nothing(&self) {
+    fn note_nothing(&self) {
         if self.before > athermal::Duration::ZERO {
             self.terminal.warning(format_args!(
                 "the last row is {} before what the run before saw last: nothing was predicted; if a clock was ahead then, {BEGIN_COLD}",
@@ -290,7 +290,7 @@ impl Source for Rest<'_> {
                     }
                 }
                 Some(Event::Segment) => self.seen = None,
-                None if self.passed_over > 0 => self.tell_of_nothing(),
+                None if self.passed_over > 0 => self.note_nothing(),
                 None => {}
             }
             return Ok(event);

@@ -28,7 +28,7 @@ use clap::Args;
 use serde_json::json;
 
 use crate::command::aside::check_apart;
-use crate::command::model::{self, check_fitted, tell_unfitted};
+use crate::command::model::{self, check_fitted, warn_unfitted};
 use crate::command::{beyond, data, refused, unread};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
@@ -106,7 +106,7 @@ impl Run {
         let _state = self.state.as_deref().map(Held::state).transpose()?;
         let _output = Held::output(&self.output)?;
         let (model, watched) = self.load(terminal)?;
-        tell_unfitted(terminal, &model, &self.model);
+        warn_unfitted(terminal, &model, &self.model);
         if let Some(told) = feedback::in_words(&model.plan) {
             terminal.warning(told);
         }
@@ -160,7 +160,7 @@ impl Run {
         let watched = Watched::of(&self.model);
         let given = model::load(&self.model, Wanted::default(), terminal);
         if let Ok(given) = &given {
-            unread::tell(terminal, &self.model, &given.graph);
+            unread::warn(terminal, &self.model, &given.graph);
         }
         let Some(last) = last else {
             let given = given?;
@@ -304,7 +304,7 @@ impl Run {
         let opened = Reader::open_through(&self.input, layout, options, stop::until_told);
         let mut reader = match opened {
             // Told to stop before there was anything.
-            Err(FileError::Empty { .. }) if stop::is_told() => return Err(Failure::Told(0)),
+            Err(FileError::Empty { .. }) if stop::is_told() => return Err(Failure::Exit(0)),
             opened => opened?,
         };
         let terminal = *terminal;
@@ -437,7 +437,7 @@ impl Run {
         };
         let reports = [(input, reader.report().clone())];
         let rejected = engine.rejected_channels();
-        data::tell(
+        data::warn(
             terminal,
             engine.plan(),
             &reports,
@@ -445,7 +445,7 @@ impl Run {
             &rejected,
         );
         if self.ends() {
-            beyond::tell(terminal, &beyond::beyond(usual, &engine.sample_ranges()));
+            beyond::warn(terminal, &beyond::beyond(usual, &engine.sample_ranges()));
         }
         // People are told of what is not in order alone.
         if terminal.events {

@@ -108,7 +108,7 @@ impl Channel {
             && beyond::is_beyond(usual, value)
             && is_news(&mut self.beyond, now)
         {
-            beyond::tell_first(terminal, usual, time, value);
+            beyond::warn_first(terminal, usual, time, value);
         }
     }
 }

@@ -77,7 +77,7 @@ impl<'a> Sensors<'a> {
     /// Tells what is told at the end.
     pub fn end(self) {
         if let Told::AtEnd(looks) = self.told {
-            faults::tell(&self.terminal, &looks.found(Purpose::Run));
+            faults::warn(&self.terminal, &looks.found(Purpose::Run));
         }
     }
 }

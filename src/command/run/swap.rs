@@ -15,7 +15,7 @@ use clap::Args;
 
 use super::ran;
 use super::watched::{Watched, Went};
-use crate::command::model::{self, check_fitted, few, tell_unfitted};
+use crate::command::model::{self, check_fitted, few, warn_unfitted};
 use crate::terminal::{Failure, Terminal};
 use athermal_analysis::figures::length;
 
@@ -164,7 +164,7 @@ fn load<'a>(
             if taken.len() == 1 { "keeps" } else { "keep" },
         ));
     }
-    tell_unfitted(terminal, &model, path);
+    warn_unfitted(terminal, &model, path);
     if !doubtful.is_empty() {
         terminal.warning(format_args!(
             "{}: {} {} as fitted before, though what they read is now made in another way: fit the graph anew to be sure",
@@ -387,7 +387,7 @@ impl<'a> Course<'a> {
         now: Instant,
     ) -> Result<(), StageError> {
         let staged = control.stage(&model, false)?;
-        self.tell_lacking(&model, &path);
+        self.warn_lacking(&model, &path);
         self.terminal.note(told::staged(&path, staged));
         let (past, mut silent) = staged.silent();
         // What runs seldom gives any either, as a settle time, which there is when the set point has changed.
@@ -420,7 +420,7 @@ impl<'a> Course<'a> {
     }
 
     /// Tells of outputs of what runs that a new graph does not have, as one for another machine would not.
-    fn tell_lacking(&self, new: &Model, path: &Path) {
+    fn warn_lacking(&self, new: &Model, path: &Path) {
         let has = |name: &str| new.plan.outputs.iter().any(|output| output.name == name);
         let running = self.running.plan.outputs.iter();
         let lacking: Vec<_> = running

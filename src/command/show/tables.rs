@@ -34,7 +34,7 @@ pub(super) fn text(estimators: &[FittedEstimator], unfitted: &[String]) -> Strin
         if found.any(is_bounded) {
             text.push_str(
                 "polynomials without one are held by the bound of stability, or the rows hardly\n\
-                 tell them: none is known\n",
+                 determine them: none is known\n",
             );
         }
     } else if estimators.is_empty() && unfitted.is_empty() {
@@ -58,7 +58,7 @@ fn without_coefficients(of: &FittedEstimator) -> String {
     let FittedEstimator {
         node, kind, truth, ..
     } = of;
-    format!("{node} ({kind} of {truth}): nodes of this type do not tell their coefficients\n")
+    format!("{node} ({kind} of {truth}): nodes of this type have no coefficients to show\n")
 }
 
 fn estimator(of: &FittedEstimator, found: &EstimatorParts) -> String {
@@ -247,7 +247,7 @@ mod tests {
         };
         assert_eq!(
             without_coefficients(&of),
-            "model.Z (my_node of drift.Z): nodes of this type do not tell their coefficients\n"
+            "model.Z (my_node of drift.Z): nodes of this type have no coefficients to show\n"
         );
     }
 

@@ -75,7 +75,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
     }
     if diagnostics.has_errors() {
         terminal.diagnostics(&diagnostics, &sources);
-        return Err(Failure::Told(status_of(&diagnostics)));
+        return Err(Failure::Exit(status_of(&diagnostics)));
     }
     terminal.doubts(&diagnostics, &sources);
     Ok(suites)

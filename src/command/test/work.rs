@@ -59,7 +59,7 @@ impl Broken {
         match failure.into() {
             Failure::Outside(message) => Self { message, status: 3 },
             Failure::Request(message) => Self { message, status: 2 },
-            Failure::Graph { .. } | Failure::Told(_) => Self {
+            Failure::Graph { .. } | Failure::Exit(_) => Self {
                 message: "the graph has mistakes".to_owned(),
                 status: 2,
             },

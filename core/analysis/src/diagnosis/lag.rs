@@ -82,7 +82,7 @@ pub struct Correlogram {
 impl Correlogram {
     /// Whether chance alone would hardly give a correlation as large.
     #[must_use]
-    pub fn says_something(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.best.abs() > self.bound
     }
 }

@@ -10,7 +10,7 @@ use super::problem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::problem::InputAsKey;
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -154,13 +154,21 @@ fn read_instance(
             }
         }
     }
-    let context = context(node, instance);
-    diagnostics.within(context.clone(), |diagnostics| {
+    diagnostics.within(context(node, instance), |diagnostics| {
         let is_whole = take_inputs(kind, &mut parameters, diagnostics);
         let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
-        let read = panics.caught(kind, &context, || {
+        let read = panics.caught(kind, (node, instance), || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
+            let wrong = out_of_range((kind.schema)(), &parameters);
+            let is_sound = wrong.is_empty();
+            for (place, message) in wrong {
+                let help = None;
+                diagnostics.report(place, problem::Parameter { message, help });
+            }
+            if !is_sound {
+                return None;
+            }
             let closes_loops = match spec.role() {
                 Role::Feature(feature) => feature.closes_loops(),
                 _ => false,
@@ -179,6 +187,14 @@ fn read_instance(
             closes_loops: closes_loops.unwrap_or_default(),
         }
     })
+}
+
+/// The name of an instance: `thermal.Z1`.
+pub(super) fn instance_name(node: &str, member: Option<&str>) -> String {
+    match member {
+        Some(member) => format!("{node}.{member}"),
+        None => node.to_owned(),
+    }
 }
 
 /// Takes inputs out of the parameters among which they stand, and reports them; false if there are any.
@@ -284,8 +300,7 @@ impl Declared<'_> {
             Some(("inputs", port)) => (self.kind.inputs)().iter().any(|own| own.name == port),
             way => {
                 let first = way.map_or(at, |(first, _)| first);
-                let schema = serde_json::Value::from((self.kind.schema)());
-                !schema["properties"][first].is_null()
+                !(self.kind.schema)()["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
         }

@@ -161,7 +161,7 @@ fn wide(html: &mut String, chart: &Chart<'_>) {
 
 fn votes(html: &mut String, facts: &Facts) {
     html.push_str(
-        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
+        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can predict it. \
          Responses are the estimator's to one sensor alone: a step of one unit, and an impulse of the size that stands at its axis.</p>",
     );
     let hours = Hours::of(&facts.course);

@@ -1,4 +1,4 @@
-//! Decides what a node sees of the slots that it reads: fresh or held, how old, how far back; not what it does with it.
+//! What a node sees of the slots that it reads: fresh or held, how old, how far back.
 
 use super::history::{Cursor, History};
 use super::slots::{Given, Slots};
@@ -147,7 +147,7 @@ impl Gathered {
     fn convert(&mut self) {
         for conversion in &self.conversions {
             let value = &mut self.values[conversion.entry];
-            // A NaN says why there is no value, and must stay as it is.
+            // A NaN carries the reason why there is no value, and must stay as it is.
             if !value.is_nan() {
                 *value *= conversion.factor();
             }

@@ -1,4 +1,4 @@
-//! Decides where the values of a plan lie between its steps.
+//! Where the values of a plan lie between its steps.
 
 use std::ops::Range;
 

@@ -10,6 +10,7 @@ struct Patient {
     #[serde(default)]
     after: u64,
     /// How long ago the last tick may be.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     within: Duration,
 }
 
@@ -19,9 +20,6 @@ impl Feature for Patient {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        if let Some(mistake) = Mistake::unless_lasting("within", self.within) {
-            return Err(vec![mistake]);
-        }
         let channels = inputs.port("signal").to_vec();
         let name = "signal";
         Ok(vec![OutputPort { name, channels }])
