@@ -98,9 +98,6 @@ impl<'g> Resolver<'g> {
         for name in &self.graph.broken {
             self.scopes.get_mut(name).broken = true;
         }
-        for name in &self.graph.elsewhere {
-            self.scopes.hide(name);
-        }
         for &node in &order.looping {
             self.scopes.get_mut(&self.graph.nodes[node].name).broken = true;
         }
@@ -116,7 +113,7 @@ impl<'g> Resolver<'g> {
         for &position in order.nodes.iter().chain(&order.looping) {
             let node = &self.graph.nodes[position];
             let closes = order.closing.contains(&position);
-            let sound = node.faulty.is_none() && !order.looping.contains(&position);
+            let sound = !node.faulty && !order.looping.contains(&position);
             for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
                 let outer = self.diagnostics.scope(Some(context(node, decl)));
                 let kind = read[position].kind;
