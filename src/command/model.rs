@@ -62,12 +62,16 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
 
 /// Tells which nodes of a model have no fit, since the fit of it failed there.
 pub fn tell_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
-    let nodes = model.unfitted();
+    tell_nodes_unfitted(terminal, &model.unfitted(), path);
+}
+
+/// The same, of nodes that are known.
+pub fn tell_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
     if !nodes.is_empty() {
         terminal.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",
             path.display(),
-            few(&nodes),
+            few(nodes),
             if nodes.len() == 1 { "gives" } else { "give" },
         ));
     }

@@ -16,6 +16,7 @@ mod kind_fault;
 mod leak;
 mod learning;
 mod order;
+pub mod origins;
 mod plan;
 mod port_channels;
 mod problem;

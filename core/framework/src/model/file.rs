@@ -326,6 +326,12 @@ impl Model {
         Ok(Engine::new(Arc::clone(&self.plan), &self.fitted)?)
     }
 
+    /// The revision of a model that can be run.
+    #[must_use]
+    pub fn revision(&self) -> Option<String> {
+        Some(self.engine().ok()?.revision().to_owned())
+    }
+
     /// The model as text: JSON, readable and the same for the same model.
     ///
     /// # Errors
