@@ -21,30 +21,39 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+#[cfg(feature = "analysis")]
+pub use athermal_analysis::{chart, diagnosis, report};
+
+#[cfg(feature = "cli")]
 #[macro_use]
 mod output;
-
-pub mod chart;
+#[cfg(feature = "cli")]
 mod checkout;
+#[cfg(feature = "cli")]
 mod command;
-pub mod diagnosis;
+#[cfg(feature = "cli")]
 mod drawing;
-mod figures;
+#[cfg(feature = "cli")]
 mod invocation;
-mod markup;
+#[cfg(feature = "cli")]
 mod message;
+#[cfg(feature = "cli")]
 mod program;
-pub mod report;
+#[cfg(feature = "cli")]
 mod starter;
+#[cfg(feature = "cli")]
 mod terminal;
 
+#[cfg(feature = "cli")]
 pub use program::command_line;
 
 // The commands use what the library offers to everybody by the name that everybody uses.
+#[cfg(feature = "cli")]
 extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
+use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_simulation as _;

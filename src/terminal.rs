@@ -3,7 +3,7 @@
 use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
@@ -13,10 +13,11 @@ use athermal::core::live::{RunError, StateError};
 use athermal::files::FileError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
-use crate::figures::{count, counted};
 use crate::message::Message;
+use athermal_analysis::figures::counted;
 
 /// Options that every command takes.
 #[derive(Debug, Args)]
@@ -151,27 +152,28 @@ impl Terminal {
         }
     }
 
-    /// Shows how many ticks a longer piece of work has stepped, once it has taken a second.
+    /// Shows how many ticks a longer piece of work has stepped.
     #[must_use]
     pub fn progress(&self, what: &'static str) -> Progress {
-        self.progress_to(what, "ticks", None)
+        self.progress_as(ProgressBar::no_length(), "{msg}: {human_pos} ticks", what)
     }
 
-    /// Shows how far a longer piece of work has come, once it has taken a second; as a bar where its end is known.
+    /// Shows how far a longer piece of work has come, as a bar.
     #[must_use]
-    pub fn progress_to(
-        &self,
-        what: &'static str,
-        unit: &'static str,
-        total: Option<u64>,
-    ) -> Progress {
+    pub fn progress_to(&self, what: &'static str, total: u64) -> Progress {
+        let template = "{msg} {bar:24} {percent:>3} %, {eta} left";
+        self.progress_as(ProgressBar::new(total), template, what)
+    }
+
+    fn progress_as(&self, bar: ProgressBar, template: &str, what: &'static str) -> Progress {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
         Progress {
-            what: what.to_owned(),
-            unit,
-            total,
-            shown: std::io::stderr().is_terminal() && !self.quiet,
-            began: Instant::now(),
-            last: None,
+            bar,
+            waits: std::io::stderr().is_terminal() && !self.quiet,
         }
     }
 
@@ -207,66 +209,33 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
         })
 }
 
-/// A line that says how far the work has come.
+/// A line on standard error that shows how far the work has come, once it takes a second.
 #[derive(Debug)]
 pub struct Progress {
-    what: String,
-    unit: &'static str,
-    total: Option<u64>,
-    shown: bool,
-    began: Instant,
-    last: Option<Instant>,
+    bar: ProgressBar,
+    /// Whether the line waits for the second to pass.
+    waits: bool,
 }
 
 impl Progress {
-    /// Tells how many have been done so far.
+    /// Shows how many have been done so far.
     pub fn tell(&mut self, done: u64) {
-        let rested = |last: Instant| last.elapsed() > Duration::from_millis(100);
-        if self.takes_long() && self.last.is_none_or(rested) {
-            self.show(&line(self, done, self.began.elapsed().as_secs_f64()));
-        }
-    }
-
-    /// Tells what is done next, which may take long and is not counted together with the rest.
-    pub fn say(&mut self, text: impl fmt::Display) {
-        if self.takes_long() {
-            self.show(&text);
+        self.bar.set_position(done);
+        if self.waits && self.bar.elapsed() >= Duration::from_secs(1) {
+            self.waits = false;
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
     }
 
     /// From here on the work is called so.
     pub fn doing(&mut self, what: String) {
-        self.what = what;
+        self.bar.set_message(what);
     }
-
-    fn takes_long(&self) -> bool {
-        self.shown && self.began.elapsed() >= Duration::from_secs(1)
-    }
-
-    fn show(&mut self, text: &dyn fmt::Display) {
-        self.last = Some(Instant::now());
-        let _ = write!(std::io::stderr(), "\r{text}\x1b[K");
-    }
-}
-
-fn line(progress: &Progress, done: u64, elapsed_s: f64) -> String {
-    let (what, unit) = (&progress.what, progress.unit);
-    let Some(total) = progress.total.filter(|total| (1..=*total).contains(&done)) else {
-        let rate = done as f64 / elapsed_s;
-        return format!("{what}: {} {unit}, {rate:.0} per second", count(done));
-    };
-    let share = done as f64 / total as f64;
-    let left_s = elapsed_s * (1.0 - share) / share;
-    let full = (24.0 * share) as usize;
-    let bar = "█".repeat(full) + &"░".repeat(24 - full);
-    format!("{what} {bar} {:3.0} %, {left_s:.0} s left", 100.0 * share)
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if self.last.is_some() {
-            let _ = write!(std::io::stderr(), "\r\x1b[K");
-        }
+        self.bar.finish_and_clear();
     }
 }
 
@@ -403,33 +372,5 @@ impl From<FitError> for Failure {
             FitError::Engine(error) => Self::Request(error.to_string()),
             FitError::Panicked => Self::Outside(error.to_string()),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn progress(total: Option<u64>) -> Progress {
-        Progress {
-            what: "fitting".to_owned(),
-            unit: "ticks",
-            total,
-            shown: true,
-            began: Instant::now(),
-            last: None,
-        }
-    }
-
-    #[test]
-    fn work_whose_end_is_known_has_a_bar_and_a_time_left() {
-        let quarter = line(&progress(Some(4_000)), 1_000, 3.0);
-        assert_eq!(quarter, "fitting ██████░░░░░░░░░░░░░░░░░░  25 %, 9 s left");
-    }
-
-    #[test]
-    fn work_whose_end_is_not_known_has_a_count_and_a_rate() {
-        let line = line(&progress(None), 60_000, 2.0);
-        assert_eq!(line, "fitting: 60,000 ticks, 30000 per second");
     }
 }

@@ -4,9 +4,9 @@ use athermal::core::engine::SampleRange;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::figures::number;
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::number;
 
 /// So many widths beyond, another unit is more likely than another day.
 const ANOTHER_UNIT: f64 = 10.0;

@@ -15,8 +15,8 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::unread;
-use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
+use athermal_analysis::figures::counted;
 
 /// Look for mistakes in a graph file
 ///

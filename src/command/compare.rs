@@ -24,9 +24,9 @@ use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
 use super::model;
 use super::scored::Scored;
-use crate::figures::{count, number, seconds};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{count, number, seconds};
 
 /// Fit several graphs on the same data and score them on others, in one table
 ///

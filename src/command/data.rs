@@ -16,11 +16,11 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::json;
 
 use super::refused;
-use crate::figures::{DATES_S, count, counted, instant};
 use crate::invocation::{program, quoted};
 use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::{DATES_S, count, counted, instant};
 
 /// Recorded data.
 #[derive(Debug, Args)]

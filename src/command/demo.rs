@@ -17,9 +17,9 @@ use super::aside::write_aside;
 use super::data::Data;
 use super::fit::fit_on;
 use super::simulate::write_recording;
-use crate::figures::{count, or_dash, table};
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{count, or_dash, table};
 
 const GRAPH: &str = include_str!("../../graphs/die-tester.toml");
 const MACHINE: &str = "die-tester";
@@ -269,7 +269,7 @@ fn next(folder: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::number;
+    use athermal_analysis::figures::number;
 
     #[test]
     fn the_meaning_is_told_with_the_figures_of_the_best_axis() {

@@ -14,9 +14,11 @@ use super::faults::{self, FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::scored::Scored;
 use super::unscored;
-use crate::figures::{count, counted, number, or_dash, paragraph, seconds, stated, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{
+    count, counted, number, or_dash, paragraph, seconds, stated, table,
+};
 
 /// Score a model's predictions on recorded data
 ///

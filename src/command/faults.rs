@@ -17,9 +17,9 @@ use athermal::diagnosis::leap::{self, Leaps};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::figures::{count, counted, instant, number, seconds};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{count, counted, instant, number, seconds};
 
 /// What a recording is read for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

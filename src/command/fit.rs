@@ -21,10 +21,10 @@ use super::faults::{self, FaultWatch, Faulty, Purpose};
 use super::model;
 use super::numbers;
 use super::threads::Threads;
-use crate::figures::{count, counted, number, paragraph, seconds, table};
 use crate::invocation::{next, program, quoted};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{count, counted, number, paragraph, seconds, table};
 
 /// Fit a graph on recorded data
 ///
@@ -260,15 +260,14 @@ pub fn fit_without_card(
     let mut progress = terminal.progress("fitting");
     let (fitted, report) = fit(&model.plan, &watch, options, &mut |told| match told {
         FitProgress::Ticks { stepped, fit, of } => {
-            progress.doing(if of > 1 {
-                format!("fitting {fit} of {of}")
-            } else {
-                "fitting".to_owned()
+            progress.doing(match of {
+                1 => "fitting".to_owned(),
+                _ => format!("fitting {fit} of {of}"),
             });
             progress.tell(stepped);
         }
         FitProgress::Order { node, nth, of } => {
-            progress.say(format_args!("fitting `{node}`: order {nth} of {of}"));
+            progress.doing(format!("fitting `{node}`, order {nth} of {of}"));
         }
     })?;
     drop(progress);

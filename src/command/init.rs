@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
 use super::data::{Data, no_graph};
-use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
+use athermal_analysis::figures::paragraph;
 
 /// Write a starter graph for a log of yours
 ///

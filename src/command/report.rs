@@ -23,8 +23,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 /// Show what a model is worth on recorded data, as one page
 ///
 /// Tells a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
-/// With `-o` it writes a self-contained HTML page that also has scores, the published figures for a machine of the same kind,
-/// drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
+/// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
 /// `--format json` the same facts go to standard output.
 #[derive(Debug, Args)]
 #[command(
@@ -41,7 +40,7 @@ pub struct Report {
     /// Where the page goes; `-` is standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// A folder for every picture as files of its own, SVG and PNG
+    /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
@@ -155,8 +154,6 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
     let names = file_names(plots.iter().map(|plot| plot.name.as_str()));
     for (plot, name) in plots.iter().zip(names) {
         write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
-        #[cfg(feature = "png")]
-        write_aside(&folder.join(format!("{name}.png")), &plot.png)?;
     }
     terminal.note(format_args!(
         "wrote {} pictures to {}",

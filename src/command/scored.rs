@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 
 use super::model::check_limit;
 use super::numbers;
-use crate::figures::counted;
 use crate::terminal::Failure;
+use athermal_analysis::figures::counted;
 
 /// How predictions are scored.
 #[derive(Debug, Args)]

@@ -20,8 +20,8 @@ use super::aside::{check_apart, not_written};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
-use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
+use athermal_analysis::figures::counted;
 
 /// Write the recording of a simulated machine, or list the machines
 ///
@@ -269,7 +269,7 @@ impl Watched {
         Ok(Self {
             simulation,
             // Days are counted in thousandths, since how many rows there will be is the machine's business.
-            progress: terminal.progress_to("simulating", "", Some((days * 1000.0) as u64)),
+            progress: terminal.progress_to("simulating", (days * 1000.0) as u64),
         })
     }
 }

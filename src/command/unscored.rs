@@ -3,8 +3,8 @@
 use athermal::core::score::Unscored;
 
 use super::model::few;
-use crate::figures::{counted, stated};
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{counted, stated};
 
 /// Tells of them, of those together of which the same is to be told.
 pub fn tell(terminal: &Terminal, unscored: &[Unscored]) {

@@ -12,7 +12,7 @@ use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal::core::node::RoleName;
 use athermal::core::time::Duration;
 
-use crate::figures::{counted, length};
+use athermal_analysis::figures::{counted, length};
 
 /// A graph as boxes and arrows, from what is measured to what comes out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

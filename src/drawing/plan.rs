@@ -7,7 +7,7 @@ use athermal::core::compile::{Plan, PlannedNode, PlannedRole, Step};
 use athermal::core::node::Read;
 use athermal::core::time::Duration;
 
-use crate::figures::{count, length, table};
+use athermal_analysis::figures::{count, length, table};
 
 /// The plan for people; instances of one node are told together unless `expand`.
 #[must_use]

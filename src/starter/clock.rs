@@ -6,7 +6,7 @@ use athermal::files::{Description, TimeForm, is_time_of_day};
 use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
 use super::texts::Texts;
-use crate::figures::time;
+use athermal_analysis::figures::time;
 
 /// The time of a log.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use athermal::files::{Again, Description, FileError, Report, with_decimal_point}
 
 use super::clock::Clock;
 use super::texts::Texts;
-use crate::figures::{count, counted};
+use athermal_analysis::figures::{count, counted};
 
 /// So many rows whose time is out of order are no slips: the clock was set back.
 const SET_BACK: u64 = 10;

@@ -4,7 +4,7 @@ use athermal_numerics::median;
 
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
-use crate::figures::{count, number};
+use athermal_analysis::figures::{count, number};
 
 /// The share of all values from which on one may stand for none. A rarer one leaps, as that of a failed sensor.
 const LEAST_SHARE: f64 = 0.2;

@@ -2,7 +2,7 @@
 
 use athermal::core::unit::Unit;
 
-use crate::figures::number;
+use athermal_analysis::figures::number;
 
 /// By how much a machine may be warmer or colder than in its log, in K: less than what a broken wire or a full scale seems to be.
 const PLAUSIBLE_K: f64 = 100.0;

@@ -12,7 +12,7 @@ use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::dropped::{self, Steps};
-use crate::figures::{count, counted};
+use athermal_analysis::figures::{count, counted};
 
 /// The values of a log, column by column.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use super::group::{Group, groups};
 use super::range;
 use super::survey::Survey;
 use super::window::{Choice, ENOUGH};
-use crate::figures::{count, number};
+use athermal_analysis::figures::{count, number};
 
 /// The text of the graph.
 pub fn graph(

@@ -10,7 +10,7 @@ use athermal::diagnosis::window::{Drift, FEWEST_SAMPLES, WINDOWS_IN_RECORDING, n
 
 use serde_json::{Value, json};
 
-use crate::figures::time;
+use athermal_analysis::figures::time;
 
 use super::clock::Clock;
 use super::column::{Column, Kind};

@@ -346,15 +346,11 @@ fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
         "autocorrelation-Z2",
         "loss",
     ] {
-        for ending in ["svg", "png"] {
-            assert!(
-                pictures.contains(&format!("{name}.{ending}")),
-                "{name}.{ending}: {pictures:?}"
-            );
-        }
+        assert!(
+            pictures.contains(&format!("{name}.svg")),
+            "{name}: {pictures:?}"
+        );
     }
-    let png = std::fs::read(plots.join("drift-Z1.png")).unwrap();
-    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 10_000);
 }
 
 #[test]
@@ -387,18 +383,8 @@ fn weights_of_a_vote_add_up_to_one_at_every_truth() {
     let given: Vec<f64> = sums.into_iter().filter(|sum| *sum > 0.0).collect();
     assert!(given.len() > 400);
     close(&given, &vec![1.0; given.len()], 1e-9);
-    // Its axes are those of the article's single axis system, and it has no correction.
-    assert_eq!(
-        facts["published"][0]["source"],
-        "Table 2, single axis system, drift below 100 nm/min"
-    );
+    // There is no correction.
     assert!(facts["worth"].is_null());
-    let told = report(&model, &days, &[]).out.replace("\n  ", " ");
-    let (whose, table) = (
-        told.find("Mandelli, Dankwart and Napoli"),
-        told.find("Table 2"),
-    );
-    assert!(whose.is_some() && whose < table, "{told}");
 }
 
 #[test]

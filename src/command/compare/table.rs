@@ -3,7 +3,7 @@
 use athermal::core::score::Mode;
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison};
 
-use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};
+use athermal_analysis::figures::{count, counted, digits, matrix, number, or_dash, stated};
 
 /// A difference of fewer standard errors may be chance.
 const SURE: f64 = 2.0;

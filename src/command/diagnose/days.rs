@@ -2,7 +2,7 @@
 
 use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 
-use crate::figures::{counted, matrix, number, rounded};
+use athermal_analysis::figures::{counted, matrix, number, rounded};
 
 /// On how many days a fit comes near those on all others, of all predictions shown; none where on all of them only.
 pub(super) fn enough(days: &Days, shown: &[&str]) -> Option<usize> {

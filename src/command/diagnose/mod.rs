@@ -25,8 +25,8 @@ use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::report::write_plots;
-use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::counted;
 use tables::Tables;
 
 /// Show why a model predicts as well as it does, and what would make it better
@@ -66,7 +66,7 @@ pub struct Diagnose {
     /// Leave out what needs fits of its own: days left out, and how many are needed
     #[arg(long)]
     no_fit: bool,
-    /// A folder for every picture as SVG and PNG files
+    /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
@@ -94,7 +94,7 @@ impl Diagnose {
         };
         let mut bar = None;
         let mut progress = |done: u64, total: u64| {
-            bar.get_or_insert_with(|| terminal.progress_to("fitting", "fits", Some(total)))
+            bar.get_or_insert_with(|| terminal.progress_to("fitting", total))
                 .tell(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);

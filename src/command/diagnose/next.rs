@@ -9,8 +9,8 @@ use athermal::diagnosis::{Main, is_called};
 use super::Diagnose;
 use super::instances::is_of;
 use super::tables::Tables;
-use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
+use athermal_analysis::figures::paragraph;
 
 impl Diagnose {
     /// What to try next, each with its reason; nothing where nothing follows. `drifts` says whether any truth is a slope.

@@ -7,7 +7,7 @@ use athermal::core::unit::Unit;
 use athermal::diagnosis::response::{Response, Responses};
 
 use super::instances::{axis_of, grouped, name_of};
-use crate::figures::{TimeUnit, matrix, number};
+use athermal_analysis::figures::{TimeUnit, matrix, number};
 
 /// By how much answers to a step up and down differ at least where it is worth a word.
 const BENT: f64 = 0.005;

@@ -7,7 +7,7 @@ use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
 use super::instances::{axis_of, grouped, is_of};
 use super::{days, responses};
-use crate::figures::{count, counted, matrix, number, or_dash, rounded, table};
+use athermal_analysis::figures::{count, counted, matrix, number, or_dash, rounded, table};
 
 /// Features that are named of each truth.
 const FEATURES: usize = 3;

@@ -10,8 +10,8 @@ use athermal::core::node::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::figures::{page, paragraph};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{page, paragraph};
 use settings::settings;
 
 /// List the node types, or explain one

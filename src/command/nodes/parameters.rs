@@ -4,7 +4,7 @@
 use athermal::core::node::{first_paragraph, inline_toml};
 use serde_json::{Map, Value};
 
-use crate::figures::paragraph;
+use athermal_analysis::figures::paragraph;
 
 /// All parameters of a table, and below each the forms that its value may have.
 pub fn explain(schema: &Value) -> String {

@@ -10,7 +10,7 @@ use super::{sensor_words, swap_words};
 use crate::command::beyond;
 use crate::command::data::REJECTED;
 use crate::command::model::{few, tell_nodes_unfitted};
-use crate::figures::{count, counted, instant, length, number, seconds, time};
+use athermal_analysis::figures::{count, counted, instant, length, number, seconds, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
 

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::command::faults::{self, Purpose, of_standstill};
 use crate::command::model::few;
-use crate::figures::{count, instant, number, time};
+use athermal_analysis::figures::{count, instant, number, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
 

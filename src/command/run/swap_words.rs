@@ -9,7 +9,7 @@ use athermal::core::live::session::{Refusal, WatchedGraph};
 use athermal::core::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
-use crate::figures::{count, counted, length, number, seconds};
+use athermal_analysis::figures::{count, counted, length, number, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal::core::node::Mode;
 
 use super::coefficients::{Found, Told};
-use crate::figures::{digits, paragraph, stated, table, time};
+use athermal_analysis::figures::{digits, paragraph, stated, table, time};
 
 /// The longest name that numbers stand beside; what is longer is told above them.
 const LONGEST_NAME: usize = 36;

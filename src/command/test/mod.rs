@@ -94,8 +94,8 @@ impl Test {
         });
         let summary = Summary::of(&suites, &results, began.elapsed());
         match &self.junit {
-            Some(_) if printed => print!("{}", summary.junit()),
-            Some(path) => write_aside(path, summary.junit())?,
+            Some(_) if printed => print!("{}", summary.junit()?),
+            Some(path) => write_aside(path, summary.junit()?)?,
             None => {}
         }
         let mut warned = BTreeSet::new();

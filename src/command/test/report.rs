@@ -1,16 +1,16 @@
-//! Decides how results of tests look: for people, as JSON, and as JUnit XML.
+//! How results of tests look: for people, as JSON, and as JUnit XML.
 
 use std::fmt::Write as _;
 use std::time::Duration;
 
 use athermal::core::trial::{Finding, Wanted};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use serde_json::{Value, json};
 
 use super::suite::Suite;
 use super::work::{Ran, Status};
-use crate::figures::count;
-use crate::markup::escaped;
 use crate::terminal::{Answer, Failure};
+use athermal_analysis::figures::count;
 
 /// The line of a test and, unless it passed, the figures that say why.
 pub(super) fn lines(suite: &Suite, ran: &Ran) -> String {
@@ -141,71 +141,41 @@ impl<'a> Summary<'a> {
     }
 
     /// The results in the form that continuous integration reads.
-    pub(super) fn junit(&self) -> String {
-        let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-        let _ = writeln!(
-            xml,
-            "<testsuites name=\"athermal\" tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3}\">",
-            self.results.len(),
-            self.failed(),
-            self.broken(),
-            self.took.as_secs_f64()
-        );
+    pub(super) fn junit(&self) -> Result<String, Failure> {
+        let mut report = Report::new("athermal");
+        report.set_time(self.took);
         for (number, suite) in self.suites.iter().enumerate() {
+            let mut of_suite = TestSuite::new(&suite.path);
             let results = self.results.iter().filter(|ran| ran.suite == number);
-            let results: Vec<&Ran> = results.collect();
-            let is = |which: fn(&Status) -> bool| {
-                results.iter().filter(|ran| which(&ran.status)).count()
-            };
-            let _ = writeln!(
-                xml,
-                "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3}\">",
-                escaped(&suite.path),
-                results.len(),
-                is(|status| matches!(status, Status::Failed)),
-                is(|status| matches!(status, Status::Broken(_))),
-                results
-                    .iter()
-                    .map(|ran| ran.took.as_secs_f64())
-                    .sum::<f64>()
-            );
-            for ran in results {
-                case(&mut xml, suite, ran);
-            }
-            xml.push_str("  </testsuite>\n");
+            of_suite.set_time(results.clone().map(|ran| ran.took).sum());
+            of_suite.add_test_cases(results.map(|ran| case(suite, ran)));
+            report.add_test_suite(of_suite);
         }
-        xml.push_str("</testsuites>\n");
-        xml
+        report
+            .to_string()
+            .map_err(|error| Failure::Outside(error.to_string()))
     }
 }
 
-fn case(xml: &mut String, suite: &Suite, ran: &Ran) {
+fn case(suite: &Suite, ran: &Ran) -> TestCase {
     let trial = &suite.trials[ran.trial];
-    let _ = write!(
-        xml,
-        "    <testcase name=\"{}\" classname=\"{}\" file=\"{}\" line=\"{}\" time=\"{:.3}\"",
-        escaped(&trial.name),
-        escaped(&suite.name),
-        escaped(&suite.path),
-        suite.line(trial),
-        ran.took.as_secs_f64()
-    );
-    let reasons = reasons(ran);
-    let element = match ran.status {
-        Status::Passed => {
-            xml.push_str("/>\n");
-            return;
-        }
-        Status::Failed => "failure",
-        Status::Broken(_) => "error",
+    let mut status = match ran.status {
+        Status::Passed => TestCaseStatus::success(),
+        Status::Failed => TestCaseStatus::non_success(NonSuccessKind::Failure),
+        Status::Broken(_) => TestCaseStatus::non_success(NonSuccessKind::Error),
     };
-    let first = reasons.first().map_or("", String::as_str);
-    let _ = writeln!(
-        xml,
-        ">\n      <{element} message=\"{}\">{}</{element}>\n    </testcase>",
-        escaped(first),
-        escaped(&reasons.join("\n"))
-    );
+    let reasons = reasons(ran);
+    if let Some(first) = reasons.first() {
+        status
+            .set_message(first)
+            .set_description(reasons.join("\n"));
+    }
+    let mut case = TestCase::new(&trial.name, status);
+    case.set_classname(&suite.name).set_time(ran.took);
+    case.extra.insert("file".into(), (&suite.path).into());
+    case.extra
+        .insert("line".into(), suite.line(trial).to_string().into());
+    case
 }
 
 fn finding(finding: &Finding) -> Value {
@@ -231,17 +201,4 @@ fn finding(finding: &Finding) -> Value {
         "instants": finding.instants,
         "first": first,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn xml_is_escaped_and_has_no_control_characters() {
-        assert_eq!(
-            escaped("a < \"b\" & c > d\u{1b}"),
-            "a &lt; &quot;b&quot; &amp; c &gt; d\u{fffd}"
-        );
-    }
 }

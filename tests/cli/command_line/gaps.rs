@@ -129,51 +129,18 @@ fn a_list_that_is_not_closed_does_not_swallow_what_follows() {
 }
 
 #[test]
-fn inputs_under_a_misspelt_key_are_one_mistake_and_looked_at_all_the_same() {
-    let text = SOUND.to_owned()
-        + r#"[modules.pair]
-inputs = ["from"]
-outputs = { slope = "slope" }
-nodes.slope = { type = "slope", input.signal = "{from}", windows = ["5min"] }
-[nodes.one]
-module = "pair"
-input.from = "temperature"
-[nodes.thermal]
-type = "slope"
-input.signal = "temperatur"
-windows = ["5min"]
-[nodes.both]
-type = "linear"
-input.features = "temperature"
-inputs.truth = "drift.X"
-ahead = "5min"
-"#;
-    let expected = [
-        (21, "no key \"input\""),
-        (24, "no key \"input\""),
-        (27, "no key \"input\""),
-        (27, "`temperatur`"),
-        (31, "no key \"input\""),
-    ];
-    assert_told("command-line-input", &text, &expected);
-    let scratch = Scratch::new("command-line-input-help");
-    let graph = scratch.file("wrong.toml", text);
-    let told = athermal(&[&"check", &graph]).ended(2).told;
-    assert!(told.contains("did you mean \"inputs\"?"), "{told}");
-}
-
-#[test]
-fn an_input_among_the_parameters_is_one_mistake_that_says_where_it_belongs() {
+fn inputs_under_a_misspelt_key_or_among_the_parameters_are_one_mistake_that_says_where_they_belong()
+{
     let text = SOUND.to_owned()
         + r#"[nodes.thermal]
+type = "slope"
+input.signal = "temperature"
+windows = ["5min"]
+[nodes.both]
 type = "linear"
 feature = "temperature"
 truth = "drift.X"
 ahead = "5min"
-[nodes.one]
-type = "slope"
-in = { signal = "temperatur" }
-windows = ["5min"]
 [nodes.filtered]
 type = "state_space"
 inputs = { features = "temperature", truth = "drift.X" }
@@ -182,16 +149,16 @@ states = 2
 stats = 2
 "#;
     let expected = [
-        (20, "node \"thermal\" has no key \"feature\""),
-        (21, "node \"thermal\" has no key \"truth\""),
-        (25, "node \"one\" has no key \"in\""),
-        (25, "`temperatur`"),
+        (20, "no key \"input\""),
+        (24, "no key \"feature\""),
+        (25, "no key \"truth\""),
         (32, "no key \"stats\""),
     ];
-    assert_told("command-line-input-as-key", &text, &expected);
-    let scratch = Scratch::new("command-line-input-as-key-help");
+    assert_told("command-line-input", &text, &expected);
+    let scratch = Scratch::new("command-line-input-help");
     let graph = scratch.file("wrong.toml", text);
     let told = athermal(&[&"check", &graph]).ended(2).told;
+    assert!(told.contains("did you mean \"inputs\"?"), "{told}");
     for port in ["features", "truth"] {
         let help = format!("`{port}` is an input: write `inputs.{port} = …`");
         assert!(told.contains(&help), "{told}");

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::conversion;
 use super::instance::{Declared, Instance};
+use super::misplaced::{INPUTS, misplaced};
 use super::plan::{Conversion, Entry, Gather};
 use super::problem::CompileProblem;
 use super::reference::Reference;
@@ -92,7 +93,11 @@ impl Resolver<'_> {
     /// Tells that an input is missing, unless it is there under a name that is told to be none.
     pub(super) fn missing_input(&mut self, instance: &Declared<'_>, port: &InputPort) {
         let is_meant = |given: &str| meant_input(instance, given) == Some(port.name);
-        if instance.decl.inputs.iter().any(|of| is_meant(&of.port)) {
+        let parameters = instance.decl.parameters.as_table();
+        let beside = parameters.map_or_else(Vec::new, |own| misplaced(instance.kind, own));
+        if instance.decl.inputs.iter().any(|of| is_meant(&of.port))
+            || (beside.iter()).any(|(_, meant)| [port.name, INPUTS].contains(meant))
+        {
             return;
         }
         let problem = CompileProblem::MissingInput {

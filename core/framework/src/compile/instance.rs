@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use super::guard::Panics;
 use super::keys::EstimatorKeys;
+use super::misplaced::{INPUTS, misplaced};
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
-    Data, Decoded, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode_rest,
+    Data, Decoded, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value,
+    decode_rest,
 };
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
 
@@ -183,6 +185,7 @@ fn read_instance(
     }
     let context = context(node, instance);
     diagnostics.within(context.clone(), |diagnostics| {
+        let is_whole = take_inputs(kind, &mut parameters, diagnostics);
         let estimator =
             decode_rest::<EstimatorKeys>(&framework, "the node", &[], &|_| None, diagnostics);
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
@@ -199,13 +202,32 @@ fn read_instance(
             diagnostics.report(node.place, CompileProblem::of_kind(kind, fault));
             None
         });
-        let (spec, closes_loops) = read.unzip();
+        let (spec, closes_loops) = read.filter(|_| is_whole).unzip();
         ReadParts {
             spec,
             estimator,
             closes_loops: closes_loops.unwrap_or_default(),
         }
     })
+}
+
+/// Takes inputs out of the parameters among which they stand, and reports them; false if there are any.
+fn take_inputs(kind: &Kind, parameters: &mut Value, diagnostics: &mut Diagnostics) -> bool {
+    let Some(table) = parameters.as_table_mut() else {
+        return true;
+    };
+    let mut is_whole = true;
+    for (key, input) in misplaced(kind, table) {
+        if input != INPUTS
+            && let Some(entry) = table.remove(&key)
+        {
+            let (what, input) = ("the node".to_owned(), input.to_owned());
+            let problem = DocumentProblem::InputAsKey { key, what, input };
+            diagnostics.report(entry.key, problem);
+            is_whole = false;
+        }
+    }
+    is_whole
 }
 
 /// How diagnostics say which instance they speak of.

@@ -15,6 +15,7 @@ mod keys;
 mod kind_fault;
 mod leak;
 mod learning;
+mod misplaced;
 mod order;
 pub mod origins;
 mod plan;

@@ -288,15 +288,6 @@ pub enum DocumentProblem {
         /// The nodes and inputs that the module has.
         known: Arc<Names>,
     },
-    /// An output of a module is a port that its node does not have.
-    UnknownPort {
-        /// The node.
-        node: String,
-        /// The port; empty where none stands behind the colon.
-        port: String,
-        /// The ports that nodes of its type may have, where they are known.
-        known: Vec<String>,
-    },
     /// An output that a module does not have.
     UnknownOutput {
         /// The instance.

@@ -2,7 +2,6 @@
 
 mod deployment;
 mod each;
-mod misspelt;
 mod modules;
 mod names;
 mod nodes;
@@ -49,14 +48,11 @@ const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
 /// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
     let Document {
-        mut tree,
+        tree,
         gaps,
         removed,
         ..
     } = document;
-    if let Data::Table(root) = &mut tree.data {
-        misspelt::right_inputs(root, diagnostics);
-    }
     let Data::Table(root) = &tree.data else {
         let expected = "a table".to_owned();
         diagnostics.report(

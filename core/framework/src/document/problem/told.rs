@@ -90,7 +90,6 @@ impl Problem for DocumentProblem {
             Self::ModuleLoop { .. } => "A026",
             Self::OutOfReach { .. } => "A027",
             Self::UnknownOutput { .. } => "A028",
-            Self::UnknownPort { .. } => "A043",
         }
     }
 
@@ -218,12 +217,6 @@ impl Problem for DocumentProblem {
             } => format!(
                 "\"{node}\" has no output \"{output}\": it is an instance of module \"{module}\""
             ),
-            Self::UnknownPort { node, port, .. } if port.is_empty() => {
-                format!("no output port of \"{node}\" stands behind the colon")
-            }
-            Self::UnknownPort { node, port, .. } => {
-                format!("\"{node}\" has no output port \"{port}\"")
-            }
         }
     }
 
@@ -256,7 +249,6 @@ impl Problem for DocumentProblem {
             Self::ModuleLoop { .. } => "comes back here".to_owned(),
             Self::OutOfReach { .. } => "out of the module's reach".to_owned(),
             Self::UnknownOutput { .. } => "no such output".to_owned(),
-            Self::UnknownPort { .. } => "no such port".to_owned(),
             _ => String::new(),
         }
     }
@@ -429,8 +421,6 @@ impl Problem for DocumentProblem {
                     || Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned()),
                 )
             }
-            Self::UnknownPort { node, port, known } => suggestion(port, known, "its ports are")
-                .or_else(|| Some(format!("write \"{node}\" for its first port"))),
             _ => None,
         }
     }
@@ -476,7 +466,6 @@ impl Problem for DocumentProblem {
             | Self::TimeContradiction { .. }
             | Self::NoLength { .. }
             | Self::StepNotPositive
-            | Self::UnknownPort { .. }
             | Self::UnitTwice { .. }
             | Self::ModuleLoop { .. } => false,
         }

@@ -12,7 +12,6 @@ use crate::document::declare::names::name_rule;
 use crate::document::declare::reading::{table, text};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Table, Value};
-use crate::node::{Kind, kind as kind_of};
 
 /// Reports what is wrong with modules as they are declared, used or not; `sight` are the modules that those see which see them.
 pub(super) fn check<'a>(
@@ -63,11 +62,8 @@ fn check_one<'a>(module: &Module<'a>, sight: &[&'a Table], diagnostics: &mut Dia
             };
             diagnostics.report(place, problem);
         } else if let Some(inner) = module.nodes.get(node) {
-            let problem = match (instantiates(inner), port) {
-                (Some(inner), _) => lacking_output(node, port, inner, sight, &mut listed),
-                (None, Some(port)) => lacking_port(node, port, inner),
-                (None, None) => None,
-            };
+            let problem = instantiates(inner)
+                .and_then(|inner| lacking_output(node, port, inner, sight, &mut listed));
             if let Some(problem) = problem {
                 diagnostics.report(place, problem);
             }
@@ -111,21 +107,5 @@ fn lacking_output(
         output: port.map(str::to_owned),
         module: module.to_owned(),
         known: Arc::clone(known.or_insert_with(names)),
-    })
-}
-
-/// What is wrong with naming a port of a node that no node of its type has.
-fn lacking_port(node: &str, port: &str, keys: &Value) -> Option<DocumentProblem> {
-    let kind = keys.as_table()?.get("type")?.as_text();
-    // A type may be a parameter, or none; and not every type tells its ports.
-    let known = kind.and_then(kind_of).map_or_else(Vec::new, Kind::outputs);
-    let lacks = match known.is_empty() {
-        true => port.is_empty(),
-        false => !known.contains(&port),
-    };
-    lacks.then(|| DocumentProblem::UnknownPort {
-        node: node.to_owned(),
-        port: port.to_owned(),
-        known: known.into_iter().map(str::to_owned).collect(),
     })
 }

@@ -24,7 +24,6 @@ pub fn page(facts: &Facts) -> String {
     worth_section(&mut html, facts);
     html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
     html.push_str(&tables::scores(&facts.scores));
-    published(&mut html, facts);
     over_time(&mut html, facts);
     votes(&mut html, facts);
     chosen(&mut html, facts);
@@ -115,23 +114,6 @@ fn light_section(html: &mut String, light: &Light, hours: &Hours) {
         html.push_str("<h3>Largest loss per temperature step</h3>");
         html.push_str(&tables::steps(light));
     }
-}
-
-fn published(html: &mut String, facts: &Facts) {
-    let Some(ahead) = facts.course.axes.first().map(|axis| axis.ahead_s) else {
-        return;
-    };
-    if facts.published.is_empty() {
-        return;
-    }
-    let _ = write!(
-        html,
-        "<h3>Beside the published figures</h3><p class=\"muted\">Root mean square errors in nm/min of Mandelli, Dankwart and Napoli \
-         on their machine, which was another one, and of this model on these data, on instants below the same drift. Here \
-         the predictions look {:.1} minutes ahead.</p>{}",
-        ahead / 60.0,
-        tables::published(&facts.published)
-    );
 }
 
 fn over_time(html: &mut String, facts: &Facts) {

@@ -1,7 +1,8 @@
 //! Texts within pages, pictures and reports that are markup. Not what these look like.
 
 /// A text that cannot be taken for markup; characters that XML cannot have are replaced.
-pub(crate) fn escaped(text: &str) -> String {
+#[must_use]
+pub fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
-use super::super::{Departure, Hours, Light, Published, SensorFacts, figure, spelled};
+use super::super::{Departure, Hours, Light, SensorFacts, figure, spelled};
 use crate::figures::count;
 use crate::markup::escaped;
 
@@ -66,36 +66,6 @@ fn persistence(score: &Score) -> String {
         Some(few) => format!("{error} on {} of them", count(few)),
         None => error,
     }
-}
-
-/// The article's figures, ours below.
-pub(super) fn published(tables: &[Published]) -> String {
-    let mut html = String::new();
-    for published in tables {
-        let mut rows = String::new();
-        for row in &published.rows {
-            let node = row
-                .node
-                .as_deref()
-                .map_or(String::new(), |node| format!(" ({})", escaped(node)));
-            let cells = |figures: &mut dyn Iterator<Item = Option<f64>>| -> String {
-                figures
-                    .map(|value| format!("<td>{}</td>", figure(value)))
-                    .collect()
-            };
-            let _ = write!(
-                rows,
-                "<tr><td>{}, published</td>{}</tr><tr><td>{0}, here{node}</td>{}</tr>",
-                row.name,
-                cells(&mut row.published.iter().map(|value| Some(*value))),
-                cells(&mut row.ours.iter().copied()),
-            );
-        }
-        let mut header = vec![published.source];
-        header.extend(&published.axes);
-        html += &table(&header, &rows);
-    }
-    html
 }
 
 pub(super) fn settling(light: &Light, hours: &Hours) -> String {

@@ -46,14 +46,6 @@ pub(super) fn in_light(style: &str) -> String {
     light
 }
 
-/// Red, green and blue of a light colour by its name.
-#[cfg(feature = "png")]
-pub(super) fn light(name: &str) -> Option<[u8; 3]> {
-    let code = u32::from_str_radix(code(name)?, 16).ok()?;
-    let [_, red, green, blue] = code.to_be_bytes();
-    Some([red, green, blue])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

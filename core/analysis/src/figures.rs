@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-pub use athermal::core::diagnostic::{count, counted, digits};
-use athermal::{Duration, Instant};
+pub use athermal_core::diagnostic::{count, counted, digits};
+use athermal_core::time::{Duration, Instant};
 use jiff::Timestamp;
 
 /// How wide tables may be, in characters.

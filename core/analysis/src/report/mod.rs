@@ -10,7 +10,6 @@ mod errors;
 mod hours;
 mod light;
 mod page;
-mod published;
 mod recomputed;
 mod sensors;
 mod text;
@@ -25,7 +24,6 @@ pub use errors::Errors;
 use hours::Hours;
 pub use light::Light;
 pub use page::{page, plots};
-pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
 pub use text::text;
 pub use track::Unjudged;
@@ -56,8 +54,6 @@ pub struct Facts {
     pub scores: Vec<Score>,
     /// The combiners that went by fewer truths than they take.
     pub lacks: Vec<Lack>,
-    /// The figures of the article beside ours, for a machine of the same kind.
-    pub published: Vec<Published>,
     /// What happened over time.
     pub course: Course,
     /// How the errors of what is put out are spread, by axis.
@@ -152,7 +148,6 @@ pub fn gather(
         graph: model.plan.name.clone().unwrap_or_default(),
         data,
         verdicts: course.axes.iter().map(verdict).collect(),
-        published: published::published(&course),
         errors: course
             .axes
             .iter()

@@ -2,27 +2,16 @@
 
 use std::fmt::Write as _;
 
-use super::published::ARTICLE;
-use super::{Departure, Facts, Hours, Light, Published, figure, spelled};
-use crate::figures::{paragraph, table, time};
+use super::{Departure, Facts, Hours, Light, figure, spelled};
+use crate::figures::{paragraph, table};
 
-/// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
+/// The verdicts, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
 pub fn text(facts: &Facts) -> String {
     let mut text = String::new();
     for verdict in &facts.verdicts {
         let sentence = format!("{}: {}", verdict.axis, verdict.sentence());
         text.push_str(&paragraph("", 3, &sentence));
-    }
-    let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
-    if !facts.published.is_empty() {
-        text.push('\n');
-        let told = format!("Published are the figures of {ARTICLE}, measured on another machine.");
-        text.push_str(&paragraph("", 2, &told));
-    }
-    for table in &facts.published {
-        let _ = writeln!(text, "\n{}; here {} ahead", table.source, time(ahead));
-        published(&mut text, table);
     }
     if let Some(worth) = &facts.worth {
         departures(&mut text, &worth.departures);
@@ -48,30 +37,6 @@ pub fn text(facts: &Facts) -> String {
         }
     }
     text
-}
-
-/// The article's errors, and ours under them.
-fn published(text: &mut String, table: &Published) {
-    let _ = write!(text, "{:<32}", "errors in nm/min");
-    for axis in &table.axes {
-        let _ = write!(text, "{axis:>8}");
-    }
-    text.push('\n');
-    let mut line = |name: &str, whose: &str, figures: &mut dyn Iterator<Item = Option<f64>>| {
-        let _ = write!(text, "{name:<22}{whose:<10}");
-        for value in figures {
-            let _ = write!(text, "{:>8}", figure(value));
-        }
-        text.push('\n');
-    };
-    for row in &table.rows {
-        line(
-            row.name,
-            "published",
-            &mut row.published.iter().map(|value| Some(*value)),
-        );
-        line("", "here", &mut row.ours.iter().copied());
-    }
 }
 
 /// How far axes depart, and what limits their corrections.

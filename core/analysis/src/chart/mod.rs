@@ -1,11 +1,9 @@
-//! Series as pictures: [`Chart`] says what is drawn, as SVG for a page or a file, or as PNG.
+//! Series as pictures: [`Chart`] says what is drawn, as SVG for a page or a file.
 //!
-//! Decides where things stand in a picture; not how numbers fall on an axis (`scale`), nor how shapes are written (`svg`, `png`).
+//! Decides where things stand in a picture; not how numbers fall on an axis (`scale`), nor how shapes are written (`svg`).
 
 mod colours;
 mod plot;
-#[cfg(feature = "png")]
-mod png;
 mod scale;
 mod svg;
 
@@ -186,13 +184,6 @@ impl Chart<'_> {
             in_light(STYLE)
         );
         self.svg().replacen('>', &style, 1)
-    }
-
-    /// The picture as a PNG file, in the light colours.
-    #[cfg(feature = "png")]
-    #[must_use]
-    pub fn png(&self) -> Option<Vec<u8>> {
-        self.scene()?.png()
     }
 
     /// Lowest and highest y of the picture.
