@@ -70,15 +70,13 @@ fn is_one_file(_one: &Path, _other: &Path) -> bool {
 /// # Errors
 /// When it cannot be written.
 pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
-    write_whole(path, content.as_ref())
-        .map_err(|error| Failure::Outside(not_written(path, &error)))
+    write_whole(path, content.as_ref()).map_err(|error| Failure::Outside(not_written(path, &error)))
 }
 
 /// Why a file is not written.
 pub fn not_written(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}", path.display())
 }
-
 
 #[cfg(test)]
 #[cfg(unix)]

@@ -10,6 +10,7 @@ use athermal::Model;
 use athermal::core::diagnostic::Sources;
 use athermal::core::engine::{Engine, SampleRange};
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
+use athermal::core::live::monitor::usual;
 use athermal::core::recording::Event;
 use athermal::core::score::{Lack, ScoreOptions, Trace, trace_as};
 use athermal::diagnosis::comparison::{Comparison, Contender, Row, compare};
@@ -97,7 +98,7 @@ impl Once<'_> {
     }
 
     fn tell_beyond(&mut self, report: &FitReport, trace: &Trace) {
-        let new = |range: &&SampleRange| beyond::usual(&self.in_fits, &range.channel).is_none();
+        let new = |range: &&SampleRange| usual(&self.in_fits, &range.channel).is_none();
         let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
         beyond::tell(self.terminal, &beyond::beyond(&new, &trace.ranges));
         self.in_fits.extend(new);

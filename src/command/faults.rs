@@ -3,15 +3,15 @@
 use std::cell::RefCell;
 
 use athermal::Instant;
+use athermal::core::compile::origins::{health_reasons, of_truths};
 use athermal::core::compile::{Plan, SourceChannel};
+use athermal::core::engine::SampleRange;
 use athermal::core::live::Feed;
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal::core::live::Reporter;
 use athermal::core::live::monitor::silence::{self, Silence};
 use athermal::core::live::monitor::standstill::{self, Standstill};
 use athermal::core::live::monitor::{Monitor, places};
-use athermal::core::live::Reporter;
-use athermal::core::compile::origins::{health_reasons, of_truths};
-use athermal::core::engine::SampleRange;
+use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal::diagnosis::leap::{self, Leaps};
 
 use serde::Serialize;

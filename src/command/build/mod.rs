@@ -10,9 +10,9 @@ use std::process::Command;
 use clap::Args;
 use serde_json::{Value, json};
 
-use athermal::core::live::store::copy_whole;
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal::core::live::store::copy_whole;
 use cargo::Cargo;
 use project::Project;
 use wish::Wish;

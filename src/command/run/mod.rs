@@ -28,9 +28,9 @@ use crate::command::aside::check_apart;
 use crate::command::faults::{self, Looks, Purpose};
 use crate::command::model::{self, check_fitted, tell_unfitted};
 use crate::command::{beyond, data, refused, unread};
-use athermal_analysis::figures::{counted, instant, seconds};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_analysis::figures::{counted, instant, seconds};
 use reports::Reports;
 
 /// Run a model: rows in, predictions out

@@ -10,9 +10,9 @@ use super::{sensor_words, swap_words};
 use crate::command::beyond;
 use crate::command::data::REJECTED;
 use crate::command::model::{few, tell_nodes_unfitted};
-use athermal_analysis::figures::{count, counted, instant, length, number, seconds, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{count, counted, instant, length, number, seconds, time};
 
 /// What to do where a clock was ahead.
 const BEGIN_COLD: &str =

@@ -5,9 +5,9 @@ use serde_json::json;
 
 use crate::command::faults::{self, Purpose, of_standstill};
 use crate::command::model::few;
-use athermal_analysis::figures::{count, instant, number, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
+use athermal_analysis::figures::{count, instant, number, time};
 
 /// Reports what happened to sensors at a row. For people, those that fail or come back together stand in one sentence, as when a
 /// logger is unplugged.

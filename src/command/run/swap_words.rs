@@ -9,9 +9,9 @@ use athermal::core::live::session::{Refusal, WatchedGraph};
 use athermal::core::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
-use athermal_analysis::figures::{count, counted, length, number, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::{count, counted, length, number, seconds};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 const ANOTHER_RUN: &str =
@@ -132,11 +132,7 @@ pub fn not_taken_over(terminal: &Terminal, path: &Path, reason: Refusal<'_>) {
                 StageError::MissingChannels { .. }
                 | StageError::OtherTime { .. }
                 | StageError::OtherUnit { .. } => {
-                    unusable(
-                        terminal,
-                        path,
-                        &format!("what runs goes on; {ANOTHER_RUN}"),
-                    );
+                    unusable(terminal, path, &format!("what runs goes on; {ANOTHER_RUN}"));
                 }
                 _ => unusable(terminal, path, "what runs goes on"),
             }

@@ -27,7 +27,7 @@ pub(crate) use plot::{
 };
 pub use rest::Untold;
 
-use athermal_core::compile::origins::{inputs, of_truths, slots, sources_of, upstream};
+use athermal_core::compile::origins::{inputs, of_truths, slots, upstream};
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::recording::Recording;

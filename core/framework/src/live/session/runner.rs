@@ -163,7 +163,8 @@ impl Replaceable {
                 outputs.position(|output| output.name == *name)
             };
             self.places.clear();
-            self.places.extend(self.schedule.columns().iter().map(place));
+            self.places
+                .extend(self.schedule.columns().iter().map(place));
             let usual = self.schedule.running().sample_ranges();
             for monitor in monitors {
                 monitor.follow(stepped.plan, &self.feed, usual);
