@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Recording, Samples};
-use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Recording, Samples};
+use athermal::run::score::{ScoreOptions, score};
 use athermal_numerics::{Direction, Folds, GramBlocks, LeastSquares, Search, Standardization};
 use divan::Bencher;
 use divan::counter::BytesCount;

@@ -9,7 +9,7 @@ mod die_tester;
 use std::time::{Duration, Instant as Clock};
 
 use athermal::Model;
-use athermal::core::live::{LiveOptions, pair};
+use athermal::run::live::{LiveOptions, pair};
 use die_tester::{Tick, fitted, ticks};
 
 const SWAPS: usize = 200;

@@ -6,8 +6,8 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
 use athermal::{Instant, Model};
 
 const GRAPH: &str = r#"

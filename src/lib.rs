@@ -17,9 +17,11 @@
 
 pub use athermal_core as core;
 pub use athermal_core::engine::{Engine, EngineError};
-pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
+pub use athermal_run as run;
+pub use athermal_run::model::{Model, ModelError};
+pub use athermal_trial as trial;
 
 #[cfg(feature = "analysis")]
 pub use athermal_analysis::{chart, diagnosis, report};
@@ -39,6 +41,8 @@ mod invocation;
 mod message;
 #[cfg(feature = "cli")]
 mod program;
+#[cfg(feature = "cli")]
+pub mod schema;
 #[cfg(feature = "cli")]
 mod starter;
 #[cfg(feature = "cli")]

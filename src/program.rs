@@ -3,7 +3,7 @@
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
-use athermal::core::diagnostic::said;
+use athermal::core::diagnostic::{panic_text, said};
 use clap::{CommandFactory, Parser};
 
 use crate::terminal::{Answer, Failure, Format};
@@ -49,12 +49,11 @@ pub fn command_line() -> ExitCode {
 
 /// What a command answers, or that code of the program or of a plugin panicked in it.
 fn caught(command: impl FnOnce() -> Result<Answer, Failure>) -> Result<Answer, Failure> {
-    panic::catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(|_| {
-        Err(Failure::Outside(
-            "the program cannot go on: its own code or that of a plugin has a mistake, of which is told above; `RUST_BACKTRACE=1` \
-             shows the way to it"
-                .to_owned(),
-        ))
+    panic::catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(|panic| {
+        Err(Failure::Outside(format!(
+            "the program cannot go on: {}; `RUST_BACKTRACE=1` shows the way to it",
+            panic_text(&*panic)
+        )))
     })
 }
 

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
-use athermal::core::fault::FaultError;
-use athermal::core::fit::FitError;
-use athermal::core::live::{RunError, StateError};
 use athermal::files::FileError;
+use athermal::run::fit::FitError;
+use athermal::run::live::{RunError, StateError};
+use athermal::trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -370,7 +370,7 @@ impl From<FitError> for Failure {
         match error {
             FitError::Recording(error) => outside(error),
             FitError::Engine(error) => Self::Request(error.to_string()),
-            FitError::Panicked => Self::Outside(error.to_string()),
+            FitError::Panicked { .. } => Self::Outside(error.to_string()),
         }
     }
 }

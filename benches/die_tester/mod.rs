@@ -11,9 +11,9 @@ use std::sync::Arc;
 use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Disk, declare, load_text};
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::machine::{Machine, Row, Setup, Simulation};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
+use athermal::trial::machine::{Machine, Row, Setup, Simulation};
 use athermal::{Instant, Model};
 
 /// One tick: temperatures, then six positions, NaN where there is none.

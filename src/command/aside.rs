@@ -4,8 +4,8 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use athermal::core::live::store::write_whole;
 use athermal::files::STANDARD_INPUT;
+use athermal::run::live::store::write_whole;
 
 use crate::terminal::Failure;
 
@@ -81,7 +81,7 @@ pub fn not_written(path: &Path, error: &io::Error) -> String {
 #[cfg(test)]
 #[cfg(unix)]
 mod tests {
-    use athermal::core::live::store::copy_whole;
+    use athermal::run::live::store::copy_whole;
 
     use super::*;
 

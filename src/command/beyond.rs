@@ -1,7 +1,7 @@
 //! Decides when data lie so far from those of a fit that predictions of them mean little; how well they do is told by their scores.
 
 use athermal::core::engine::SampleRange;
-use athermal::core::live::monitor::usual;
+use athermal::run::live::monitor::usual;
 use serde::Serialize;
 use serde_json::json;
 

@@ -9,7 +9,7 @@ use athermal::core::compile::{Plan, Wanted, compile_part};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk, GraphFile};
 use athermal::core::engine::Fitted;
-use athermal::core::trial::{self, Trial};
+use athermal::trial::{self, Trial};
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;

@@ -9,11 +9,11 @@ use std::time::Instant;
 use athermal::Model;
 use athermal::core::diagnostic::Sources;
 use athermal::core::engine::{Engine, SampleRange};
-use athermal::core::fit::{FitOptions, FitReport, Outcome};
-use athermal::core::live::monitor::usual;
-use athermal::core::recording::Event;
-use athermal::core::score::{Lack, ScoreOptions, Trace, trace_as};
 use athermal::diagnosis::comparison::{Comparison, Contender, Row, compare};
+use athermal::run::fit::{FitOptions, FitReport, Outcome};
+use athermal::run::live::monitor::usual;
+use athermal::run::recording::Event;
+use athermal::run::score::{Lack, ScoreOptions, Trace, trace_as};
 use clap::Args;
 use serde_json::{Map, Value, json};
 

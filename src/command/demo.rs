@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::fit::FitOptions;
-use athermal::core::machine::{Setup, Simulated, machine};
-use athermal::core::score::{Score, ScoreOptions, Scores, score};
+use athermal::run::fit::FitOptions;
+use athermal::run::score::{Score, ScoreOptions, Scores, score};
+use athermal::trial::machine::{Setup, Simulated, machine};
 use clap::Args;
 use serde_json::json;
 

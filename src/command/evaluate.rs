@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use athermal::core::compile::Wanted;
-use athermal::core::score::{Lack, Score, ScoreOptions, Scores, score};
+use athermal::run::score::{Lack, Score, ScoreOptions, Scores, score};
 use clap::Args;
 use serde_json::json;
 

@@ -6,13 +6,12 @@ use athermal::Instant;
 use athermal::core::compile::origins::{health_reasons, of_truths};
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::Feed;
-use athermal::core::live::Reporter;
-use athermal::core::live::monitor::silence::{self, Silence};
-use athermal::core::live::monitor::standstill::{self, Standstill};
-use athermal::core::live::monitor::{Monitor, places};
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
 use athermal::diagnosis::leap::{self, Leaps};
+use athermal::run::live::monitor::silence::{self, Silence};
+use athermal::run::live::monitor::standstill::{self, Standstill};
+use athermal::run::live::monitor::{Monitor, places};
+use athermal::run::live::{Feed, Reporter};
+use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
 
 use serde::Serialize;
 use serde_json::{Value, json};

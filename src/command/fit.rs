@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::compile::PlannedChannel;
 use athermal::core::diagnostic::Sources;
-use athermal::core::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
-use athermal::core::model::{Card, EstimatorCard, Period};
 use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
+use athermal::run::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
+use athermal::run::model::{Card, EstimatorCard, Period};
 use clap::Args;
 use serde_json::json;
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::{Diagnostics, Sources, listed};
-use athermal::core::model::ModelError;
 use athermal::core::quantity::Quantity;
+use athermal::run::model::ModelError;
 
 use crate::terminal::{Failure, Terminal};
 

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
-use athermal::core::fit::FitError;
-use athermal::core::score::Lack;
 use athermal::diagnosis::feedback;
 use athermal::report::{SensorFacts, gather, page, plots, text};
+use athermal::run::fit::FitError;
+use athermal::run::score::Lack;
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use athermal::core::schema::graph_schema;
+use athermal::schema::graph_schema;
 use clap::Args;
 
 use super::aside::write_aside;

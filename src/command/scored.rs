@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use athermal::Model;
 use athermal::core::quantity::Quantity;
-use athermal::core::score::{Mode, ScoreOptions};
+use athermal::run::score::{Mode, ScoreOptions};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
-use athermal::core::fault::FaultSpec;
-use athermal::core::machine::{
+use athermal::files::{Flush, Format as FileFormat, Writer};
+use athermal::trial::fault::FaultSpec;
+use athermal::trial::machine::{
     ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
     machine, machines,
 };
-use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal_simulation::{table_columns, write_table};
 use clap::Args;
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! Decides in what words people are told why nothing of a prediction is scored.
 
-use athermal::core::score::Unscored;
+use athermal::run::score::Unscored;
 
 use super::model::few;
 use crate::terminal::Terminal;

@@ -6,11 +6,11 @@ use std::path::Path;
 
 use crate::workbench::{Scratch, athermal, data, graph, graphs, simulated};
 use athermal::Model;
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{RoleName, kinds};
-use athermal::core::score::trace;
 use athermal::diagnosis::comparison::{Comparison, Contender, compare};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::score::trace;
 use serde_json::Value;
 
 /// Kinds that predict the same whatever was measured: baselines, which others are measured by.

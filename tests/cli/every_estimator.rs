@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use crate::workbench::{Scratch, athermal};
 use athermal::Model;
-use athermal::core::fit::{FitOptions, FitReport, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 
 /// They choose among products of features, and do not say which of them are alike.
 const CHOOSING: [&str; 2] = ["narx", "polynomial"];

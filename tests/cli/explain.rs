@@ -7,7 +7,7 @@ use athermal as _;
 use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{CODES, Diagnostics, Severity, Sources, explain};
 use athermal::core::document::{Memory, declare, load};
-use athermal::core::trial;
+use athermal::trial;
 
 /// Two crates with a node type of the same name, a type whose code is at fault, and what is wrong with a model beside the file: no
 /// graph alone shows these.

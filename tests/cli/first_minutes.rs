@@ -5,9 +5,9 @@ use std::process::Command;
 
 use crate::workbench::Folder;
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::machine::{Setup, Simulated, machine, machines};
-use athermal::core::score::{ScoreOptions, score};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::score::{ScoreOptions, score};
+use athermal::trial::machine::{Setup, Simulated, machine, machines};
 
 impl Folder {
     /// Runs and expects success; gives standard output and standard error.

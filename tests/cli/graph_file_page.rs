@@ -8,8 +8,8 @@ use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{CODES, Diagnostics, Sources};
 use athermal::core::document::{Memory, declare, load};
 use athermal::core::node::kinds;
-use athermal::core::schema::graph_schema;
-use athermal::core::trial;
+use athermal::schema::graph_schema;
+use athermal::trial;
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/src/graph-file.md");

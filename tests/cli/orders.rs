@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 
 use crate::workbench::{Scratch, athermal, athermal_on, numbers, own_oracle, plan};
 use athermal::Instant;
-use athermal::core::fit::{FitOptions, FitProgress, fit};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, FitProgress, fit};
+use athermal::run::recording::Table;
 use serde_json::Value;
 
 /// A graph that leaves open of how many steps back it reads, up to `most`.

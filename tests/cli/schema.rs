@@ -3,7 +3,7 @@
 use crate::workbench::{athermal, graph};
 use athermal as _;
 use athermal::core::node::kinds;
-use athermal::core::schema::graph_schema;
+use athermal::schema::graph_schema;
 use serde_json::Value;
 
 #[test]

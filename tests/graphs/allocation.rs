@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::workbench::graphs;
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::kinds;
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
 use athermal::{Duration, Instant, Model};
 
 /// The time between ticks: ten seconds, or so much that the longest window is long over when a graph counts as warm.

@@ -12,9 +12,9 @@ use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
 use crate::workbench::{Scratch, athermal, athermal_fed, graph, simulated};
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Recording, Samples, Table};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Recording, Samples, Table};
 use athermal::{Engine, Model};
 
 /// Two days of a machine, half a day of another, and a model fitted on the former.

@@ -10,7 +10,7 @@ use athermal as _;
 use athermal::core::compile::{Wanted, compile, compile_part, diff};
 use athermal::core::diagnostic::{Diagnostics, Severity, Sources, explain};
 use athermal::core::document::{Memory, declare, load};
-use athermal::core::trial;
+use athermal::trial;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 

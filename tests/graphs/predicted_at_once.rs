@@ -6,10 +6,10 @@ use crate::workbench::{Bench, linear, plan, secs, slot};
 use athermal::Engine;
 use athermal::core::channel::ABSENT;
 use athermal::core::compile::PlannedRole;
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
 
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 /// Eleven are eight whose products are summed at once and three that are left.

@@ -1,12 +1,12 @@
 //! What a trainer is told that asks for the runs between truths: the same whether rows are kept or streamed.
 
 use crate::workbench::{plan, secs};
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{
     Estimator, InputPort, Predictor, Regressors, Runs, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 use athermal::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::workbench::{Finished, Scratch, athermal, fitted, numbers, plan, regression, secs};
 use athermal::core::node::Of;
-use athermal::core::recording::Table;
+use athermal::run::recording::Table;
 use serde_json::Value;
 
 const SIGNALS: &str = r#"

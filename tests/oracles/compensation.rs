@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::workbench::{Read, data};
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
 use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
+use athermal::run::fit::{FitOptions, fit};
 
 fn facts(graph: &str, data: &Path) -> Facts {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");

@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 
 use crate::workbench::{Scratch, data, graph};
 use athermal::Model;
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Kind, RoleName, kinds};
-use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::score::{ScoreOptions, score};
 
 /// Baselines themselves, and what goes by states whose limits have no default.
 const LEFT_OUT: [&str; 3] = ["persistence", "state_gate", "zero"];

@@ -7,9 +7,9 @@ use crate::workbench::{
     coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs,
 };
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Figure, Predictor, TrainingError, TrainingReport};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 use serde_json::Value;
 
 const COLUMNS: usize = 12;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::workbench::{own_oracle, plan, regression, secs};
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::TrainingReport;
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 use serde_json::Value;
 
 /// The rows of the oracle: two inputs, and what each of its models leads to, NaN where it is missing.

@@ -7,9 +7,9 @@ use std::sync::{Arc, OnceLock};
 use crate::workbench::{data, graph, slot};
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Table};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Model};
 
 const SENSORS: [&str; 6] = ["plate1", "holder1", "plate2", "holder2", "room", "chuck"];

@@ -8,9 +8,9 @@ use std::sync::Arc;
 use crate::workbench::{data, graph};
 use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::score::{Score, ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::score::{Score, ScoreOptions, score};
 
 /// A figure may be worse than the reference by this share, and better by any.
 const WORSE: f64 = 1.02;

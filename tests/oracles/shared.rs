@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::workbench::{coefficients, fitted, oracle, plan, regression, slot};
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 use athermal::{Engine, Instant};
 
 /// A CSV file without quotes: the names of its columns, and its cells.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::workbench::plan;
 use athermal::Instant;
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitOptions, Outcome, fit};
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
 
 /// Temperatures that wander, once a second, and a drift that follows two of them.
 struct Wandering {

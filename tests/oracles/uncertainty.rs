@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use crate::workbench::{Bench, Read, Scratch, athermal, data, plan, problems, secs, slot};
 use athermal::core::compile::{Plan, Wanted};
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
-use athermal::core::recording::Table;
-use athermal::core::score::{Score, ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
+use athermal::run::score::{Score, ScoreOptions, score};
 use athermal::{Engine, Instant};
 
 /// The plan of a graph that gives all intervals it can.
@@ -396,7 +396,7 @@ fn the_most_likely_noises_are_told_as_a_graph_takes_them() {
         .collect();
     let train = recorded(500, |row| truths[row]);
     let (_, report) = fit(&plan, &train, &FitOptions::default(), &mut |_| {}).unwrap();
-    let athermal::core::fit::Outcome::Fitted(told) = &report.estimators[0].outcome else {
+    let athermal::run::fit::Outcome::Fitted(told) = &report.estimators[0].outcome else {
         panic!("{:?}", report.estimators[0].outcome)
     };
     let mut notes = told.notes.iter();

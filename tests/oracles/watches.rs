@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::workbench::{Scratch, data, graph};
 use athermal::Model;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Table};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
 
 /// When the machine begins to drift otherwise, in s.
 const CHANGED_S: f64 = 4.0 * 86_400.0;

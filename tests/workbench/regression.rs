@@ -4,9 +4,9 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::core::node::Predictor;
-use athermal::core::recording::Table;
+use athermal::run::fit::{EstimatorFit, FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 
 /// The numbers of a table, line by line, without its header.
 pub fn numbers(text: &str) -> Vec<Vec<f64>> {

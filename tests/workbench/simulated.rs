@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use athermal::core::{self, machine::Setup};
+use athermal::trial::machine::Setup;
 
 use super::Scratch;
 
 /// Writes so many days of a machine as a CSV file.
 pub fn simulated(scratch: &Scratch, name: &str, machine: &str, days: f64, seed: u64) -> PathBuf {
-    let machine = core::machine::machine(machine)
+    let machine = athermal::trial::machine::machine(machine)
         .expect("a machine of that name is built in")
         .machine;
     let setup = Setup {

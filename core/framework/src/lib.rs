@@ -106,28 +106,13 @@
 //! | [`live`] | sources, sinks, running from one to the other; replacing a graph while it runs |
 //! | `testkit`, a feature | what every node must do, for the tests of those who write nodes |
 
-pub mod channel;
 pub mod compile;
-mod decimal_comma;
-pub mod diagnostic;
-pub mod document;
 pub mod engine;
-pub mod fault;
-pub mod fit;
-pub mod live;
-pub mod machine;
-pub mod model;
 pub mod node;
 pub mod prng;
-pub mod quantity;
-pub mod recording;
-pub mod schema;
-pub mod score;
-#[cfg(feature = "testkit")]
-pub mod testkit;
-pub mod time;
-pub mod trial;
-pub mod unit;
+
+// The vocabulary that a graph is written in; authors of nodes need one crate.
+pub use athermal_graph::{channel, diagnostic, document, quantity, time, unit};
 
 #[doc(hidden)]
 pub use inventory;

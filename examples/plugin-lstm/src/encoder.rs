@@ -170,7 +170,7 @@ athermal_core::register!(LstmEncoder, Feature, "lstm_encoder");
 
 #[cfg(test)]
 mod tests {
-    use athermal_core::testkit::Bench;
+    use athermal_testkit::Bench;
 
     use super::*;
 

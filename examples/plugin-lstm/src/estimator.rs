@@ -115,7 +115,7 @@ athermal_core::register!(Lstm, Estimator, "lstm");
 #[cfg(test)]
 mod tests {
     use athermal_core::prng::Prng;
-    use athermal_core::testkit::Bench;
+    use athermal_testkit::Bench;
 
     use super::*;
 

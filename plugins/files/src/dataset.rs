@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
-use athermal_core::recording::{self, Samples, Source, SourceError};
 use athermal_core::time::Duration;
+use athermal_run::recording::{self, Samples, Source, SourceError};
 
 use crate::stream::read_into;
 use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, TimeColumn, TimeForm};

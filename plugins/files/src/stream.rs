@@ -1,8 +1,8 @@
 //! Files as source and sink of a run: rows in, rows out.
 
-use athermal_core::live::{Frame, Sink, SinkError};
-use athermal_core::recording::{Event, Samples, Source, SourceError};
 use athermal_core::time::Instant;
+use athermal_run::live::{Frame, Sink, SinkError};
+use athermal_run::recording::{Event, Samples, Source, SourceError};
 
 use crate::{FileError, Reader, Row, Writer};
 

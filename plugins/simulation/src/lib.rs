@@ -1,7 +1,7 @@
 //! Simulated machines whose axes drift with temperature. Decides which machines there are, not who runs them.
 //!
 //! ```
-//! use athermal_core::machine::{Row, Setup, machine};
+//! use athermal_trial::machine::{Row, Setup, machine};
 //! use athermal_simulation as _;
 //!
 //! let machine = machine("linear-axis")?.machine;
@@ -30,10 +30,10 @@ pub use die_tester::DieTester;
 pub use linear_axis::LinearAxis;
 pub use table::{table_columns, write_table};
 
-use athermal_core::machine::Machine;
+use athermal_trial::machine::Machine;
 
 /// The machines of this crate, by name.
 pub const MACHINES: [&dyn Machine; 2] = [&DieTester, &LinearAxis];
 
-athermal_core::register_machine!(DieTester);
-athermal_core::register_machine!(LinearAxis);
+athermal_trial::register_machine!(DieTester);
+athermal_trial::register_machine!(LinearAxis);

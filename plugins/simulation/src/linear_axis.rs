@@ -5,11 +5,11 @@ use crate::creep::Creep;
 use crate::motors::{Duty, Motors};
 use crate::recorder::{PERIOD_S, Plant, Recorder};
 use crate::room::{Coupling, Room, RoomShape};
-use athermal_core::machine::schedule::Track;
-use athermal_core::machine::{
+use athermal_core::prng::Prng;
+use athermal_trial::machine::schedule::Track;
+use athermal_trial::machine::{
     Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
-use athermal_core::prng::Prng;
 
 /// The machine `linear-axis`.
 ///

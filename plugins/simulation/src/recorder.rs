@@ -1,7 +1,7 @@
 //! How the true state of a machine becomes rows. Decides sampling instants, noise, resolution and true drift, not the state.
 
-use athermal_core::machine::{Channel, Row, SECOND_NS, Simulation};
 use athermal_core::prng::Prng;
+use athermal_trial::machine::{Channel, Row, SECOND_NS, Simulation};
 
 /// Seconds between rows: every temperature is sampled in each.
 pub const PERIOD_S: i64 = 10;

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use crate::recorder::DRIFT_DECIMALS;
-use athermal_core::machine::{Channel, Row, SECOND_NS, Simulation};
+use athermal_trial::machine::{Channel, Row, SECOND_NS, Simulation};
 
 /// The names of the columns after the time: one per channel (`plate1_degC`, `Z1_nm`), and with `truth` one per axis with its
 /// true drift (`Z1_drift_true_nm_per_min`).

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal::core::live::store::copy_whole;
+use athermal::run::live::store::copy_whole;
 use cargo::Cargo;
 use project::Project;
 use wish::Wish;

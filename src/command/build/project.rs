@@ -79,14 +79,26 @@ impl Project {
 /// The manifest. With `registry`, crates that ask a registry for the core get the one at hand.
 pub(super) fn manifest(wishes: &[Wish], checkout: &Checkout, registry: bool) -> String {
     let athermal = in_toml(checkout.folder());
-    let core = in_toml(&checkout.core());
-    let numerics = in_toml(&checkout.folder().join("core/numerics"));
+    let crates: String = [
+        ("athermal-core", "core/framework"),
+        ("athermal-graph", "core/graph"),
+        ("athermal-run", "core/run"),
+        ("athermal-trial", "core/trial"),
+        ("athermal-testkit", "core/testkit"),
+        ("athermal-numerics", "core/numerics"),
+    ]
+    .map(|(name, folder)| {
+        format!(
+            "{name} = {{ path = {} }}\n",
+            in_toml(&checkout.folder().join(folder))
+        )
+    })
+    .concat();
     let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
     let patch = format!(
         "# A plugin that asks a registry for athermal gets this one.\n\
          [patch.crates-io]\n\
-         athermal-core = {{ path = {core} }}\n\
-         athermal-numerics = {{ path = {numerics} }}\n\n"
+         {crates}\n"
     );
     let patch = if registry { patch.as_str() } else { "" };
     format!(

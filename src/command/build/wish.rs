@@ -145,19 +145,17 @@ pub(super) fn without_testkit<'a>(
     packages: impl Iterator<Item = &'a Value>,
 ) -> Result<(), Failure> {
     let brings_it = |dependency: &Value| {
-        let mut features = dependency["features"].as_array().into_iter().flatten();
-        dependency["name"] == "athermal-core"
+        dependency["name"] == "athermal-testkit"
             && dependency["kind"].is_null()
             && dependency["optional"] != true
-            && features.any(|feature| feature == "testkit")
     };
     for package in packages {
         let mut dependencies = package["dependencies"].as_array().into_iter().flatten();
         if dependencies.any(brings_it) {
             let name = package["name"].as_str().unwrap_or_default();
             return Err(Failure::Request(format!(
-                "{name} has athermal-core with the feature `testkit` under `[dependencies]`, which would count every allocation of the \
-                 program: leave the feature out there, and have athermal-core under `[dev-dependencies]` too, with `features = [\"testkit\"]`"
+                "{name} has athermal-testkit under `[dependencies]`, which would count every allocation of the program: move it to \
+                 `[dev-dependencies]`"
             )));
         }
     }

@@ -1,7 +1,7 @@
 //! What a comparison is told as; what is compared stands above.
 
-use athermal::core::score::Mode;
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison};
+use athermal::run::score::Mode;
 
 use athermal_analysis::figures::{count, counted, digits, matrix, number, or_dash, stated};
 

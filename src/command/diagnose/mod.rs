@@ -11,11 +11,11 @@ use std::path::PathBuf;
 
 use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
-use athermal::core::score::Lack;
 use athermal::diagnosis::day::Days;
 use athermal::diagnosis::{
     Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
 };
+use athermal::run::score::Lack;
 use clap::Args;
 use serde_json::json;
 

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use athermal::core::machine::machines;
 use athermal::core::node::kinds;
+use athermal::trial::machine::machines;
 use clap::Args;
 use serde_json::json;
 
@@ -58,7 +58,14 @@ impl Plugin {
         }
         let athermal = Athermal {
             folder: in_toml(checkout.folder()),
-            core: in_toml(&checkout.core()),
+            crates: [
+                ("CORE", "core/framework"),
+                ("RUN", "core/run"),
+                ("TRIAL", "core/trial"),
+                ("TESTKIT", "core/testkit"),
+            ]
+            .map(|(word, folder)| (word, in_toml(&checkout.folder().join(folder))))
+            .to_vec(),
             version: VERSION,
         };
         let mut written = Vec::new();

@@ -1,5 +1,5 @@
 //! Decides what a new plugin crate consists of; the texts are files beside this one, in which `my-node`, `my_node` and
-//! `MyNode` stand for the name, `CORE`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
+//! `MyNode` stand for the name, `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 
@@ -115,9 +115,12 @@ const KEYWORDS: [&str; 51] = [
 ];
 
 /// The crates and modules that a new one cannot be called, because it uses them.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 12] = [
     "athermal",
     "athermal_core",
+    "athermal_run",
+    "athermal_testkit",
+    "athermal_trial",
     "alloc",
     "core",
     "live",
@@ -132,8 +135,8 @@ const CRATES: [&str; 9] = [
 pub struct Athermal<'a> {
     /// The folder of its sources.
     pub folder: String,
-    /// The folder of its core.
-    pub core: String,
+    /// The folders of the crates that a plugin may build on, by the words that stand for them in a manifest.
+    pub crates: Vec<(&'static str, String)>,
     /// Its version.
     pub version: &'a str,
 }
@@ -146,11 +149,14 @@ pub fn files(names: &Names, role: Role, athermal: &Athermal<'_>) -> Vec<(String,
         if path != "Cargo.toml" {
             return (path, text);
         }
-        let words = [
-            ("VERSION", athermal.version),
-            ("CORE", &athermal.core),
-            ("ATHERMAL", &athermal.folder),
-        ];
+        let mut words = vec![("VERSION", athermal.version)];
+        words.extend(
+            athermal
+                .crates
+                .iter()
+                .map(|(word, folder)| (*word, folder.as_str())),
+        );
+        words.push(("ATHERMAL", &athermal.folder));
         (path, put(&text, &words))
     });
     texts.collect()
@@ -288,7 +294,7 @@ mod tests {
         let names = Names::of("room-lag").unwrap();
         let athermal = Athermal {
             folder: "\"/srv/my-node\"".to_owned(),
-            core: "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned(),
+            crates: vec![("CORE", "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned())],
             version: "1.2.3",
         };
         let (path, text) = files(&names, Role::Source, &athermal).swap_remove(0);
@@ -306,13 +312,16 @@ mod tests {
         let names = Names::of("room-lag").unwrap();
         let athermal = Athermal {
             folder: "\"/sources\"".to_owned(),
-            core: "\"/sources/core\"".to_owned(),
+            crates: ["CORE", "RUN", "TRIAL", "TESTKIT"]
+                .map(|word| (word, "\"/sources/core\"".to_owned()))
+                .to_vec(),
             version: "1.2.3",
         };
         for role in ROLES {
             for (path, text) in files(&names, role, &athermal) {
                 for left in [
-                    "my_node", "my-node", "MyNode", "CORE", "VERSION", "ATHERMAL",
+                    "my_node", "my-node", "MyNode", "CORE", "RUN", "TRIAL", "TESTKIT", "VERSION",
+                    "ATHERMAL",
                 ] {
                     assert!(!path.contains(left), "{left} in {path}");
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");

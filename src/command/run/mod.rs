@@ -12,15 +12,15 @@ use std::sync::Arc;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
-use athermal::core::live::monitor::{RangeMonitor, SensorMonitor};
-use athermal::core::live::session::WatchedGraph;
-use athermal::core::live::store::{FileLock, OutputIdentity};
-use athermal::core::live::{Session, SessionOptions, Sink, StateStore};
 use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
     layout,
 };
+use athermal::run::live::monitor::{RangeMonitor, SensorMonitor};
+use athermal::run::live::session::WatchedGraph;
+use athermal::run::live::store::{FileLock, OutputIdentity};
+use athermal::run::live::{Session, SessionOptions, Sink, StateStore};
 use clap::Args;
 use serde_json::json;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use athermal::core::live::{Report, Reporter};
+use athermal::run::live::{Report, Reporter};
 use athermal::{Duration, Instant};
 use serde_json::json;
 
@@ -166,7 +166,7 @@ impl Reports {
     }
 
     /// That nothing came out, with the first node that gives nothing.
-    pub fn no_output(&self, of: &athermal::core::live::monitor::NoOutput) {
+    pub fn no_output(&self, of: &athermal::run::live::monitor::NoOutput) {
         let pace = match of.apart_s > 0.0 {
             true => format!(", which are {} apart", time(of.apart_s)),
             false => String::new(),

@@ -1,6 +1,6 @@
 //! The words of sensors that fail and are in order again.
 
-use athermal::core::live::monitor::{SensorChange, SensorFault};
+use athermal::run::live::monitor::{SensorChange, SensorFault};
 use serde_json::json;
 
 use crate::command::faults::{self, Purpose, of_standstill};

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use athermal::core::document::TimeBase;
-use athermal::core::live::session::{Swap, SwapTime, WatchedGraph, load_replacement};
-use athermal::core::live::{Replacement, Reporter, StageError};
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
+use athermal::run::live::session::{Swap, SwapTime, WatchedGraph, load_replacement};
+use athermal::run::live::{Replacement, Reporter, StageError};
 use athermal::{Duration, Model};
 use clap::Args;
 

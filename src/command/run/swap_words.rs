@@ -5,8 +5,8 @@ use std::path::Path;
 
 use athermal::Duration;
 use athermal::core::engine::Carry;
-use athermal::core::live::session::{Refusal, WatchedGraph};
-use athermal::core::live::{Notice, StageError, Staged, Verdict};
+use athermal::run::live::session::{Refusal, WatchedGraph};
+use athermal::run::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
 use crate::message::Message;

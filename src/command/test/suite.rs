@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::trial::{self, DataSet, On, Trial};
+use athermal::trial::{self, DataSet, On, Trial};
 
 use crate::command::check::plan_and_tests;
 use crate::terminal::{Failure, Terminal, status_of};

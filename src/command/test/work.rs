@@ -6,11 +6,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
+use athermal::core::diagnostic::panic_text;
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Recording;
-use athermal::core::trial::{self, DataSet, Finding, On};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Recording;
+use athermal::trial::{self, DataSet, Finding, On};
 
 use super::suite::Suite;
 use crate::command::data::of_files;
@@ -67,11 +68,11 @@ impl Broken {
     }
 }
 
-/// What a job gives, or that a node panicked in it: other tests wait for its fit, and are to be told of.
+/// What a job gives, or what a node that panicked in it says: other tests wait for its fit.
 fn caught<T>(job: impl FnOnce() -> Result<T, Broken>) -> Result<T, Broken> {
-    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|_| {
+    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
         Err(Broken {
-            message: "a node panicked; what it said stands above, and is for its author".to_owned(),
+            message: panic_text(&*panic),
             status: 3,
         })
     })
@@ -261,7 +262,7 @@ mod tests {
     #[test]
     fn a_panic_is_told_as_what_breaks_a_test() {
         let broken = caught::<()>(|| panic!("within a node")).unwrap_err();
-        assert!(broken.message.contains("a node panicked"));
+        assert!(broken.message.contains("within a node"));
         assert_eq!(caught(|| Ok(1)).unwrap_or_default(), 1);
     }
 }

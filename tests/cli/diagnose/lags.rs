@@ -1,8 +1,8 @@
 //! When features tell something of a truth and of what predictions leave of it, and when they only seem to.
 
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
 use athermal::diagnosis::{lag, observe};
+use athermal::run::recording::Table;
 
 use super::{TWO_SENSORS, linear, model, secs, wandering};
 

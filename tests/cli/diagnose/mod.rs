@@ -8,15 +8,15 @@ mod reach;
 use std::sync::Arc;
 
 use crate::workbench::{Scratch, graph, linear, secs, simulated};
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
-use athermal::core::recording::{Event, Table};
-use athermal::core::score::trace;
 use athermal::diagnosis::{
     Options, day, diagnose, observe, regressor, residual, response, sensor, window,
 };
 use athermal::files::Dataset;
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
+use athermal::run::score::trace;
 use athermal::{Duration, Instant, Model};
 
 /// Two temperatures and a position, every 10 s, and an estimator whose coefficients the test gives.

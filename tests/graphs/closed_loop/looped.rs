@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::machine::{
+use athermal::run::fit::{FitOptions, fit};
+use athermal::trial::machine::{
     ClosedLoop, Machine, Row, SECOND_NS, Schedule, Setup, Simulated, Simulation, machine,
 };
 use athermal::{Engine, Model};

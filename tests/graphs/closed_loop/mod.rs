@@ -4,8 +4,8 @@ mod looped;
 use std::path::Path;
 
 use crate::workbench::{Scratch, athermal, graph, simulated};
-use athermal::core::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use athermal::core::prng::Prng;
+use athermal::trial::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use looped::{Looped, output};
 
 fn die_tester() -> Looped {

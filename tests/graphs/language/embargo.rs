@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::{Event, Recording, Samples, Table};
-use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Recording, Samples, Table};
+use athermal::run::score::{ScoreOptions, score};
 use athermal::{Engine, Instant};
 
 use super::{SAMPLES, SLOPES};

@@ -7,15 +7,15 @@ use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Memory, declare, load_text};
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, FitProgress, FitReport, fit};
-use athermal::core::model::Model;
 use athermal::core::node::{
     Encoder, Estimator, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs,
     Predictor, Regressors, Tick, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal::core::recording::{Event, Table};
 use athermal::core::time::Duration;
 use athermal::core::unit::Unit;
+use athermal::run::fit::{FitOptions, FitProgress, FitReport, fit};
+use athermal::run::model::Model;
+use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -294,8 +294,8 @@ fn what_reads_it_is_fitted_after_it_on_what_it_then_gives() {
         }
     }
     let in_sample = match &report.estimators[1].outcome {
-        athermal::core::fit::Outcome::Fitted(report) => report.in_sample_rmse.unwrap(),
-        athermal::core::fit::Outcome::Failed(error) => panic!("{error}"),
+        athermal::run::fit::Outcome::Fitted(report) => report.in_sample_rmse.unwrap(),
+        athermal::run::fit::Outcome::Failed(error) => panic!("{error}"),
     };
     let rmse = f64::sqrt(squares / rows);
     assert!(
@@ -386,7 +386,7 @@ fn a_model_of_a_node_type_that_this_program_lacks_is_told_by_the_name_of_the_typ
     model.fitted = fitted(&model.plan).0;
     let text = model.to_text().unwrap().replace("test_along", "bellows");
     let told = match Model::from_text("model.json", text) {
-        Err(athermal::core::model::ModelError::Graph {
+        Err(athermal::run::model::ModelError::Graph {
             diagnostics,
             sources,
         }) => diagnostics.render(&sources, false, 200),

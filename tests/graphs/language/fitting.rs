@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{EstimatorFit, FitOptions, Outcome, fit};
-use athermal::core::recording::{Event, Table};
+use athermal::run::fit::{EstimatorFit, FitOptions, Outcome, fit};
+use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
 use super::{SAMPLES, SLOPES};

@@ -1,7 +1,7 @@
 //! What counts as a sample: finite, within the range of its signal, of a channel that the data have.
 
-use athermal::core::recording::Table;
 use athermal::files::{Dataset, Options};
+use athermal::run::recording::Table;
 
 use super::SAMPLES;
 use crate::workbench::{Bench, Scratch, plan};

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, fit};
-use athermal::core::recording::Table;
-use athermal::core::score::{ScoreOptions, score};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::Table;
+use athermal::run::score::{ScoreOptions, score};
 
 use super::{SAMPLES, SLOPES};
 use crate::workbench::{Bench, linear, plan, secs};

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, FitProgress, Outcome, fit};
 use athermal::core::node::Figure;
-use athermal::core::recording::{Event, Table};
+use athermal::run::fit::{FitOptions, FitProgress, Outcome, fit};
+use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
 use super::SAMPLES;

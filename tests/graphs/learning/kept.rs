@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use athermal::core::engine::Engine;
-use athermal::core::live::{LiveOptions, Notice, pair};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
+use athermal::run::live::{LiveOptions, Notice, pair};
 use athermal::{Instant, Model};
 
 use super::world::{RLS, SGD, engine, fitted, graph, rows, run, same};

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::engine::{Engine, Fitted};
-use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
+use athermal::run::fit::{FitOptions, Outcome, fit};
+use athermal::run::recording::Table;
 
 use crate::workbench::{plan, secs};
 

@@ -1,7 +1,7 @@
 //! Two graphs that disagree by 200 nm pass over into each other at the stated rate.
 
 use athermal::Model;
-use athermal::core::live::{LiveOptions, Stepper, pair};
+use athermal::run::live::{LiveOptions, Stepper, pair};
 
 use super::model::{d, model, s};
 
@@ -16,7 +16,7 @@ fn showing(from: &str) -> Model {
 }
 
 fn channels() -> LiveOptions {
-    use athermal::core::live::Feed;
+    use athermal::run::live::Feed;
     let feed = |name: &str| Feed {
         name: format!("command.{name}"),
         column: name.to_owned(),

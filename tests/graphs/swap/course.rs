@@ -1,8 +1,8 @@
 //! The course of a replacement: a sensor out and a voter in, a shadow that refuses or admits, the way back.
 
 use athermal::core::engine::Carry;
-use athermal::core::live::{Control, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::core::prng::Prng;
+use athermal::run::live::{Control, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::{Instant, Model};
 
 use super::model::{d, model, s};
@@ -369,7 +369,7 @@ fn what_runs_is_fitted_again_on_the_retained_past_and_takes_over() {
         &running,
         s(0),
         s(4000),
-        athermal::core::fit::FitOptions::default(),
+        athermal::run::fit::FitOptions::default(),
     );
     let outcome = loop {
         if let Some(outcome) = refit.poll() {

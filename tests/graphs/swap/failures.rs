@@ -2,9 +2,9 @@
 //! put out lasts.
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{FitError, FitOptions};
-use athermal::core::live::{Frame, Refit, RunError, Sink, SinkError, StageError, run};
-use athermal::core::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal::run::fit::{FitError, FitOptions};
+use athermal::run::live::{Frame, Refit, RunError, Sink, SinkError, StageError, run};
+use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
 
 use super::course::live;
 use super::model::{model, s};
@@ -79,10 +79,10 @@ fn a_refit_in_which_a_node_panics_is_over() {
         }
         std::thread::yield_now();
     };
-    assert!(matches!(outcome, Err(FitError::Panicked)));
+    assert!(matches!(outcome, Err(FitError::Panicked { .. })));
     assert!(polled.poll().is_none(), "it is given once");
     let waited = Refit::on(&running, Panicking, FitOptions::default()).wait();
-    assert!(matches!(waited, Some(Err(FitError::Panicked))));
+    assert!(matches!(waited, Some(Err(FitError::Panicked { .. }))));
 }
 
 #[test]

@@ -15,8 +15,8 @@ use std::ops::Range;
 
 use athermal::Model;
 use athermal::core::engine::{Carry, NodeCarry};
-use athermal::core::live::{Control, Feed, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::core::prng::Prng;
+use athermal::run::live::{Control, Feed, LiveOptions, Notice, StageError, Stepper, pair};
 
 use super::model::{Happening, bits, columns, d, model, run};
 use super::random_graph::{Graph, chance, feed, happenings, pick};

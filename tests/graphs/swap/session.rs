@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::time::{Duration as Span, Instant as Clock};
 
-use athermal::core::live::session::WatchedGraph;
-use athermal::core::live::{
+use athermal::run::live::session::WatchedGraph;
+use athermal::run::live::{
     Frame, Notice, Replacement, Report, Reporter, Session, SessionOptions, Sink, SinkError,
     StateError, StateStore,
 };
-use athermal::core::recording::{Event, Recording, Samples, Table};
+use athermal::run::recording::{Event, Recording, Samples, Table};
 use athermal::{Instant, Model};
 
 use super::model::s;

@@ -2,7 +2,7 @@
 
 use athermal::Model;
 use athermal::core::engine::Carry;
-use athermal::core::live::{LiveOptions, Stepper, pair};
+use athermal::run::live::{LiveOptions, Stepper, pair};
 
 use super::model::{d, model, s};
 

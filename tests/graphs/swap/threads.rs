@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use athermal::core::live::{LiveOptions, Notice, pair};
 use athermal::core::prng::Prng;
+use athermal::run::live::{LiveOptions, Notice, pair};
 
 use super::course::rows;
 use super::model::{columns, d, model};

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 
 use athermal::core::engine::{Carry, RestoreError};
-use athermal::core::live::{LiveOptions, pair};
 use athermal::core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
 };
 use athermal::core::state;
+use athermal::run::live::{LiveOptions, pair};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

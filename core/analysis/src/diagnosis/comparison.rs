@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use athermal_core::compile::Plan;
 use athermal_core::quantity::Quantity;
-use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much, if_few};
 use athermal_core::time::{Duration, Instant};
+use athermal_run::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much, if_few};
 use serde::Serialize;
 
 use crate::report::rms;

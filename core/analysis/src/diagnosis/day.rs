@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Fitted;
-use athermal_core::fit::{FitError, FitOptions, fit};
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording, Samples, Source, SourceError};
-use athermal_core::score::{PredictionTrace, Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
+use athermal_run::fit::{FitError, FitOptions, fit};
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal_run::score::{PredictionTrace, Trace, TruthTrace, trace};
 use serde::Serialize;
 
 use super::observation::Observation;

@@ -5,15 +5,15 @@
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording};
-use athermal_core::score::{TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
     autocorrelation, bound_of_farthest, cross_correlation, cross_correlation_error,
     cross_correlation_pairs,
 };
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::{TruthTrace, trace};
 use serde::Serialize;
 
 use super::observation::{Observation, main_prediction};

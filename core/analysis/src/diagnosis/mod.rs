@@ -28,11 +28,11 @@ pub(crate) use plot::{
 pub use rest::Untold;
 
 use athermal_core::compile::origins::{inputs, of_truths, slots, upstream};
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::Recording;
-use athermal_core::score::Lack;
 use athermal_core::time::Duration;
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::Recording;
+use athermal_run::score::Lack;
 use serde::Serialize;
 
 use observation::main_prediction;

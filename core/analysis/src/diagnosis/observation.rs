@@ -2,11 +2,11 @@
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording};
-use athermal_core::score::{Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::{Trace, TruthTrace, trace};
 
 use super::gap::Gaps;
 

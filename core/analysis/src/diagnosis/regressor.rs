@@ -3,14 +3,14 @@
 
 use athermal_core::compile::{PlannedNode, PlannedRole, TrainingLimits};
 use athermal_core::engine::{Engine, Pairing};
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
 use athermal_core::node::number_or_none;
 use athermal_core::node::{Of, Predictor};
-use athermal_core::recording::{Event, Recording};
-use athermal_core::score::trace;
 use athermal_core::time::Instant;
 use athermal_numerics::{Collinearity, GramBlocks};
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::trace;
 use serde::{Serialize, Serializer};
 
 /// The regressors that a fitted estimator uses, over the rows of a recording.

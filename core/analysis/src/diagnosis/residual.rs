@@ -5,11 +5,11 @@
 //! missing, their places stay empty, and only pairs that are there tell of a lag.
 
 use athermal_core::compile::Plan;
-use athermal_core::score::{PredictionTrace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
     NORMAL_95, autocorrelation, autocorrelation_errors, autocorrelation_pairs, ljung_box,
 };
+use athermal_run::score::{PredictionTrace, TruthTrace};
 use serde::Serialize;
 
 use super::observation::Observation;

@@ -14,9 +14,9 @@ use std::sync::Arc;
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::{Engine, EngineError, Mode};
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
 use athermal_core::time::{Duration, Instant};
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
 use serde::Serialize;
 
 use super::observation::Observation;

@@ -5,10 +5,10 @@
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording, Samples, Source, SourceError};
-use athermal_core::score::{PredictionTrace, Trace, trace};
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
+use athermal_run::score::{PredictionTrace, Trace, trace};
 use serde::Serialize;
 
 use super::observation::{Observation, count_valid};

@@ -7,12 +7,12 @@
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
-use athermal_core::fit::FitError;
-use athermal_core::model::Model;
-use athermal_core::recording::{Event, Recording};
-use athermal_core::score::trace;
 use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
+use athermal_run::fit::FitError;
+use athermal_run::model::Model;
+use athermal_run::recording::{Event, Recording};
+use athermal_run::score::trace;
 use serde::Serialize;
 
 /// Samples that the narrowest window holds on the average, four but for rounding.

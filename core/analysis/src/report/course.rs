@@ -7,12 +7,12 @@ use std::sync::Arc;
 use athermal_control::Stability;
 use athermal_core::compile::{Entry, Plan, PlannedRole};
 use athermal_core::engine::Engine;
-use athermal_core::model::{Model, Period};
 use athermal_core::quantity::Quantity;
-use athermal_core::recording::{Event, Recording, pass};
-use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
+use athermal_run::model::{Model, Period};
+use athermal_run::recording::{Event, Recording, pass};
+use athermal_run::score::{PredictionTrace, Trace, TruthTrace};
 use serde::{Serialize, Serializer};
 
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};

@@ -31,9 +31,9 @@ pub use verdict::Verdict;
 pub use worth::Worth;
 
 use athermal_core::diagnostic::digits;
-use athermal_core::model::{Card, Model};
-use athermal_core::recording::Recording;
-use athermal_core::score::{Lack, Score, ScoreOptions, Scores, score};
+use athermal_run::model::{Card, Model};
+use athermal_run::recording::Recording;
+use athermal_run::score::{Lack, Score, ScoreOptions, Scores, score};
 use serde::Serialize;
 
 use crate::diagnosis::lag::{Lags, lags};

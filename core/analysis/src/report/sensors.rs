@@ -12,7 +12,7 @@ use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
 use crate::figures::{counted, time};
 use athermal_core::compile::origins::{health_reasons, of_truths};
-use athermal_core::live::monitor::standstill;
+use athermal_run::live::monitor::standstill;
 
 /// What can be said of a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]

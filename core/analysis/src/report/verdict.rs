@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use athermal_core::score::Score;
+use athermal_run::score::Score;
 use serde::Serialize;
 
 use super::{Axis, Worth, figure, rms};

@@ -10,7 +10,7 @@ use crate::time::Duration;
 /// What the framework reads of an estimator's table.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub(crate) struct EstimatorKeys {
+pub struct EstimatorKeys {
     /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
     pub(crate) ahead: Option<Duration>,
     /// Which truths it is fitted on.

@@ -33,18 +33,18 @@ mod survey;
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
-pub(crate) use keys::EstimatorKeys;
+pub use keys::EstimatorKeys;
 pub use kind_fault::KindFault;
 pub use plan::{
     AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
     PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
-pub(crate) use plan::{Rows, admits};
-pub(crate) use port_channels::PortChannels;
+pub use plan::{Rows, admits};
+pub use port_channels::PortChannels;
 pub use problem::CompileProblem;
-pub(crate) use provenance::persistence_lag;
-pub(crate) use reference::Reference;
-pub(crate) use scope::outermost;
+pub use provenance::persistence_lag;
+pub use reference::Reference;
+pub use scope::outermost;
 
 use std::collections::BTreeSet;
 
@@ -78,12 +78,13 @@ pub struct Part {
 }
 
 impl Part {
-    pub(crate) fn plan(&self) -> &Plan {
+    /// The nodes that could be resolved.
+    pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
     /// Whether something of a name may be missing, since a mistake in it, or in the module around it, has been told.
-    pub(crate) fn is_broken(&self, name: &str) -> bool {
+    pub fn is_broken(&self, name: &str) -> bool {
         let outer = name.split('/').next().unwrap_or_default();
         self.broken.contains(name) || self.broken.contains(outer)
     }

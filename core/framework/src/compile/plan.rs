@@ -58,7 +58,7 @@ impl SourceChannel {
 
 /// Whether a sample is finite and within a range.
 #[inline]
-pub(crate) fn admits((lowest, highest): (f64, f64), sample: f64) -> bool {
+pub fn admits((lowest, highest): (f64, f64), sample: f64) -> bool {
     sample.is_finite() && sample >= lowest && sample <= highest
 }
 
@@ -294,17 +294,17 @@ pub struct PlannedFit {
 
 /// The rows that a node is fitted on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rows<'a> {
+pub struct Rows<'a> {
     /// What makes up a row, over all gathers.
-    pub(crate) regressors: &'a [Regressor],
+    pub regressors: &'a [Regressor],
     /// The gathers of a row, one after the other.
-    pub(crate) gathers: &'a [usize],
+    pub gathers: &'a [usize],
     /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
-    pub(crate) triggers: &'a [usize],
+    pub triggers: &'a [usize],
     /// The truth that belongs to them.
-    pub(crate) truth: TruthLink,
+    pub truth: TruthLink,
     /// Which of them it is fitted on.
-    pub(crate) training: TrainingLimits,
+    pub training: TrainingLimits,
 }
 
 impl PlannedNode {
@@ -320,7 +320,7 @@ impl PlannedNode {
     }
 
     /// The rows that the node is fitted on; none where it needs no fit.
-    pub(crate) fn rows(&self) -> Option<Rows<'_>> {
+    pub fn rows(&self) -> Option<Rows<'_>> {
         match (&self.role, self.spec.role()) {
             (
                 PlannedRole::Feature {
@@ -392,7 +392,7 @@ pub struct PlannedLearning {
 
 impl Plan {
     /// The slots that a node reads, with its truth.
-    pub(crate) fn reads<'a>(&'a self, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
+    pub fn reads<'a>(&'a self, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
         let gathers = node.role.gathers();
         let entries = gathers.flat_map(|gather| &self.gathers[gather].entries);
         let truth = node.role.truth().map(|truth| truth.slot);
@@ -400,7 +400,7 @@ impl Plan {
     }
 
     /// These slots and every one that they depend on.
-    pub(crate) fn behind(&self, slots: impl Iterator<Item = usize>) -> SlotSet {
+    pub fn behind(&self, slots: impl Iterator<Item = usize>) -> SlotSet {
         let mut behind = SlotSet::default();
         let mut open: Vec<usize> = slots.collect();
         let mut seen = vec![false; self.nodes.len()];

@@ -11,7 +11,7 @@ use crate::diagnostic::Names;
 
 /// The channels of a port, each with its slot.
 #[derive(Debug, Default, Clone)]
-pub(crate) struct PortChannels {
+pub struct PortChannels {
     slots: IndexMap<String, usize>,
     /// Their names, once somebody refers to one that there is not: a graph may do so thousands of times.
     known: OnceCell<Arc<Names>>,
@@ -19,7 +19,7 @@ pub(crate) struct PortChannels {
 
 impl PortChannels {
     /// Adds a channel; gives the slot of one that had the name before.
-    pub(crate) fn insert(&mut self, name: String, slot: usize) -> Option<usize> {
+    pub fn insert(&mut self, name: String, slot: usize) -> Option<usize> {
         self.known.take();
         self.slots.insert(name, slot)
     }
@@ -28,7 +28,7 @@ impl PortChannels {
     ///
     /// # Errors
     /// [`CompileProblem::UnknownChannel`], also where an alternative of a choice stands for none.
-    pub(crate) fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
+    pub fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
         let slots = self.slots(reference.channel);
         let Some(channel) = reference.channel else {
             return Ok(slots);

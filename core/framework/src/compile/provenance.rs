@@ -88,7 +88,7 @@ pub(crate) const ONE_SAMPLE: Duration = Duration::from_ns(1);
 
 /// The lag of persistence: the smallest at which the truth sees nothing of the answer.
 #[must_use]
-pub(crate) fn persistence_lag(span: Duration, ahead: Duration) -> Duration {
+pub fn persistence_lag(span: Duration, ahead: Duration) -> Duration {
     let lag = smallest_lag(span, ahead);
     if leaks(lag, span, ahead) {
         ONE_SAMPLE

@@ -51,7 +51,7 @@ impl<'a> Reference<'a> {
 
 impl<'a> Reference<'a> {
     /// What is told where the node has no such port; none are known of a signal.
-    pub(crate) fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
+    pub fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
         let node = self.node.to_owned();
         match self.port {
             Some("") => CompileProblem::EmptyPort {
@@ -69,7 +69,7 @@ impl<'a> Reference<'a> {
     }
 
     /// The node without the members that are picked out of the modules around it: `axis[Z1]/thermal` is `axis/thermal`.
-    pub(crate) fn whole_node(&self) -> Cow<'a, str> {
+    pub fn whole_node(&self) -> Cow<'a, str> {
         if !self.is_member() {
             return Cow::Borrowed(self.node);
         }

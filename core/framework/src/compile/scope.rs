@@ -41,7 +41,7 @@ pub(crate) enum Found {
 }
 
 /// The names that a graph gives itself: an instance of a module stands for the nodes inside of it.
-pub(crate) fn outermost<'a>(names: impl Iterator<Item = &'a str>) -> Arc<Names> {
+pub fn outermost<'a>(names: impl Iterator<Item = &'a str>) -> Arc<Names> {
     let outer: IndexSet<&str> = names.map(without_inner).collect();
     Arc::new(outer.into_iter().map(str::to_owned).collect())
 }

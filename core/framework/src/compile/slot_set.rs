@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Some of the slots of a plan.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SlotSet(Vec<bool>);
+pub struct SlotSet(Vec<bool>);
 
 impl SlotSet {
     /// Takes a slot in; whether it was not there before.
@@ -15,12 +15,12 @@ impl SlotSet {
         !std::mem::replace(&mut self.0[slot], true)
     }
 
-    pub(crate) fn contains(&self, slot: usize) -> bool {
+    pub fn contains(&self, slot: usize) -> bool {
         self.0.get(slot).is_some_and(|marked| *marked)
     }
 
     /// Whether any slot of a range is in it.
-    pub(crate) fn has_any(&self, mut slots: Range<usize>) -> bool {
+    pub fn has_any(&self, mut slots: Range<usize>) -> bool {
         slots.any(|slot| self.contains(slot))
     }
 }

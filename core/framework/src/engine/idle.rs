@@ -1,29 +1,31 @@
 //! Decides how a node is asked for answers that nobody wants, to find out what they are and whether asking changes it.
 
-use super::{Engine, Running};
+use super::Engine;
+use super::tick::NodeRunner;
 
 /// What a combiner makes of votes.
 #[derive(Debug)]
-pub(crate) struct Answer {
-    pub(crate) combined: f64,
+pub struct Answer {
+    /// The combined prediction; NaN where there is none.
+    pub combined: f64,
     /// NaN for each vote where it does not weigh.
-    pub(crate) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Both ends, NaN where there is none.
-    pub(crate) interval: [f64; 2],
+    pub interval: [f64; 2],
 }
 
 impl Engine {
     /// Asks every estimator and combiner for answers to values that `value` draws.
-    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+    pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         for node in &self.nodes {
             match node {
-                Running::Operator { .. } => {}
-                Running::Estimate { estimate, .. } => {
+                NodeRunner::Operator { .. } => {}
+                NodeRunner::Estimate { estimate, .. } => {
                     estimate
                         .iter()
                         .for_each(|estimate| estimate.ask_idly(value));
                 }
-                Running::Vote(vote) => {
+                NodeRunner::Vote(vote) => {
                     let votes = self.gathered[vote.wires.voters].values.iter();
                     let mut votes: Vec<f64> = votes.map(|_| value()).collect();
                     vote.answer(&votes);
@@ -37,10 +39,10 @@ impl Engine {
     }
 
     /// What the only combiner would make of votes; none where there is no combiner.
-    pub(crate) fn answer(&self, votes: &[f64]) -> Option<Answer> {
+    pub fn answer(&self, votes: &[f64]) -> Option<Answer> {
         self.nodes.iter().find_map(|node| match node {
-            Running::Vote(vote) => Some(vote.answer(votes)),
-            Running::Operator { .. } | Running::Estimate { .. } => None,
+            NodeRunner::Vote(vote) => Some(vote.answer(votes)),
+            NodeRunner::Operator { .. } | NodeRunner::Estimate { .. } => None,
         })
     }
 }

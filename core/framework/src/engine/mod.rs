@@ -1,62 +1,40 @@
-//! Decides how a plan is stepped: what runs at a tick, in which order, and when truths are told; not where samples come
-//! from or go.
+//! Steps a plan: what runs at a tick, in which order, and when truths reach those that learn.
+//!
+//! Three rooms: [`tick`] computes, [`learning`] hands truths over when they may be known, [`state`] is what goes on in
+//! another engine. Sources and sinks are not known here.
 
-mod at_hand;
-mod bank;
-mod blend;
-mod carry;
+mod at_work;
 mod error;
-mod estimate;
-mod feedback;
-mod gather;
-mod history;
 #[cfg(feature = "testkit")]
 mod idle;
-mod keep;
 mod learning;
-pub(crate) mod mode;
-mod outlets;
-mod pairing;
-mod part;
-mod products;
-mod revision;
-mod rows;
-mod running;
 mod sample_range;
-mod slots;
 mod state;
-mod turn;
-mod vote;
-mod withheld;
+mod tick;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
-pub use carry::{Carry, NodeCarry};
+pub use at_work::{When, naming_one};
 pub use error::EngineError;
-pub use mode::Mode;
-pub use pairing::{Paired, Pairing};
-pub use revision::{Fnv1a, fnv_1a, revision};
+pub use learning::{Mode, Pair, Pairing, StepLength, times};
 pub use sample_range::SampleRange;
-pub use state::{EngineState, RestoreError};
+pub use state::{
+    Carry, EngineState, Fnv1a, NodeCarry, RestoreError, StateTransfer, fnv_1a, revision,
+};
+pub use tick::{Cursor, History};
 
-pub(crate) use at_hand::{AtHand, FitAtHand};
-pub(crate) use carry::Heritage;
-pub(crate) use gather::Gathered;
-pub use history::{Cursor, History};
 #[cfg(feature = "testkit")]
-pub(crate) use idle::Answer;
-pub(crate) use slots::{Given, Slots};
+pub use idle::Answer;
+
+pub(crate) use at_work::naming;
+pub(crate) use tick::{Gathered, Given};
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
 use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
-use bank::{Work, work};
-use estimate::Estimate;
-use outlets::Outlets;
-use running::{Running, running};
-use turn::Turn;
+use tick::{Estimate, NodeRunner, OutputSlots, Slots, TickContext, Work, runners, work};
 
 /// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
@@ -77,7 +55,7 @@ pub struct Engine {
     recorded: Vec<usize>,
     /// The nodes that are told truths after all outputs, and the slots of these.
     told: Vec<(usize, usize)>,
-    nodes: Vec<Running>,
+    nodes: Vec<NodeRunner>,
     work: Box<[Work]>,
     last: Instant,
     /// Set between a segment break and the first tick after it: the last instant before the break.
@@ -94,7 +72,7 @@ pub struct Engine {
     row: Vec<f64>,
     /// The lowest and highest sample that count, of each source.
     ranges: Vec<(f64, f64)>,
-    outlets: Outlets,
+    outputs: OutputSlots,
 }
 
 impl Engine {
@@ -103,7 +81,7 @@ impl Engine {
     /// # Errors
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
-        let nodes = running(&plan, fitted)?;
+        let nodes = runners(&plan, fitted)?;
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
@@ -119,7 +97,7 @@ impl Engine {
                 .iter()
                 .map(|channel| channel.history.map(History::new))
                 .collect(),
-            row: vec![0.0; nodes.iter().map(Running::width).max().unwrap_or(0)],
+            row: vec![0.0; nodes.iter().map(NodeRunner::width).max().unwrap_or(0)],
             work: work(&plan, &nodes),
             nodes,
             last: Instant::MIN,
@@ -129,7 +107,7 @@ impl Engine {
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
-            outlets: Outlets::new(&plan),
+            outputs: OutputSlots::new(&plan),
             ranges: plan.sources.iter().map(|source| source.range).collect(),
             fitted: fitted.clone(),
             revision: OnceLock::new(),
@@ -140,7 +118,7 @@ impl Engine {
     /// What the last tick gave, in the order of [`Plan::outputs`].
     #[must_use]
     pub fn outputs(&self) -> &[f64] {
-        self.outlets.values()
+        self.outputs.values()
     }
 
     /// The plan that is stepped.
@@ -187,34 +165,35 @@ impl Engine {
             frozen,
             ..
         } = self;
-        let mut turn = Turn {
-            now: time,
-            slots,
-            gathered,
-            row,
-            frozen: *frozen,
-            at_hand: AtHand::at(plan, time),
-        };
-        for work in work {
-            match work {
-                Work::Step(Step::Gather(gather)) => {
-                    turn.gathered[*gather].read(turn.slots, histories, time);
+        naming(plan, When::Tick(time), |at_work| {
+            let mut context = TickContext {
+                now: time,
+                slots,
+                gathered,
+                row,
+                frozen: *frozen,
+                at_work,
+            };
+            for work in work {
+                match work {
+                    Work::Step(Step::Gather(gather)) => {
+                        context.gathered[*gather].read(context.slots, histories, time);
+                    }
+                    Work::Step(Step::Run(node)) => {
+                        context.at_work.is(*node);
+                        context.run(&mut nodes[*node]);
+                    }
+                    Work::Step(Step::Capture(node)) => {
+                        context.at_work.is(*node);
+                        context.capture(&mut nodes[*node]);
+                    }
+                    Work::Bank(bank) => bank.run(&mut context, nodes),
                 }
-                Work::Step(Step::Run(node)) => {
-                    turn.at_hand.is(*node);
-                    turn.of(&mut nodes[*node]);
-                }
-                Work::Step(Step::Capture(node)) => {
-                    turn.at_hand.is(*node);
-                    turn.capture(&mut nodes[*node]);
-                }
-                Work::Bank(bank) => bank.run(&mut turn, nodes),
             }
-        }
-        drop(turn);
+        });
         self.remember(time);
-        self.outlets.put_out(&self.slots, time);
-        Ok(self.outlets.values())
+        self.outputs.put_out(&self.slots, time);
+        Ok(self.outputs.values())
     }
 
     /// The instant of the last tick; none before the first.
@@ -225,7 +204,7 @@ impl Engine {
     }
 
     /// Whether a tick at this instant would be taken.
-    pub(crate) fn takes(&self, time: Instant) -> bool {
+    pub fn takes(&self, time: Instant) -> bool {
         time > self.last
     }
 
@@ -248,7 +227,8 @@ impl Engine {
         } = self;
         fed_back.clear();
         for (index, (node, running)) in plan.nodes.iter().zip(nodes).enumerate() {
-            if let (Running::Estimate { estimate, .. }, Some(link)) = (running, node.role.truth())
+            if let (NodeRunner::Estimate { estimate, .. }, Some(link)) =
+                (running, node.role.truth())
                 && let Some(estimate) = estimate
             {
                 estimate.predict_in(mode, link, &plan.gathers);
@@ -262,9 +242,9 @@ impl Engine {
 
     /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
     /// where no past truth changes what it predicts in the mode of the engine.
-    pub(crate) fn step_of(&self, node: usize) -> Option<Option<Duration>> {
+    pub fn step_of(&self, node: usize) -> Option<Option<Duration>> {
         match self.nodes.get(node) {
-            Some(Running::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
+            Some(NodeRunner::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
             _ => None,
         }
     }
@@ -293,23 +273,23 @@ impl Engine {
         if self.last == Instant::MIN {
             return;
         }
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        for (nth, node) in self.nodes.iter_mut().enumerate() {
-            at_hand.is(nth);
-            match node {
-                Running::Operator { operator, .. } => operator.segment(),
-                Running::Estimate { estimate, .. } => {
-                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
-                        learning.segment(self.last, &self.gathered, !self.frozen);
+        naming(&self.plan, When::Tick(self.last), |at_work| {
+            for (nth, node) in self.nodes.iter_mut().enumerate() {
+                at_work.is(nth);
+                match node {
+                    NodeRunner::Operator { operator, .. } => operator.segment(),
+                    NodeRunner::Estimate { estimate, .. } => {
+                        if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                            learning.segment(self.last, &self.gathered, !self.frozen);
+                        }
+                        if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                            feedback.segment();
+                        }
                     }
-                    if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
-                        feedback.segment();
-                    }
+                    NodeRunner::Vote(vote) => vote.segment(self.last),
                 }
-                Running::Vote(vote) => vote.segment(self.last),
             }
-        }
-        drop(at_hand);
+        });
         self.slots.clear();
         self.gathered.iter_mut().for_each(Gathered::clear);
         self.histories.iter_mut().flatten().for_each(History::clear);
@@ -413,13 +393,12 @@ impl Engine {
     }
 
     /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
-    pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
-        let mut at_hand = AtHand::at(&self.plan, self.last);
-        at_hand.is(node);
-        match &self.nodes[node] {
-            Running::Vote(vote) => vote.evidence(),
-            Running::Operator { .. } | Running::Estimate { .. } => None,
-        }
+    pub fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+        let NodeRunner::Vote(vote) = &self.nodes[node] else {
+            return None;
+        };
+        let when = When::Tick(self.last);
+        naming_one(&self.plan, node, when, || vote.evidence())
     }
 
     fn take_in(&mut self, time: Instant, samples: &[f64]) {
@@ -446,7 +425,7 @@ impl Engine {
             }
         }
         for &(node, slot) in &self.fed_back {
-            if let Running::Estimate { estimate, .. } = &mut self.nodes[node]
+            if let NodeRunner::Estimate { estimate, .. } = &mut self.nodes[node]
                 && let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback)
                 && self.slots.ran(slot)
             {
@@ -459,7 +438,7 @@ impl Engine {
             }
             let truth = self.slots.values[slot];
             match &mut self.nodes[node] {
-                Running::Vote(vote) => vote.observe(truth, now),
+                NodeRunner::Vote(vote) => vote.observe(truth, now),
                 other => {
                     if let Some(learning) = other.learning() {
                         learning.observe(truth, now, &self.gathered, !self.frozen);
@@ -472,7 +451,7 @@ impl Engine {
     fn shift(&mut self, shift: Duration) {
         for node in &mut self.nodes {
             match node {
-                Running::Vote(vote) => vote.shift(shift),
+                NodeRunner::Vote(vote) => vote.shift(shift),
                 other => {
                     if let Some(learning) = other.learning() {
                         learning.shift(shift);

@@ -53,7 +53,7 @@ pub use predictor::Predictor;
 pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
 #[cfg(feature = "testkit")]
-pub(crate) use registry::as_toml;
+pub use registry::as_toml;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{
@@ -61,5 +61,5 @@ pub use registry::{
 };
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
-pub(crate) use written_name::taken_twice;
+pub use written_name::taken_twice;
 pub use written_name::{Written, WrittenName, written_names};

@@ -24,12 +24,7 @@ pub enum Reach {
 
 impl Reach {
     /// What reaches the `nth` of `width` channels of an output port: channels of the input ports, each with its delay.
-    pub(crate) fn parts(
-        &self,
-        inputs: &[Vec<usize>],
-        nth: usize,
-        width: usize,
-    ) -> Vec<(usize, Duration)> {
+    pub fn parts(&self, inputs: &[Vec<usize>], nth: usize, width: usize) -> Vec<(usize, Duration)> {
         let owners = inputs.first().map_or(0, Vec::len);
         let each = width.checked_div(owners).unwrap_or(0);
         if *self == Self::All || each * owners != width || each == 0 {

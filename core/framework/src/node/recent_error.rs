@@ -47,7 +47,7 @@ impl RecentError {
     /// One that is not below counts as if it were as large as that, so that what has changed for good is learned after a few; when
     /// as many as there is patience for have been, what was before is forgotten. A deviation says how large the first errors are,
     /// but for a learner that goes on from the last truths, and `starts_anywhere`.
-    pub(crate) fn admits(
+    pub fn admits(
         &mut self,
         error: f64,
         std_dev: f64,

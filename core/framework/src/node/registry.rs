@@ -217,7 +217,7 @@ pub fn inline_toml(value: &serde_json::Value) -> String {
 }
 
 /// Data as TOML has it, where nothing is not written.
-pub(crate) fn as_toml(json: &serde_json::Value) -> Option<toml::Value> {
+pub fn as_toml(json: &serde_json::Value) -> Option<toml::Value> {
     Some(match json {
         serde_json::Value::Null => return None,
         serde_json::Value::Bool(value) => toml::Value::Boolean(*value),

@@ -54,7 +54,7 @@ pub fn written_names() -> &'static [WrittenName] {
 }
 
 /// The first of a crate's names that is taken twice: what it names, the name and the crates that took it.
-pub(crate) fn taken_twice(package: &str) -> Option<(Written, &'static str, Vec<&'static str>)> {
+pub fn taken_twice(package: &str) -> Option<(Written, &'static str, Vec<&'static str>)> {
     type Takers = BTreeMap<(Written, &'static str), Vec<&'static str>>;
     static TWICE: OnceLock<Takers> = OnceLock::new();
     let twice = TWICE.get_or_init(|| {

@@ -4,8 +4,8 @@ use athermal_combiners::{
     Adwin, AutoWeighted, Best, Conformal, Fallback, Guard, Hedge, Mean, Median, PageHinkley,
     StateGate, Trimmed,
 };
-use athermal_core::conformance;
-use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
+use athermal_testkit::conformance;
+use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
 
 conformance!(Mean, Case::new(""));
 

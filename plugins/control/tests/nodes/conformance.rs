@@ -3,8 +3,8 @@
 use athermal_control::{
     Compensate, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
 };
-use athermal_core::conformance;
-use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
+use athermal_testkit::conformance;
+use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
 
 /// Why the past of a correction is not asked for.
 const IS_TAKEN_OUT: &str =

@@ -1,11 +1,11 @@
 //! Every kind of this crate through the rules that every node keeps.
 
-use athermal_core::conformance;
-use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_estimators::{
     Ar, Arimax, Arma, Armax, Arx, Bj, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Oe,
     Persistence, Polynomial, Rls, Stack, StateSpace, Zero,
 };
+use athermal_testkit::conformance;
+use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
 
 conformance!(
     Zero,

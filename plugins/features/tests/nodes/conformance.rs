@@ -1,11 +1,11 @@
 //! Every kind of this crate through the rules that every node keeps.
 
-use athermal_core::conformance;
-use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_features::{
     Delay, Difference, FirstOrder, Hampel, Lag, MinimumDifference, Moving, Pick, Product, Resample,
     SampleAt, Scale, Slope, Sum,
 };
+use athermal_testkit::conformance;
+use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
 
 conformance!(
     Slope,

@@ -1,7 +1,7 @@
 //! Every machine of this crate through the rules that every machine keeps.
 
-use athermal_core::testkit::assert_every_machine_conforms;
 use athermal_simulation as _;
+use athermal_testkit::assert_every_machine_conforms;
 
 #[test]
 fn every_machine_of_this_crate_conforms() {

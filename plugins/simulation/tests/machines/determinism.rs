@@ -1,11 +1,11 @@
 //! 1) The same seed gives the same bytes, everywhere. 2) Another seed gives others, or 1 proves nothing.
 //! 3) A table read back has the bits of the rows. 4) A fault in one channel leaves all others as they were.
 
-use athermal_core::fault::{Fault, FaultKind, Faults};
-use athermal_core::machine::{
+use athermal_simulation::{MACHINES, write_table};
+use athermal_trial::fault::{Fault, FaultKind, Faults};
+use athermal_trial::machine::{
     self, Faulty, Machine, Row, SECOND_NS, Schedule, Setup, SetupError, Simulation,
 };
-use athermal_simulation::{MACHINES, write_table};
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
     machine::machine(name).ok().map(|known| known.machine)

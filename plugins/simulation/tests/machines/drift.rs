@@ -1,7 +1,7 @@
 //! The simulated machines drift as much as the published ones, and their temperatures tell most of it.
 
-use athermal_core::machine::{self, Machine, Row, SECOND_NS, Setup};
 use athermal_simulation as _;
+use athermal_trial::machine::{self, Machine, Row, SECOND_NS, Setup};
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
     machine::machine(name).ok().map(|known| known.machine)

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use athermal_core::model::EstimatorCard;
-use athermal_core::score::Score;
+use athermal_run::model::EstimatorCard;
+use athermal_run::score::Score;
 
 use super::super::{Departure, Hours, Light, SensorFacts, figure, spelled};
 use crate::figures::count;

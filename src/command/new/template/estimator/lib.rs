@@ -129,7 +129,7 @@ athermal_core::register!(MyNode, Estimator, "my_node");
 #[cfg(test)]
 mod tests {
     use super::*;
-    use athermal_core::testkit::Bench;
+    use athermal_testkit::Bench;
 
     #[test]
     fn a_line_is_found_and_its_slope_shrunk() {

@@ -1,7 +1,7 @@
 //! Every kind of this crate through the rules that every node keeps.
 
-use athermal_core::conformance;
-use athermal_core::testkit::{Case, assert_every_kind_conforms};
+use athermal_testkit::conformance;
+use athermal_testkit::{Case, assert_every_kind_conforms};
 use my_node::MyNode;
 
 conformance!(

@@ -110,7 +110,7 @@ athermal_core::register!(MyNode, Feature, "my_node");
 #[cfg(test)]
 mod tests {
     use super::*;
-    use athermal_core::testkit::Bench;
+    use athermal_testkit::Bench;
 
     #[test]
     fn the_mean_is_that_of_the_last_samples() {

@@ -1,6 +1,6 @@
 //! Every machine of this crate through the rules that every machine keeps.
 
-use athermal_core::testkit::assert_every_machine_conforms;
+use athermal_testkit::assert_every_machine_conforms;
 use my_node as _;
 
 #[test]

@@ -1,7 +1,7 @@
 //! A machine of athermal: a body on a heated chuck, and an axis that grows with it.
 
-use athermal_core::machine::schedule::Track;
-use athermal_core::machine::{
+use athermal_trial::machine::schedule::Track;
+use athermal_trial::machine::{
     Channel, Machine, Row, SECOND_NS, Schedule, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
 use athermal_core::prng::Prng;
@@ -72,7 +72,7 @@ impl Machine for MyNode {
     }
 }
 
-athermal_core::register_machine!(MyNode);
+athermal_trial::register_machine!(MyNode);
 
 /// What the chuck does where nobody says it: another level every two hours.
 fn own(seed: u64) -> Schedule {

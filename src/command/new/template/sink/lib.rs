@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 
 use athermal_core::compile::Plan;
-use athermal_core::live::{Frame, Sink, SinkError};
+use athermal_run::live::{Frame, Sink, SinkError};
 
 /// Lines to whatever takes bytes: standard output, a serial port, a socket.
 pub struct MyNode<W> {

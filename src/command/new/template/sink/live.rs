@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use athermal::Model;
-use athermal::core::live;
+use athermal::run::live;
 use athermal::files::{Options, Reader, layout};
 use my_node::MyNode;
 

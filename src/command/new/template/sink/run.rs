@@ -7,7 +7,7 @@ use std::io::stdout;
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::core::live;
+use athermal::run::live;
 use athermal::files::{Options, Reader, layout};
 use my_node::MyNode;
 

@@ -6,7 +6,7 @@
 use std::io::BufRead;
 
 use athermal_core::compile::Plan;
-use athermal_core::recording::{Event, Samples, Source, SourceError};
+use athermal_run::recording::{Event, Samples, Source, SourceError};
 use athermal_core::time::Instant;
 
 /// Lines from whatever has lines: standard input, a serial port, a socket.

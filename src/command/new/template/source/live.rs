@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use athermal::Model;
-use athermal::core::live::{self, Frame, Sink, SinkError};
+use athermal::run::live::{self, Frame, Sink, SinkError};
 use my_node::MyNode;
 
 /// Keeps all outputs.

@@ -7,7 +7,7 @@ use std::io::stdin;
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::core::live;
+use athermal::run::live;
 use athermal::files::{Flush, Writer};
 use my_node::MyNode;
 

@@ -1,0 +1,293 @@
+//! Decides what an estimator learns from while it runs, and what it is kept from; how it learns is the learner's.
+
+use std::sync::Arc;
+
+use super::embargo::{DueTruth, Embargo};
+use super::mode::{Mode, StepLength};
+use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
+use crate::engine::state::NodeState;
+use crate::engine::tick::Gathered;
+use crate::node::{Admission, Learner, LearningGate, LinearForm, Predictor, Restored};
+use crate::time::{Duration, Instant};
+
+/// A learner in a running plan, with the truths that the embargo still withholds from it.
+#[derive(Debug)]
+pub(crate) struct GatedLearner {
+    learner: Box<dyn Learner>,
+    withheld: Embargo,
+    gate: Gate,
+    freeze: Option<usize>,
+    mode: Mode,
+    step: StepLength,
+    /// Whether a run knows of the truth of its own tick.
+    at_once: bool,
+    /// Whether it may predict otherwise than when it was asked last.
+    changed: bool,
+    /// A row in which nothing is there.
+    nothing: Vec<f64>,
+}
+
+/// What became of a truth that the embargo let through, as the port `learning` tells it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum LearnOutcome {
+    /// It was learned from.
+    Learned = 0,
+    /// Learning was frozen on command.
+    FrozenOnCommand = 1,
+    /// Learning was frozen by a channel.
+    FrozenByChannel = 2,
+    /// It missed its prediction by too much.
+    Outlier = 3,
+    /// A regressor lay outside the range of the fit: a level follows it all the same, and nothing else is learned.
+    OutsideRange = 4,
+    /// It lay outside the limits of `train.abs_truth`.
+    OutsideLimits = 5,
+    /// The run that it belongs to lacked a regressor.
+    Incomplete = 6,
+}
+
+impl GatedLearner {
+    /// Goes on from a fit; none for a predictor that stays as it was fitted.
+    pub(crate) fn new(
+        predictor: &Arc<dyn Predictor>,
+        planned: PlannedLearning,
+        truth: TruthLink,
+        training: TrainingLimits,
+    ) -> Option<Self> {
+        let width = predictor.uses().len();
+        let learner = predictor.learner()?;
+        let own = LearningGate::new(planned.limits, &*learner);
+        Some(Self {
+            at_once: truth.allows_present() && learner.extrapolates(),
+            learner,
+            changed: false,
+            // With each row stands whether learning was frozen at the run.
+            withheld: Embargo::new(truth, width + 1),
+            freeze: planned.freeze,
+            gate: Gate {
+                predictor: Arc::clone(predictor),
+                training,
+                own,
+            },
+            mode: Mode::OneStep,
+            step: StepLength::new(truth.ahead.max(truth.span)),
+            nothing: vec![f64::NAN; width],
+        })
+    }
+
+    /// Learns as late as a mode says.
+    pub(crate) fn predict_in(&mut self, mode: Mode) {
+        self.mode = mode;
+    }
+
+    /// How long a step was planned to be; none where it is as long as the time between truths.
+    pub fn step(&self) -> Option<Duration> {
+        self.step.planned()
+    }
+
+    /// The newest arrival that a prediction made at `now` may know of.
+    fn newest(&self, now: Instant) -> Instant {
+        let newest = self.withheld.newest(now);
+        match self.mode {
+            Mode::OneStep | Mode::FreeRun => newest,
+            // Several steps are counted back from the newest truth that one step knows of.
+            mode => {
+                let after = Duration::from_ns(i64::from(!self.at_once));
+                newest.min(now - after) - mode.earlier(self.step.length())
+            }
+        }
+    }
+
+    pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
+        self.learner.predict(row, now + self.withheld.link().ahead)
+    }
+
+    pub(crate) fn std_dev(&self, row: &[f64], now: Instant) -> f64 {
+        let of = now + self.withheld.link().ahead;
+        self.learner.std_dev(row, of)
+    }
+
+    /// The slot of the truth.
+    pub(crate) fn truth(&self) -> usize {
+        self.withheld.link().slot
+    }
+
+    /// Whether a truth is taken before the run of its tick; else it is after all outputs.
+    pub(crate) fn at_once(&self) -> bool {
+        self.at_once
+    }
+
+    /// What the prediction is, where it is a linear form.
+    pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
+        // What is given the truth of its own tick first cannot be predicted with others.
+        self.learner.linear().filter(|_| !self.at_once)
+    }
+
+    /// Whether it may predict otherwise than when this was asked last.
+    pub(crate) fn has_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// Writes the regressors of a run down, where all that are needed were there.
+    pub(crate) fn run(
+        &mut self,
+        row: Option<&[f64]>,
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) {
+        let row = row.unwrap_or(&self.nothing);
+        let frozen = [self.frozen(gathered, on)];
+        self.withheld.run(now, [row, &frozen]);
+        let of = now + self.withheld.link().ahead;
+        self.learner.run(row, of, self.newest(now));
+    }
+
+    /// The same for a linear form, whose regressors may lie in two pieces.
+    #[inline]
+    pub(crate) fn ran(
+        &mut self,
+        [first, others]: [&[f64]; 2],
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) {
+        let frozen = [self.frozen(gathered, on)];
+        self.withheld.run(now, [first, others, &frozen]);
+    }
+
+    /// Takes a truth that has just been measured.
+    pub(crate) fn observe(&mut self, truth: f64, now: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = self.frozen(gathered, on);
+        self.step.truth(now);
+        self.withheld.observe(truth, now, frozen);
+    }
+
+    /// Learns from what the embargo lets through at `now`; tells what became of the newest, and when it had arrived.
+    pub(crate) fn release(
+        &mut self,
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) -> Option<(LearnOutcome, Instant)> {
+        let frozen = self.frozen(gathered, on);
+        let newest = self.newest(now);
+        let (learner, gate) = (&mut *self.learner, &mut self.gate);
+        let mut news = None;
+        let free = self.mode == Mode::FreeRun;
+        self.withheld.release(newest, |released| {
+            if free && learner.is_settled() {
+                return;
+            }
+            news = Some((gate.offer(learner, released, frozen), released.arrived));
+        });
+        self.changed |= news.is_some();
+        news
+    }
+
+    /// The segment has ended with this tick.
+    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = self.frozen(gathered, on);
+        let (learner, gate) = (&mut *self.learner, &mut self.gate);
+        let free = self.mode == Mode::FreeRun;
+        self.withheld.end_segment(last, |released| {
+            if !(free && learner.is_settled()) {
+                gate.offer(learner, released, frozen);
+            }
+        });
+        self.changed = true;
+        self.step.segment();
+    }
+
+    /// Moves what is remembered to the clock of the segment that begins.
+    pub(crate) fn shift(&mut self, shift: Duration) {
+        self.learner.segment(shift);
+    }
+
+    pub(crate) fn snapshot(&self) -> NodeState {
+        let mut state = NodeState::pack(Some(self.learner.snapshot()));
+        state.learning = Some(self.withheld.state());
+        state.recent = Some(self.gate.own.recent);
+        state
+    }
+
+    pub(crate) fn restore(&mut self, state: &NodeState) -> Restored {
+        let answer = match state.unpack() {
+            Ok(Some(own)) => self.learner.restore(own),
+            Ok(None) => Restored::cold("it did not learn before"),
+            Err(cold) => cold,
+        };
+        self.changed = true;
+        if !matches!(answer, Restored::Cold { .. }) {
+            if let Some(from) = &state.learning {
+                self.withheld.restore(from);
+            }
+            let recent = &mut self.gate.own.recent;
+            *recent = state.recent.unwrap_or(*recent);
+        }
+        answer
+    }
+
+    /// Why nothing of this tick is learned from, as a number; 0 where it is.
+    fn frozen(&self, gathered: &[Gathered], on: bool) -> f64 {
+        let mut channels = self
+            .freeze
+            .iter()
+            .flat_map(|&freeze| &gathered[freeze].values);
+        let became = if !on && !self.learner.tracks_state() {
+            LearnOutcome::FrozenOnCommand
+        } else if channels.any(|&value| value != 0.0) {
+            // NaN too: where nobody says that learning may go on, it does not.
+            LearnOutcome::FrozenByChannel
+        } else {
+            LearnOutcome::Learned
+        };
+        f64::from(became as u8)
+    }
+}
+
+/// What keeps a learner from rows that would spoil it.
+#[derive(Debug)]
+struct Gate {
+    predictor: Arc<dyn Predictor>,
+    training: TrainingLimits,
+    own: LearningGate,
+}
+
+impl Gate {
+    /// Lets a learner learn from a pair, unless something speaks against it.
+    fn offer(
+        &mut self,
+        learner: &mut dyn Learner,
+        released: DueTruth<'_>,
+        frozen: f64,
+    ) -> LearnOutcome {
+        let DueTruth {
+            row,
+            truth,
+            arrived,
+            note: frozen_at_arrival,
+        } = released;
+        let (row, frozen_at_run) = row.split_at(row.len() - 1);
+        let frozen = frozen.max(frozen_at_run[0]).max(frozen_at_arrival);
+        if frozen == f64::from(LearnOutcome::FrozenOnCommand as u8) {
+            return LearnOutcome::FrozenOnCommand;
+        }
+        if frozen > 0.0 {
+            return LearnOutcome::FrozenByChannel;
+        }
+        if row.iter().any(|value| value.is_nan()) {
+            return LearnOutcome::Incomplete;
+        }
+        if !self.training.admits(truth) {
+            return LearnOutcome::OutsideLimits;
+        }
+        let range = self.predictor.trained_range();
+        match self.own.offer(learner, range, row, truth, arrived) {
+            Admission::Learned => LearnOutcome::Learned,
+            Admission::Outlier => LearnOutcome::Outlier,
+            Admission::OutsideRange => LearnOutcome::OutsideRange,
+        }
+    }
+}

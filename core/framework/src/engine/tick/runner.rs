@@ -1,0 +1,181 @@
+//! Decides what runs each node of a plan, given what was fitted.
+
+use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::estimate::{Estimate, fit_of};
+use super::vote::{Vote, Wires};
+use crate::compile::{AuxPorts, Plan, PlannedNode, PlannedRole};
+use crate::engine::at_work::{When, naming};
+use crate::engine::learning::GatedLearner;
+use crate::engine::{EngineError, Fitted};
+use crate::node::{Inputs, Operator, Predictor, Role};
+
+/// What runs a node, with all that a tick needs of its plan.
+pub(crate) enum NodeRunner {
+    Operator {
+        operator: Box<dyn Operator>,
+        gathers: Box<[usize]>,
+        every_tick: bool,
+        closes_loops: bool,
+        slots: Range<usize>,
+    },
+    Estimate {
+        estimate: Option<Estimate>,
+        trigger: Option<usize>,
+        slot: usize,
+        /// The slot of the standard deviation, where somebody reads it.
+        std_dev: Option<usize>,
+    },
+    Vote(Box<Vote>),
+}
+
+impl NodeRunner {
+    /// How many regressors it reads as an estimator.
+    pub(crate) fn width(&self) -> usize {
+        match self {
+            Self::Estimate {
+                estimate: Some(estimate),
+                ..
+            } => estimate.width(),
+            _ => 0,
+        }
+    }
+
+    /// What goes on learning, of an estimator that does.
+    pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
+        match self {
+            Self::Estimate { estimate, .. } => estimate.as_mut()?.learning(),
+            _ => None,
+        }
+    }
+
+    /// Whether what it knows stays true whatever becomes of what it reads.
+    pub(crate) fn outlives_changes(&self) -> bool {
+        matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
+    }
+
+    /// The slot of the truth that it is told after all outputs.
+    pub(crate) fn truth(&self) -> Option<usize> {
+        match self {
+            Self::Operator { .. } => None,
+            Self::Estimate { estimate, .. } => {
+                let learning = estimate.as_ref()?.learning.as_ref()?;
+                (!learning.at_once()).then(|| learning.truth())
+            }
+            Self::Vote(vote) => vote.truth(),
+        }
+    }
+}
+
+/// The nodes of a plan, cold.
+///
+/// # Errors
+/// When something fitted does not belong to the plan.
+pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
+    let learning = plan
+        .nodes
+        .iter()
+        .filter(|of| of.role.learns_from().is_some());
+    let learning: HashSet<String> = learning.map(PlannedNode::instance).collect();
+    if let Some(node) = fitted.keys().find(|name| !learning.contains(*name)) {
+        return Err(EngineError::NotAnEstimator { node: node.clone() });
+    }
+    let gathers = plan.gathers.iter();
+    let widths: Vec<_> = gathers.map(|gather| gather.entries.len()).collect();
+    naming(plan, When::Start, |at_work| {
+        let nodes = plan.nodes.iter().enumerate();
+        nodes
+            .map(|(nth, node)| {
+                at_work.is(nth);
+                runner(node, fitted.get(&node.instance()), &widths)
+            })
+            .collect()
+    })
+}
+
+/// A node with what it was fitted to, where it was; `widths` are those of the gathers.
+fn runner(
+    node: &PlannedNode,
+    fit: Option<&Arc<dyn Predictor>>,
+    widths: &[usize],
+) -> Result<NodeRunner, EngineError> {
+    Ok(match (&node.role, node.spec.role()) {
+        (
+            PlannedRole::Feature {
+                inputs,
+                gathers,
+                wanted,
+                every_tick,
+                closes_loops,
+                fit: planned,
+            },
+            Role::Feature(spec),
+        ) => {
+            let operator = match planned.as_ref().zip(fit) {
+                Some((planned, fit)) => {
+                    let inputs = Inputs {
+                        fit: Some(fit_of(node, &planned.regressors, fit)?),
+                        ..inputs.clone()
+                    };
+                    spec.build(&inputs, wanted)
+                }
+                None => spec.build(inputs, wanted),
+            };
+            NodeRunner::Operator {
+                operator,
+                gathers: gathers.clone().into(),
+                every_tick: *every_tick,
+                closes_loops: *closes_loops,
+                slots: node.slots.clone(),
+            }
+        }
+        (
+            PlannedRole::Estimator {
+                gathers,
+                every_tick,
+                std_dev,
+                ..
+            },
+            Role::Estimator(_),
+        ) => {
+            let predictor = fit.cloned().or_else(|| node.fixed().map(Arc::from));
+            let estimate = predictor.map(|predictor| Estimate::new(node, predictor, widths));
+            NodeRunner::Estimate {
+                estimate: estimate.transpose().map_err(|error| match error {
+                    EngineError::DoesNotLearn { node: instance } if fit.is_none() => {
+                        EngineError::NoLearner {
+                            node: instance,
+                            author: node.kind.author(),
+                        }
+                    }
+                    error => error,
+                })?,
+                trigger: gathers.first().copied().filter(|_| !every_tick),
+                slot: node.slots.start,
+                std_dev: *std_dev,
+            }
+        }
+        (
+            PlannedRole::Combiner {
+                voters,
+                state,
+                truth,
+                beside,
+                ..
+            },
+            Role::Combiner(spec),
+        ) => {
+            let wires = Wires {
+                voters: *voters,
+                state: *state,
+                slot: node.slots.start,
+                beside: (*beside != AuxPorts::default()).then(|| Box::new(*beside)),
+            };
+            let vote = Vote::new(spec, wires, widths[*voters], *truth);
+            NodeRunner::Vote(Box::new(vote))
+        }
+        _ => unreachable!("a plan gives each node the role of its specification"),
+    })
+}

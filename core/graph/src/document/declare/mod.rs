@@ -1,0 +1,143 @@
+//! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
+
+mod deployment;
+mod each;
+mod modules;
+mod names;
+mod nodes;
+mod outputs;
+mod placeholder;
+mod reading;
+mod sets;
+mod signals;
+mod time_base;
+
+use super::graph_file::GraphFile;
+use super::problem::DocumentProblem;
+use super::read::Document;
+use super::tree::{Data, Table};
+use crate::diagnostic::Diagnostics;
+#[cfg(feature = "testkit")]
+pub use names::is_name;
+use reading::text;
+pub use reading::{is_misspelt, known_keys};
+pub use time_base::UNITS as TIME_UNITS;
+
+const SECTIONS: [&str; 15] = [
+    "schema",
+    "name",
+    "description",
+    "extends",
+    "sets",
+    "time",
+    "signals",
+    "modules",
+    "nodes",
+    "outputs",
+    "tests",
+    deployment::SOURCE,
+    deployment::SINKS,
+    deployment::RUNTIME,
+    deployment::MODEL,
+];
+
+/// Sections that say which names there are.
+const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
+
+/// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
+/// which names there are.
+pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
+    let Document {
+        tree,
+        gaps,
+        removed,
+        ..
+    } = document;
+    let Data::Table(root) = &tree.data else {
+        let expected = "a table".to_owned();
+        diagnostics.report(
+            tree.place,
+            DocumentProblem::WrongType {
+                key: None,
+                expected,
+                found: tree.found(),
+                lacks: None,
+            },
+        );
+        return None;
+    };
+    known_keys(root, &SECTIONS, "a graph file", diagnostics);
+    let name = text_of(root, "name", diagnostics);
+    let description = text_of(root, "description", diagnostics);
+    // Whoever refers to what stands in a section that is none has been told of the section.
+    let strange = root.iter().filter(|(key, _)| !SECTIONS.contains(key));
+    let below = strange.filter_map(|(_, section)| section.value.as_table());
+    let elsewhere = below.flat_map(Table::keys).map(str::to_owned);
+    let elsewhere: Vec<String> = elsewhere.chain(gaps.names.iter().cloned()).collect();
+    let mut broken = Vec::new();
+    let shared = names::check(root, &mut broken, diagnostics);
+    let sets = sets::declare(root.get("sets"), &elsewhere, diagnostics);
+    let time = time_base::declare(root.get("time"), diagnostics);
+    let sample = time.sample();
+    let signals = root.get("signals");
+    let mut signals = signals::declare(signals, &sets, sample, &mut broken, diagnostics);
+    let expanded = modules::expand(root, &sets, &mut broken, diagnostics);
+    let mut nodes = nodes::declare(&expanded, &sets, sample, &mut broken, diagnostics);
+    signals.retain(|signal| !shared.contains(&signal.name));
+    nodes.retain(|node| !shared.contains(&node.name));
+    broken.extend(shared);
+    // Of what has gaps, its own mistakes are told, and nothing of those who read it.
+    let gapped = signals.iter().map(|signal| &signal.name);
+    broken.extend(gapped.filter(|name| gaps.concern(name)).cloned());
+    for node in nodes.iter_mut().filter(|node| gaps.concern(&node.name)) {
+        node.faulty.get_or_insert_default();
+        broken.push(node.name.clone());
+    }
+    let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
+    let mut tests = expanded.tests;
+    if let Some(tests) = &mut tests {
+        nodes::convert_samples_but(tests, "name", sample, diagnostics);
+    }
+    if let Some(tests) = &tests
+        && tests.as_list().is_none()
+    {
+        let expected = "a list of tables, each under `[[tests]]`".to_owned();
+        diagnostics.report(
+            tests.place,
+            DocumentProblem::WrongType {
+                key: Some("tests".to_owned()),
+                expected,
+                found: tests.found(),
+                lacks: None,
+            },
+        );
+    }
+    let deployment = deployment::declare(root, sample, diagnostics);
+    let mut naming = NAMING.iter().filter_map(|section| root.get(section));
+    let whole = naming.all(|section| section.as_table().is_some());
+    if expanded.cut || !whole {
+        return None;
+    }
+    Some(GraphFile {
+        name,
+        description,
+        sets: sets.members,
+        time,
+        signals,
+        nodes,
+        broken,
+        elsewhere,
+        removed,
+        outputs,
+        tests,
+        deployment,
+        tree,
+    })
+}
+
+fn text_of(root: &Table, key: &str, diagnostics: &mut Diagnostics) -> Option<String> {
+    text(root.get(key)?, key, diagnostics).map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests;

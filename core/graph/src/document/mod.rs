@@ -1,0 +1,38 @@
+//! A graph file, with what it extends, as a tree with places and then as typed declarations; whether the graph makes sense is decided by the compiler.
+//!
+//! [`load`] reads and merges files into a [`Document`]; [`declare`] checks names, expands sets and `each`, and gives a
+//! [`GraphFile`]; [`decode`] turns a table into the parameters of whoever owns it.
+
+mod declare;
+mod decode;
+mod gaps;
+mod graph_file;
+mod json;
+mod lacks;
+mod merge;
+mod problem;
+mod read;
+mod salvage;
+mod slip;
+mod toml_text;
+mod tree;
+
+pub use declare::declare;
+#[cfg(feature = "testkit")]
+pub use declare::is_name;
+pub use declare::{TIME_UNITS, is_misspelt, known_keys};
+pub use decode::{Decoded, decode};
+pub use decode::{LeftOut, Wanted, decode_part, decode_rest};
+pub use graph_file::{
+    GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
+};
+pub use json::JsonError;
+pub use lacks::Lacks;
+pub use problem::DocumentProblem;
+pub use read::unreadable;
+pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};
+pub use slip::Slip;
+pub use tree::{Data, Entry, Table, Value};
+
+#[cfg(test)]
+mod tests;

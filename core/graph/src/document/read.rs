@@ -1,0 +1,455 @@
+//! Reading a graph file and the files that it extends into one tree; what the tree declares is decided elsewhere.
+
+use std::collections::HashMap;
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use super::gaps::Gaps;
+use super::merge::merge;
+use super::problem::DocumentProblem;
+use super::salvage::Lost;
+use super::toml_text;
+use super::tree::{Data, Entry, Table, Value};
+use crate::diagnostic::{Diagnostics, Names, Place, SourceId, Sources};
+
+/// The largest file that is read, in bytes.
+const LARGEST: usize = 16_000_000;
+/// The greatest number of files in a chain of `extends`.
+const LONGEST_CHAIN: usize = 16;
+
+/// Where files come from.
+pub trait FileReader {
+    /// The whole text of a file.
+    ///
+    /// # Errors
+    /// What the operating system says, also for a text that is not UTF-8.
+    fn read(&self, path: &Path) -> Result<String, io::Error>;
+
+    /// The same of a file that another names, which must be one that can be read again: no pipe and no device.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn read_named(&self, path: &Path) -> Result<String, io::Error> {
+        self.read(path)
+    }
+
+    /// The names of the graph files in the folder of `path`, in order: one of them may be meant where that is not there.
+    fn beside(&self, path: &Path) -> Vec<String>;
+}
+
+/// What is said of something that is read again, or must end, and does not.
+pub const NO_FILE: &str = "it is a pipe or a device, and must be a file";
+
+/// Whether what stands at a path, if anything, is read to an end without waiting, and again: a pipe or a device may not be.
+#[must_use]
+pub fn lasts(path: &Path) -> bool {
+    std::fs::metadata(path).map_or(true, |of| of.is_file() || of.is_dir())
+}
+
+/// The names of the graph files of these, in order.
+fn graph_files(paths: impl Iterator<Item = PathBuf>) -> Vec<String> {
+    let graphs = paths.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let names = graphs.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned()));
+    let mut names: Vec<_> = names.collect();
+    names.sort_unstable();
+    names
+}
+
+/// Files of the operating system.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Disk;
+
+impl FileReader for Disk {
+    fn read(&self, path: &Path) -> Result<String, io::Error> {
+        let mut text = String::new();
+        // One byte more than is allowed tells a file that is too large, without reading an endless one.
+        std::fs::File::open(path)?
+            .take(LARGEST as u64 + 1)
+            .read_to_string(&mut text)?;
+        Ok(text)
+    }
+
+    fn read_named(&self, path: &Path) -> Result<String, io::Error> {
+        match lasts(path) {
+            true => self.read(path),
+            false => Err(io::Error::other(NO_FILE)),
+        }
+    }
+
+    fn beside(&self, path: &Path) -> Vec<String> {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let found = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        graph_files(found.map(|entry| entry.path()))
+    }
+}
+
+/// Files in memory, for tests and embedded programs.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    files: HashMap<PathBuf, String>,
+}
+
+impl Memory {
+    /// No files.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The same with one file more.
+    pub fn with(mut self, path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
+        self.files.insert(path.into(), text.into());
+        self
+    }
+}
+
+impl FileReader for Memory {
+    fn read(&self, path: &Path) -> Result<String, io::Error> {
+        self.files
+            .get(path)
+            .or_else(|| self.files.get(&normal(path)))
+            .cloned()
+            .ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+
+    fn beside(&self, path: &Path) -> Vec<String> {
+        let files = self.files.keys();
+        graph_files(files.filter(|file| file.parent() == path.parent()).cloned())
+    }
+}
+
+/// A graph file merged with what it extends, not yet expanded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Document {
+    /// The file that was asked for.
+    pub root: SourceId,
+    /// The merged tree: a table without `extends`.
+    pub tree: Value,
+    /// What mistakes in reading have left open.
+    pub(super) gaps: Gaps,
+    /// Inherited nodes that were removed.
+    pub(super) removed: Vec<String>,
+}
+
+impl Document {
+    /// A tree that comes from elsewhere than files, e.g. from a model.
+    pub fn new(root: SourceId, tree: Value) -> Self {
+        Document {
+            root,
+            tree,
+            gaps: Gaps::default(),
+            removed: Vec::new(),
+        }
+    }
+}
+
+/// Reads the file at `path` and all that it extends.
+///
+/// `None` if it is missing, or nothing of it can be read for sure; the diagnostics say why. Where a file that it extends is
+/// missing, or the syntax of one is wrong, that is told, and the document is what could be read: diagnostics then keep to themselves
+/// what may only follow. Every file read is added to `sources`.
+pub fn load(
+    path: &Path,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Document> {
+    match reader.read(path) {
+        Ok(text) => load_text(path, text, reader, sources, diagnostics),
+        Err(error) => {
+            diagnostics.report(None, not_read(path, &error, reader, &[]));
+            None
+        }
+    }
+}
+
+/// The same for a text that is at hand; `name` stands for its path, and what it extends is looked for beside it.
+pub fn load_text(
+    name: impl AsRef<Path>,
+    text: impl Into<String>,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Document> {
+    let mut chain = Chain {
+        reader,
+        sources,
+        diagnostics,
+        paths: Vec::new(),
+        lent: HashMap::new(),
+        hopeless: false,
+        gaps: Gaps::default(),
+        removed: Vec::new(),
+    };
+    let root = SourceId(chain.sources.count());
+    let table = chain.read(name.as_ref(), text.into());
+    let (mut gaps, hopeless, removed) = (chain.gaps, chain.hopeless, chain.removed);
+    let mut table = table.filter(|_| !hopeless)?;
+    gaps.spread(&table);
+    if gaps.anywhere {
+        // A module of which something is missing says nothing sure of those that use it.
+        table.remove("modules");
+    }
+    diagnostics.leave_open(gaps.anywhere, &gaps.places);
+    let tree = Value::new(Place::new(root, 0, 0), Data::Table(table));
+    Some(Document {
+        root,
+        tree,
+        gaps,
+        removed,
+    })
+}
+
+struct Chain<'a> {
+    reader: &'a dyn FileReader,
+    sources: &'a mut Sources,
+    diagnostics: &'a mut Diagnostics,
+    paths: Vec<PathBuf>,
+    /// Files that modules come from, read once.
+    lent: HashMap<PathBuf, Option<Table>>,
+    /// A file says of itself that it may mean anything.
+    hopeless: bool,
+    gaps: Gaps,
+    removed: Vec<String>,
+}
+
+impl Chain<'_> {
+    fn read(&mut self, path: &Path, text: String) -> Option<Table> {
+        self.paths.push(normal(path));
+        let table = self.read_and_merge(path, text);
+        self.paths.pop();
+        self.gaps.anywhere |= table.is_none();
+        table
+    }
+
+    fn read_and_merge(&mut self, path: &Path, text: String) -> Option<Table> {
+        let shown = path.display().to_string();
+        if text.len() > LARGEST {
+            let source = self.sources.add(shown, "");
+            self.diagnostics.report(
+                Place::new(source, 0, 0),
+                DocumentProblem::TooLarge { limit: LARGEST },
+            );
+            return None;
+        }
+        let text: Arc<str> = text.into();
+        let source = self.sources.add(shown, text.clone());
+        let parsed = toml_text::parse(source, &text, self.diagnostics)?;
+        let mut table = parsed.table;
+        for lost in &parsed.lost {
+            self.gaps.add(source, lost);
+        }
+        let schema = table
+            .get("schema")
+            .map(|value| (value.place, value.as_integer(), value.found()));
+        match schema {
+            Some((_, Some(1), _)) => {}
+            // It may be what a syntax error cost.
+            None if parsed.lost.iter().any(Lost::may_be_schema) => {}
+            None => self
+                .diagnostics
+                .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
+            // Another schema may mean anything; 1 in another dress means 1.
+            Some((place, None, found)) => self
+                .diagnostics
+                .report(place, DocumentProblem::SchemaUnknown { found }),
+            Some((place, _, found)) => {
+                self.hopeless = true;
+                self.diagnostics
+                    .report(place, DocumentProblem::SchemaUnknown { found });
+            }
+        }
+        let mut base = match table.remove("extends") {
+            Some(entry) => self.other(&entry.value, "extends"),
+            None => None,
+        };
+        let borrowed = self.borrow_modules(&mut table);
+        let inherited = base.as_mut().and_then(|base| base.get_mut("modules"));
+        if let Some(inherited) = inherited.and_then(Value::as_table_mut) {
+            // A module of another file is another one: it takes the place of the inherited one of its name, whole.
+            for name in &borrowed {
+                inherited.remove(name);
+            }
+        }
+        self.diagnostics.leave_open(self.gaps.anywhere, &[]);
+        Some(merge(base, table, &mut self.removed, self.diagnostics))
+    }
+
+    /// Puts the modules of other files (`modules.NAME.from`) in the place of their names, which it gives.
+    fn borrow_modules(&mut self, table: &mut Table) -> Vec<String> {
+        let mut borrowed = Vec::new();
+        let borrows = |value: &Value| {
+            let modules = value.as_table().into_iter().flat_map(Table::iter);
+            let mut keys = modules.filter_map(|(_, module)| module.value.as_table());
+            keys.any(|keys| keys.contains("from"))
+        };
+        if !table.get("modules").is_some_and(borrows) {
+            return borrowed;
+        }
+        let Some(modules) = table.get_mut("modules").and_then(Value::as_table_mut) else {
+            return borrowed;
+        };
+        // The modules of each file, listed once for all that are not among them.
+        let mut listed: HashMap<String, Arc<Names>> = HashMap::new();
+        for (name, entry) in modules.iter_mut() {
+            let Some(from) = entry
+                .value
+                .as_table_mut()
+                .and_then(|keys| keys.remove("from"))
+            else {
+                continue;
+            };
+            let own = entry.value.as_table_mut();
+            let wanted = own.and_then(|keys| keys.remove("module"));
+            let (wanted, place) = match &wanted {
+                Some(Entry { value, .. }) => (value.as_text().unwrap_or(name), value.place),
+                None => (name, from.value.place),
+            };
+            let (wanted, lent) = (wanted.to_owned(), self.lender(&from.value));
+            let Some(lent) = lent else { continue };
+            let empty = Table::new();
+            let of_file = lent.get("modules").and_then(Value::as_table);
+            let of_file = of_file.unwrap_or(&empty);
+            let Some(Data::Table(mut module)) =
+                of_file.get(&wanted).map(|module| module.data.clone())
+            else {
+                let file = from.value.as_text().unwrap_or_default();
+                let known = listed
+                    .entry(file.to_owned())
+                    .or_insert_with(|| Arc::new(of_file.keys().map(str::to_owned).collect()));
+                let (name, known) = (wanted, Arc::clone(known));
+                self.fail(place, DocumentProblem::UnknownModule { name, known });
+                continue;
+            };
+            if let Some(entry) = lent.entry("modules")
+                && !module.contains("modules")
+            {
+                module.insert("modules", entry.clone());
+            }
+            borrowed.push(name.to_owned());
+            let Some(over) = entry.value.as_table().cloned() else {
+                continue;
+            };
+            // What is inside of a module has no name outside of it.
+            let laid = merge(Some(module), over, &mut Vec::new(), self.diagnostics);
+            entry.value.data = Data::Table(laid);
+        }
+        borrowed
+    }
+
+    fn lender(&mut self, from: &Value) -> Option<Table> {
+        let path = from
+            .as_text()
+            .map(|name| normal(&self.sources.resolve(from.place, name)));
+        if let Some(known) = path.as_ref().and_then(|path| self.lent.get(path)) {
+            return known.clone();
+        }
+        let lent = self.other(from, "from");
+        self.lent.extend(path.map(|path| (path, lent.clone())));
+        lent
+    }
+
+    /// The tables of another file that this one names.
+    fn other(&mut self, extends: &Value, key: &str) -> Option<Table> {
+        let place = extends.place;
+        let Some(name) = extends.as_text() else {
+            let (key, expected) = (
+                Some(key.to_owned()),
+                "the path of a file in quotes".to_owned(),
+            );
+            self.fail(
+                place,
+                DocumentProblem::WrongType {
+                    key,
+                    expected,
+                    found: extends.found(),
+                    lacks: None,
+                },
+            );
+            return None;
+        };
+        let path = self.sources.resolve(place, name);
+        let wanted = normal(&path);
+        if let Some(first) = self.paths.iter().position(|seen| *seen == wanted) {
+            let chain = self.paths[first..]
+                .iter()
+                .chain([&wanted])
+                .map(|path| path.display().to_string())
+                .collect();
+            self.fail(place, DocumentProblem::ExtendsLoop { chain });
+            return None;
+        }
+        if self.paths.len() >= LONGEST_CHAIN {
+            self.fail(
+                place,
+                DocumentProblem::LongChain {
+                    limit: LONGEST_CHAIN,
+                },
+            );
+            return None;
+        }
+        match self.reader.read_named(&path) {
+            Ok(text) => self.read(&path, text),
+            Err(error) => {
+                self.fail(place, not_read(&path, &error, self.reader, &self.paths));
+                None
+            }
+        }
+    }
+
+    fn fail(&mut self, place: Place, problem: DocumentProblem) {
+        self.gaps.anywhere = true;
+        self.diagnostics.report(place, problem);
+    }
+}
+
+/// None of those that are being read can be meant.
+fn not_read(
+    path: &Path,
+    error: &io::Error,
+    reader: &dyn FileReader,
+    being_read: &[PathBuf],
+) -> DocumentProblem {
+    let mut beside = match error.kind() {
+        io::ErrorKind::NotFound => reader.beside(path),
+        _ => Vec::new(),
+    };
+    beside.retain(|name| !being_read.contains(&normal(&path.with_file_name(name))));
+    DocumentProblem::Unreadable {
+        path: path.display().to_string(),
+        reason: unreadable(error),
+        beside,
+        named: error.kind() == io::ErrorKind::NotFound && !being_read.is_empty(),
+    }
+}
+
+/// Why a file cannot be read, in words.
+pub fn unreadable(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        io::ErrorKind::InvalidData => "it is not text in UTF-8; save it as that".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// The path without `.` and, where that does not depend on the file system, without `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir
+                if matches!(normal.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                normal.pop();
+            }
+            other => normal.push(other),
+        }
+    }
+    normal
+}

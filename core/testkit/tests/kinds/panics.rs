@@ -1,0 +1,95 @@
+//! A panic within a node carries the name that the node has in its graph.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use athermal_core::diagnostic::{NodePanic, panic_text};
+use athermal_core::engine::Engine;
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
+use athermal_core::time::Instant;
+use athermal_run::model::Model;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Passes its input on, and panics above 1.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Brittle {}
+
+impl Feature for Brittle {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is passed on")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let channels = inputs.port("signal").to_vec();
+        let name = "passed";
+        Ok(vec![OutputPort { name, channels }])
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        assert!(inputs.port("signal")[0].name != "fragile", "cannot be made");
+        Box::new(Passing)
+    }
+}
+
+struct Passing;
+
+impl Operator for Passing {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        let value = tick.port(0)[0];
+        assert!(value < 1.0, "too much");
+        outputs.set(0, value);
+    }
+
+    fn segment(&mut self) {}
+}
+
+athermal_core::register!(Brittle, Feature, "brittle");
+
+const GRAPH: &str = r#"{"athermal_model": 1, "card": null, "fitted": {}, "graph": {
+    "sets": {"axis": ["X", "Y"]},
+    "signals": {"t": {"unit": "K", "channels": ["X", "Y"]}},
+    "nodes": {"passed": {"each": "axis", "type": "brittle", "inputs": {"signal": "t.{axis}"}}},
+    "outputs": {"out": "passed"}
+}}"#;
+
+fn engine(graph: &str) -> Engine {
+    let model = Model::from_text("model.json", graph.to_owned()).unwrap();
+    model.engine().unwrap()
+}
+
+/// What a panic is reported as.
+fn panic_of(work: impl FnOnce()) -> String {
+    let panic = catch_unwind(AssertUnwindSafe(work)).unwrap_err();
+    assert!(panic.is::<NodePanic>());
+    panic_text(&*panic)
+}
+
+#[test]
+fn a_panic_of_a_node_that_is_made_names_it() {
+    let text = panic_of(|| drop(engine(&GRAPH.replace('Y', "fragile"))));
+    assert!(
+        text.starts_with(
+            "the node `passed.fragile` panicked before its first tick: cannot be made;"
+        ),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_panic_names_the_node_and_the_tick() {
+    let text = panic_of(|| {
+        let mut engine = engine(GRAPH);
+        for (second, value) in [(1, 0.5), (2, 1.5)] {
+            let now = Instant::from_ns(second * 1_000_000_000);
+            engine.step(now, &[0.0, value]).unwrap();
+        }
+    });
+    assert_eq!(
+        text,
+        "the node `passed.Y` panicked at 2 s: too much; this is a mistake in its code, for the author of `brittle`, \
+         from athermal-core 0.1.0"
+    );
+}

@@ -1,0 +1,317 @@
+//! An estimator that is sound, and the same with one fault at a time.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use athermal_core::node::{
+    Estimator, InputPort, Learner, LinearForm, Mistake, Predictor, Regressors, Restored, State,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+};
+use athermal_core::time::{Duration, Instant};
+use athermal_testkit::{Case, Rule};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{breaks, breaks_only, finds};
+
+/// Predicts the mean of the truths, or the quotient of it and the mean of the first feature times that feature.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Ratio {
+    /// What is wrong with it; nothing by default.
+    #[serde(default)]
+    #[schemars(with = "String")]
+    fault: Fault,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Fault {
+    #[default]
+    None,
+    /// Divides by what may be zero.
+    Reckless,
+    /// No two fits are the same.
+    Unseeded,
+    /// Part of what was learned is not written.
+    Unwritten,
+    /// Counts on ten rows or more.
+    Panics,
+    /// Counts on a model file that nobody has edited.
+    Trusting,
+    /// Says to be a linear form that it is not.
+    Misstated,
+    /// Says so once it goes on learning.
+    Mislearnt,
+    /// Is surer than sure.
+    Negative,
+    /// Says how sure it is, and never is.
+    Unsure,
+    /// Predicts from what it was not given.
+    UsesOther,
+}
+
+impl Estimator for Ratio {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of"),
+                InputPort::truth("what is predicted"),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            ..Regressors::default()
+        }
+    }
+
+    fn has_std_dev(&self) -> bool {
+        matches!(self.fault, Fault::Negative | Fault::Unsure)
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        let regressors = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone());
+        Box::new(Averaging {
+            fault: self.fault,
+            regressors: regressors.collect(),
+            sum: 0.0,
+            rows: 0,
+            first: None,
+            spread: 0.0,
+        })
+    }
+}
+
+struct Averaging {
+    fault: Fault,
+    regressors: Vec<String>,
+    sum: f64,
+    rows: usize,
+    first: Option<f64>,
+    spread: f64,
+}
+
+impl Trainer for Averaging {
+    fn row(&mut self, _regressors: &[f64], truth: f64) {
+        self.sum += truth;
+        self.rows += 1;
+        self.first.get_or_insert(truth);
+        self.spread = self
+            .first
+            .map_or(0.0, |first| self.spread.max((truth - first).abs()));
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Trained, TrainingError> {
+        static FITS: AtomicU64 = AtomicU64::new(0);
+        assert!(self.fault != Fault::Panics || self.rows >= 10, "ten rows");
+        if self.rows == 0 {
+            return Err(TrainingError::TooFewRows { rows: 0, needed: 1 });
+        }
+        let mut mean = self.sum / self.rows as f64;
+        if self.fault == Fault::Reckless {
+            mean = mean * self.spread / self.spread;
+        }
+        if self.fault == Fault::Unseeded {
+            mean += FITS.fetch_add(1, Ordering::Relaxed) as f64;
+        }
+        let written = self.fault != Fault::Unwritten;
+        let width = self.regressors.len();
+        if self.fault == Fault::UsesOther {
+            self.regressors[0].push('!');
+        }
+        let fitted = Fitted {
+            regressors: self.regressors,
+            means: vec![if written { mean } else { 0.0 }],
+            trusting: self.fault == Fault::Trusting,
+            unsure: self.fault == Fault::Unsure,
+            misstated: (self.fault == Fault::Misstated).then(|| vec![0.0; width]),
+            mislearnt: self.fault == Fault::Mislearnt,
+            unwritten: if written { 0.0 } else { mean },
+        };
+        Ok(Trained {
+            predictor: Box::new(fitted),
+            report: TrainingReport::default(),
+        })
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Fitted {
+    regressors: Vec<String>,
+    /// Of the truths, the only one.
+    means: Vec<f64>,
+    trusting: bool,
+    unsure: bool,
+    misstated: Option<Vec<f64>>,
+    mislearnt: bool,
+    #[serde(skip)]
+    unwritten: f64,
+}
+
+impl Predictor for Fitted {
+    fn uses(&self) -> &[String] {
+        &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        if self.trusting {
+            return Vec::new();
+        }
+        Mistake::of_lengths(1, &[("means", self.means.len())])
+    }
+
+    fn predict(&self, _regressors: &[f64]) -> f64 {
+        self.means[0] + self.unwritten
+    }
+
+    fn std_dev(&self, _regressors: &[f64]) -> f64 {
+        if self.unsure {
+            f64::NAN
+        } else {
+            -self.means[0].abs()
+        }
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        let coefficients = self.misstated.as_ref()?;
+        Some(LinearForm {
+            constant: 0.0,
+            coefficients,
+        })
+    }
+
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        self.mislearnt.then(|| {
+            Box::new(Mislearnt {
+                means: self.means.clone(),
+                coefficients: vec![0.0; self.regressors.len()],
+            }) as _
+        })
+    }
+}
+
+athermal_core::predictor!(Fitted, "sabotaged_estimator");
+
+/// Predicts the last truth, and says to predict the mean of the fit.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Mislearnt {
+    /// Of the fit, then all that followed.
+    means: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+impl Learner for Mislearnt {
+    fn predict(&self, _regressors: &[f64], _of: Instant) -> f64 {
+        self.means[self.means.len() - 1]
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        Some(LinearForm {
+            constant: self.means[0],
+            coefficients: &self.coefficients,
+        })
+    }
+
+    fn learn(&mut self, _regressors: &[f64], truth: f64, _at: Instant) {
+        self.means.push(truth);
+    }
+
+    fn snapshot(&self) -> Box<dyn State> {
+        Box::new(self.clone())
+    }
+
+    fn restore(&mut self, _state: Box<dyn State>) -> Restored {
+        Restored::cold("it never learns")
+    }
+}
+
+athermal_core::state!(Mislearnt, "mislearnt/1");
+athermal_core::register!(Ratio, Estimator, "sabotaged_estimator");
+
+fn with(fault: &str) -> Case {
+    Case::new(format!("ahead = \"1min\"\nfault = \"{fault}\""))
+}
+
+#[test]
+fn a_sound_estimator_breaks_no_rule() {
+    breaks_only::<Ratio>(Case::new("ahead = \"1min\""), &[]);
+}
+
+#[test]
+fn a_fit_on_nothing_is_an_error_in_words() {
+    breaks::<Ratio>(with("panics"), Rule::Fits, "it panics: ten rows");
+    breaks::<Ratio>(
+        with("reckless"),
+        Rule::Fits,
+        "fitted on channels that never change",
+    );
+}
+
+#[test]
+fn a_fit_without_a_seed_is_another_every_time() {
+    breaks::<Ratio>(with("unseeded"), Rule::Fits, "it is another");
+}
+
+#[test]
+fn a_model_holds_all_that_predicts() {
+    breaks_only::<Ratio>(with("unwritten"), &[Rule::Models]);
+    breaks::<Ratio>(with("unwritten"), Rule::Models, "predicts otherwise");
+}
+
+#[test]
+fn a_model_that_was_edited_is_not_trusted() {
+    breaks_only::<Ratio>(with("trusting"), &[Rule::Edited]);
+    breaks::<Ratio>(
+        with("trusting"),
+        Rule::Edited,
+        "with the last dropped of /fitted/node/means, it panics: index out of bounds",
+    );
+}
+
+#[test]
+fn a_deviation_is_not_negative() {
+    breaks_only::<Ratio>(with("negative"), &[Rule::Uncertainty]);
+    finds::<Ratio>(
+        with("negative"),
+        Rule::Uncertainty,
+        "`node:std_dev.a` is -0.8019520665777313 at 8.189 s",
+    );
+}
+
+#[test]
+fn a_deviation_that_is_promised_comes() {
+    breaks_only::<Ratio>(with("unsure"), &[Rule::Uncertainty]);
+    finds::<Ratio>(
+        with("unsure"),
+        Rule::Uncertainty,
+        "`node:std_dev.a` is never there in the second half of the run, though predictions are",
+    );
+}
+
+#[test]
+fn what_a_predictor_uses_is_among_what_it_was_given() {
+    breaks_only::<Ratio>(with("uses_other"), &[Rule::Fits]);
+    finds::<Ratio>(
+        with("uses_other"),
+        Rule::Fits,
+        "the fit of `node` uses `features.a!`, which the node does not have (it has features.a, features.b, features.c): fit the \
+         graph again",
+    );
+}
+
+#[test]
+fn a_linear_form_is_what_is_predicted() {
+    breaks_only::<Ratio>(with("misstated"), &[Rule::Linear]);
+    breaks::<Ratio>(
+        with("misstated"),
+        Rule::Linear,
+        "of which its linear form is 0.0",
+    );
+    breaks_only::<Ratio>(with("mislearnt"), &[Rule::Linear]);
+    breaks::<Ratio>(with("mislearnt"), Rule::Linear, "its learner predicts");
+}
