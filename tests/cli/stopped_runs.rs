@@ -183,7 +183,7 @@ fn a_file_that_a_run_keeps_or_writes_is_refused_to_another_until_the_first_is_de
     let more: [&dyn AsRef<std::ffi::OsStr>; 6] = [&"run", &graph, &"-i", &"-", &"--state", &state];
     let refused = athermal_fed(&more, b"time_s,Z\n500,1\n").ended(3);
     refused.tells(&[
-        "state: another run keeps there what it knows",
+        "state: another run keeps its state there",
         "end that one first, or name another file with `--state`",
     ]);
     assert_eq!(refused.out, "");
