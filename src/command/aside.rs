@@ -1,4 +1,4 @@
-//! Decides how a whole file comes to be at a path: aside first, then by its name; not what is in it.
+//! Writing whole files: beside their place first, then renamed, so that a reader never sees half of one.
 
 use std::fs;
 use std::io;

@@ -9,15 +9,15 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::data::{Data, no_graph};
 use crate::invocation::{command, program, quoted};
-use crate::starter::{NoStarter, Told, starter};
+use crate::starter::{NoStarter, Request, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
 
 /// Write a starter graph for a log of yours
 ///
-/// Looks at the names and values of a CSV or JSON lines file, guesses what is a temperature, what drifts and in which
-/// units, measures rates and gaps, and sets the drift against its standard error to choose the windows. Every guess is
-/// told, and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
+/// Looks at the names and values of a CSV or JSON lines file. It guesses what is a temperature, what drifts, and in which
+/// units. It measures rates and gaps, and chooses windows by the drift against its standard error. Every guess is printed,
+/// and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal init log.csv
@@ -28,7 +28,7 @@ use athermal_analysis::figures::paragraph;
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log
-    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and -o to say where its graph goes"))]
+    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
     data: PathBuf,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
@@ -53,7 +53,7 @@ impl Init {
     /// # Errors
     /// When the log cannot be read, nothing in it drifts, or the graph is there already.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let told = Told {
+        let request = Request {
             time: self.time.clone(),
             format: self.time_format.clone(),
             drifting: self.drifts.clone(),
@@ -66,12 +66,12 @@ impl Init {
             )));
         }
         check_apart("--output", &self.output, [&*self.data])?;
-        let starter = starter(&self.data, &told).map_err(|error| match error {
+        let starter = starter(&self.data, &request).map_err(|error| match error {
             NoStarter::File(error) => {
                 // There is no `--lenient` here that it could advise.
-                let told = error.taken().to_string();
+                let reason = error.without_advice().to_string();
                 match error.into() {
-                    Failure::Request(_) => Failure::Request(told),
+                    Failure::Request(_) => Failure::Request(reason),
                     other => other,
                 }
             }
@@ -89,35 +89,24 @@ impl Init {
         }
         write_aside(&self.output, &starter.text)?;
         if people {
-            terminal.note(self.next(starter.lenient));
+            terminal.note(self.next());
         } else {
-            let told = json!({
+            let facts = json!({
                 "graph": self.output,
                 "columns": starter.columns,
                 "windows": starter.windows,
                 "remarks": starter.remarks,
             });
-            println!("{told:#}");
+            println!("{facts:#}");
         }
         Ok(Answer::Fine)
     }
 
-    fn next(&self, lenient: bool) -> String {
+    fn next(&self) -> String {
         let program = program();
         let [graph, data] =
             [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
-        let lenient = if lenient { "--lenient" } else { "" };
-        let fit: [&str; 7] = [
-            &program,
-            "fit",
-            &graph,
-            "--data",
-            &data,
-            lenient,
-            "-o model.json",
-        ];
-        let fit: Vec<&str> = fit.into_iter().filter(|part| !part.is_empty()).collect();
-        let fit = command(&fit);
+        let fit = command(&[&program, "fit", &graph, "--data", &data, "-o model.json"]);
         let unseen = quoted(&Data::of(vec![self.data.clone()]).unseen());
         let evaluate = format!("evaluate model.json --data {unseen}");
         let evaluate = command(&[&program, &evaluate]);

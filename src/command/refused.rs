@@ -1,4 +1,4 @@
-//! Decides what programs are told of rows and cells that a reader does not take; in what words people are told, its errors say.
+//! Rows and cells that a reader does not take, as events for programs.
 
 use athermal::files::FileError;
 use serde_json::{Value, json};
@@ -26,7 +26,7 @@ const CELLS: &str = "unreadable_cells";
 
 fn facts(error: &FileError) -> (&'static str, Value) {
     match error {
-        FileError::TimeNotAfter { time, .. } | FileError::TimeStaysBehind { time, .. } => {
+        FileError::TimeNotAfter { time, .. } => {
             (ROWS, json!({ "reason": "time_before", "time": time }))
         }
         FileError::TimeAgain { time, .. } => {
@@ -44,7 +44,7 @@ fn facts(error: &FileError) -> (&'static str, Value) {
         FileError::BadCell { column, found, .. } | FileError::MixedMarks { column, found, .. } => {
             (CELLS, json!({ "column": column, "found": found }))
         }
-        FileError::StaysUnreadable { newest, .. } => facts(newest),
+        FileError::StillRefused { newest, .. } => facts(newest),
         FileError::HeaderAgain { .. } => ("header_again", json!({})),
         FileError::MissingColumns { missing, .. } => {
             let columns: Vec<_> = missing.iter().map(|of| &of.name).collect();

@@ -7,7 +7,7 @@ use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
 use athermal_core::compile::EstimatorKeys;
-use athermal_core::document::TIME_UNITS;
+use athermal_core::document::{TIME_UNITS, TableFormat};
 use athermal_core::node::{Kind, Read, kinds};
 use athermal_trial::TestTable;
 
@@ -26,6 +26,8 @@ pub fn graph_schema() -> Value {
     let names: Vec<&str> = all.iter().map(|kind| kind.name).collect();
     let summaries: Vec<String> = all.iter().map(|kind| kind.summary()).collect();
     let duration = of::<athermal_core::time::Duration>(&mut generator);
+    let format = Value::from(TableFormat::json_schema(&mut generator));
+    let format = as_draft_7(&format, &str::to_owned);
     let quantity = of::<athermal_core::quantity::Quantity>(&mut generator);
     let unit = of::<athermal_core::unit::Unit>(&mut generator);
     let mut definitions = Definitions::default();
@@ -96,6 +98,7 @@ pub fn graph_schema() -> Value {
                 "additionalProperties": members
             },
             "time": time(&duration),
+            "table": table(&format),
             "signals": {
                 "description": "What is measured.",
                 "type": "object",
@@ -149,7 +152,7 @@ impl Definitions {
     /// Takes the definitions of a kind over, and gives its schema with references to them. A name that another kind has for
     /// something else gets the kind's name in front.
     fn adopt(&mut self, kind: &Kind) -> Value {
-        let mut schema = Value::from((kind.schema)());
+        let mut schema = (kind.schema)().clone();
         let own = schema
             .as_object_mut()
             .and_then(|schema| schema.remove("$defs"));
@@ -412,6 +415,23 @@ fn time(duration: &Value) -> Value {
             }
         }
     })
+}
+
+/// `[table]` with the keys of a file, which `[[table.files]]` has again beside the names that it is for.
+fn table(format: &Value) -> Value {
+    let mut file = format.clone();
+    file["description"] = "What differs in some of several files.".into();
+    file["properties"]["match"] = json!({
+        "description": "The names of the files; `*`, `?` and `{a,b}` match.",
+        "type": "string",
+        "examples": ["temp*.csv"]
+    });
+    file["required"] = json!(["match"]);
+    let mut table = format.clone();
+    table["description"] =
+        "How the text of a log is laid out; what is not declared is found in the file.".into();
+    table["properties"]["files"] = json!({ "type": "array", "items": file });
+    table
 }
 
 fn signal(unit: &Value, quantity: &Value, duration: &Value) -> Value {

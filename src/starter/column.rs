@@ -4,7 +4,7 @@ use athermal::core::unit::Unit;
 use athermal::files::Description;
 use serde_json::{Value, json};
 
-use super::Told;
+use super::Request;
 use super::name::{POSITIONS, is_count, measures, unit_in, words};
 
 /// What a column is for.
@@ -118,7 +118,7 @@ impl Column {
         })
     }
 
-    /// Tells the user something of it.
+    /// Adds a warning about it.
     pub fn warn(&mut self, what: String) {
         self.warnings.push(what);
     }
@@ -275,8 +275,8 @@ fn guess(name: &str, below: &str) -> Column {
 ///
 /// # Errors
 /// A text that says what is missing.
-pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
-    for name in &told.drifting {
+pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
+    for name in &request.drifting {
         let Some(column) = columns.iter_mut().find(|column| column.name == *name) else {
             let known: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
             return Err(format!(
@@ -309,10 +309,10 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
         (Guess::Position, "")
     };
     for column in columns.iter_mut() {
-        let drifts = if told.drifting.is_empty() {
+        let drifts = if request.drifting.is_empty() {
             column.guess == drifting
         } else {
-            told.drifting.contains(&column.name)
+            request.drifting.contains(&column.name)
         };
         column.kind = match column.guess {
             Guess::Unused => Kind::Unused,
@@ -321,7 +321,7 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
             Guess::Drive | Guess::Ambient | Guess::Other => Kind::Drive,
             Guess::Position => Kind::Unused,
         };
-        if drifts && told.drifting.is_empty() {
+        if drifts && request.drifting.is_empty() {
             column.why.push_str(why);
         } else if drifts {
             column.why = "as you say".to_owned();
@@ -331,64 +331,55 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
             column.why.push_str(", may explain the drift");
         }
     }
-    one_quantity(columns, told)?;
+    one_quantity(columns, request)?;
     let names = |kind| -> Vec<&str> {
         let of_kind = columns.iter().filter(|column| column.kind == kind);
         of_kind.map(|column| column.name.as_str()).collect()
     };
     let causes = [names(Kind::Temperature), names(Kind::Drive)].concat();
-    let left_out = |named: &[Guess]| -> Option<String> {
-        let lost = columns
-            .iter()
-            .filter(|column| column.kind == Kind::Unused && named.contains(&column.named));
-        let lost: Vec<String> = lost.filter_map(Column::remark).collect();
-        (!lost.is_empty()).then(|| lost.join("; "))
-    };
-    let lost = match (names(Kind::Drifting).is_empty(), causes.is_empty()) {
-        (false, false) => None,
-        (true, false) => {
-            left_out(&[Guess::Position]).map(|lost| ("nothing is left that drifts", lost))
-        }
-        (false, true) => left_out(&[Guess::Temperature, Guess::Drive, Guess::Ambient])
-            .map(|lost| ("nothing is left that could explain a drift", lost)),
-        (true, true) => left_out(&[Guess::Temperature, Guess::Position]).map(|lost| {
-            (
-                "neither what drifts nor what could explain it is left",
-                lost,
-            )
-        }),
-    };
-    if let Some((what, lost)) = lost {
-        return Err(format!("{what}: {lost}"));
-    }
-    match (names(Kind::Drifting).is_empty(), causes.is_empty()) {
-        (false, false) => Ok(()),
-        (true, false) => Err(format!(
-            "nothing in it drifts: {} {}, and there is no position or other quantity to be explained; log a \
-             position beside, or name the column that drifts with --drifts",
-            causes.join(", "),
-            match (columns.iter().any(|column| column.kind == Kind::Drive), causes.len()) {
-                (true, _) => "may explain a drift",
-                (_, 1) => "is a temperature",
-                _ => "are temperatures",
-            },
-        )),
-        (false, true) => Err(format!(
-            "nothing in it could explain the drift of {}: there is no temperature",
-            names(Kind::Drifting).join(", ")
-        )),
-        (true, true) => Err(
+    let drifting = names(Kind::Drifting);
+    use Guess::{Ambient, Drive, Position, Temperature};
+    let (lost, named, without) = match (drifting.is_empty(), causes.is_empty()) {
+        (false, false) => return Ok(()),
+        (true, false) => (
+            "nothing is left that drifts",
+            &[Position][..],
+            format!(
+                "nothing in it drifts: {} may explain a drift, and there is no position or other quantity to be explained; log a \
+                 position beside, or name the column that drifts with --drifts",
+                causes.join(", ")
+            ),
+        ),
+        (false, true) => (
+            "nothing is left that could explain a drift",
+            &[Temperature, Drive, Ambient][..],
+            format!(
+                "nothing in it could explain the drift of {}: there is no temperature",
+                drifting.join(", ")
+            ),
+        ),
+        (true, true) => (
+            "neither what drifts nor what could explain it is left",
+            &[Temperature, Position][..],
             "no column is a temperature or a position; names such as `plate_degC` and `Z_nm` say so"
                 .to_owned(),
         ),
+    };
+    let left_out = columns
+        .iter()
+        .filter(|column| column.kind == Kind::Unused && named.contains(&column.named));
+    let left_out: Vec<String> = left_out.filter_map(Column::remark).collect();
+    match left_out.is_empty() {
+        true => Err(without),
+        false => Err(format!("{lost}: {}", left_out.join("; "))),
     }
 }
 
 /// What drifts must be one quantity, since one node takes its slopes in one unit.
-fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
+fn one_quantity(columns: &mut [Column], request: &Request) -> Result<(), String> {
     let drifts = |column: &&Column| column.kind == Kind::Drifting;
     let mut drifting = columns.iter().filter(drifts);
-    let first = match told.drifting.is_empty() {
+    let first = match request.drifting.is_empty() {
         true => drifting.min_by_key(|column| column.hardly_drifts()),
         false => drifting.next(),
     };
@@ -399,12 +390,12 @@ fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
         .iter_mut()
         .filter(|column| column.kind == Kind::Drifting);
     for column in drifting.filter(|column| !column.is_same_quantity(&first)) {
-        if told.drifting.is_empty() {
+        if request.drifting.is_empty() {
             column.kind = Kind::Drive;
             column.why = format!("another quantity than `{}`, may explain it", first.name);
             continue;
         }
-        let told = |of: &Column| match of.unit_known {
+        let unit = |of: &Column| match of.unit_known {
             true => format!("`{}` is in {}", of.name, of.unit),
             false => format!("what unit `{}` is in, its name does not say", of.name),
         };
@@ -412,8 +403,8 @@ fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
             "`{}` and `{}` are different quantities ({}; {}); write a graph for each",
             first.name,
             column.name,
-            told(&first),
-            told(column),
+            unit(&first),
+            unit(column),
         ));
     }
     Ok(())

@@ -3,12 +3,12 @@
 use athermal::core::time::TimeFormat;
 use athermal::files::{TimeForm, has_clock, has_zone};
 
-/// What is told of dates and times that do not say how far they are from UTC.
+/// A remark on dates and times that do not say how far they are from UTC.
 pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, say whose, so that no hour is lost \
      when the clocks go back in autumn: `zone = \"Europe/Berlin\"` in `[time]`";
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
-/// month that does, where only the numbers could tell them apart.
+/// month that does, where only the numbers could decide.
 const FORMATS: [&str; 25] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
@@ -37,7 +37,7 @@ const FORMATS: [&str; 25] = [
     "%Y%m%d_%H%M%S",
 ];
 
-/// A form of dates and times, with what is told of it.
+/// A form of dates and times, with remarks on it.
 pub struct Dates {
     /// The form.
     pub form: TimeForm,
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_day_that_may_be_a_month_is_told() {
+    fn a_day_that_may_be_a_month_has_another_form() {
         let found = found(&["01/03/2026 12:00:00", "01/03/2026 12:00:10"]).unwrap();
         assert_eq!(found.declared.1, "%d/%m/%Y %H:%M:%S%.f");
         let other = found.other.unwrap().to_string();

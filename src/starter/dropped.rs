@@ -1,6 +1,6 @@
-//! Decides what is told of the rows that a log has and no command takes, with the likely cause. Not which rows these are.
+//! What to report of the rows that a log has and no command takes, with the likely cause.
 
-use athermal::files::{Again, Description, FileError, Report, with_decimal_point};
+use athermal::files::{Description, FileError, Report, with_decimal_point};
 
 use super::clock::Clock;
 use super::texts::Texts;
@@ -9,42 +9,18 @@ use athermal_analysis::figures::{count, counted};
 /// So many rows whose time is out of order are no slips: the clock was set back.
 const SET_BACK: u64 = 10;
 
-/// The finest step of the times that were read.
-#[derive(Debug, Clone, Copy)]
-pub struct Steps {
-    minutes: bool,
-    seconds: bool,
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self {
-            minutes: true,
-            seconds: true,
-        }
-    }
-}
-
-impl Steps {
-    /// Looks at another instant, in ns.
-    pub fn push(&mut self, time_ns: i64) {
-        self.minutes &= time_ns % 60_000_000_000 == 0;
-        self.seconds &= time_ns % 1_000_000_000 == 0;
-    }
-}
-
-/// What is told of the rows of a log that were not taken, and of those that were put together.
-pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
+/// Remarks on the rows of a log that were not taken, and on those that were put together.
+pub fn remarks(report: &Report, clock: &Clock) -> Vec<String> {
     let left_out = [
         &report.repeated_time,
         &report.refused_time,
         &report.refused_rows,
     ];
     let all = report.rows + report.joined + left_out.map(|found| found.count).iter().sum::<u64>();
-    let mut told = Vec::new();
+    let mut remarks = Vec::new();
     if report.joined > 0 {
         let [have, are] = verbs(report.joined);
-        told.push(format!(
+        remarks.push(format!(
             "{} of {} {have} the time of the row before, and {are} put together with it",
             count(report.joined),
             counted(all, "row")
@@ -54,14 +30,11 @@ pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
         if let Some(first) = &found.first {
             let [have, are] = verbs(found.count);
             let (what, cause) = match place {
-                0 => (
-                    format!("{have} the time of the row before"),
-                    same_time(report, all, steps).to_owned(),
-                ),
+                0 => (format!("{have} the time of the row before"), String::new()),
                 1 => (format!("{are} out of order"), out_of_order(report, clock)),
                 _ => ("cannot be read".to_owned(), String::new()),
             };
-            told.push(format!(
+            remarks.push(format!(
                 "{} of {} {what}, and {are} left out; the first: {first}{cause}",
                 count(found.count),
                 counted(all, "row")
@@ -69,9 +42,9 @@ pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
         }
     }
     if let Some(place) = &report.truncated {
-        told.push(format!("{place}: the last line is cut off and left out"));
+        remarks.push(format!("{place}: the last line is cut off and left out"));
     }
-    told
+    remarks
 }
 
 /// What so many rows do.
@@ -79,23 +52,6 @@ fn verbs(rows: u64) -> [&'static str; 2] {
     match rows {
         1 => ["has", "is"],
         _ => ["have", "are"],
-    }
-}
-
-/// Why rows may have the time of the one before, and what to do. Where one in a hundred has it, it is the rule.
-fn same_time(report: &Report, all: u64, steps: Steps) -> &'static str {
-    let differ = matches!(
-        report.repeated_time.first,
-        Some(FileError::TimeAgain {
-            why: Again::Other(_),
-            ..
-        })
-    );
-    match (steps.minutes, steps.seconds) {
-        _ if !differ || report.repeated_time.count * 100 < all => "",
-        (true, _) => "; all times are whole minutes: log the seconds too",
-        (_, true) => "; all times are whole seconds: log fractions of a second too",
-        _ => "",
     }
 }
 

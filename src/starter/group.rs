@@ -164,7 +164,7 @@ fn channel_name(column: &str) -> String {
 mod tests {
     use super::*;
 
-    fn told(names: &[&str]) -> Option<(String, String)> {
+    fn named(names: &[&str]) -> Option<(String, String)> {
         pattern(names).map(|(pattern, channels)| (pattern, channels.join(" ")))
     }
 
@@ -188,13 +188,13 @@ mod tests {
             (&["X", "X2"], "{channel}", "X X2"),
         ] {
             let expected = Some((pattern.to_owned(), channels.to_owned()));
-            assert_eq!(told(names), expected, "{names:?}");
+            assert_eq!(named(names), expected, "{names:?}");
         }
     }
 
     #[test]
     fn columns_that_no_channel_can_be_named_after_stand_alone() {
-        assert_eq!(told(&["Plate 1 [°C]", "Room air"]), None);
+        assert_eq!(named(&["Plate 1 [°C]", "Room air"]), None);
         for (column, channel) in [
             ("Plate 1 [°C]", "Plate-1"),
             ("Z (µm) ", "Z"),

@@ -13,7 +13,6 @@ mod spacing;
 mod survey;
 mod text;
 mod texts;
-mod thousands;
 mod undecided;
 mod window;
 
@@ -21,6 +20,7 @@ pub use dates::WITHOUT_ZONE;
 
 use std::path::Path;
 
+use athermal::core::document::TableFormat;
 use athermal::core::time::TimeFormat;
 use athermal::files::{Description, FileError, TimeForm};
 
@@ -29,9 +29,9 @@ use serde_json::Value;
 use survey::Survey;
 use window::Choice;
 
-/// What the user has said, so that it need not be guessed.
+/// What the user asks for, so that it need not be guessed.
 #[derive(Debug, Clone, Default)]
-pub struct Told {
+pub struct Request {
     /// The column that gives the time.
     pub time: Option<String>,
     /// How it is written.
@@ -51,8 +51,6 @@ pub struct Starter {
     pub columns: Value,
     /// The signal to noise of each drift against its window, for programs.
     pub windows: Value,
-    /// Whether the log has cells that only a lenient reader passes over.
-    pub lenient: bool,
 }
 
 /// Why there is no starter graph for a log.
@@ -74,7 +72,7 @@ impl From<FileError> for NoStarter {
 ///
 /// # Errors
 /// When the file cannot be read, or nothing in it drifts with something that could explain it.
-pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
+pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     let described = Description::of(path, 500)?;
     if let Some(long) = described.long_format() {
         return Err(NoStarter::Unfit(long.to_string()));
@@ -83,7 +81,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         return Err(NoStarter::Unfit(why));
     }
     let mut remarks = Vec::new();
-    let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
+    let clock = clock::find(&described, request.time.as_deref(), request.format.as_ref())
         .map_err(NoStarter::Unfit)?;
     let clock = undecided::decided(path, clock)?;
     remarks.push(clock.remark());
@@ -91,21 +89,24 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     if let Some(why) = dropped::newest_first(&described, &clock) {
         return Err(NoStarter::Unfit(why));
     }
-    let own_times = own_times::told(&described, &clock).filter(|_| told.time.is_none());
+    let own_times = own_times::refusal(&described, &clock).filter(|_| request.time.is_none());
     if let Some(why) = own_times {
         return Err(NoStarter::Unfit(why));
     }
-    let mut survey = Survey::of(path, &clock, &columns)?;
+    let mut table = TableFormat {
+        decimal: described.decimal(clock.columns.names()),
+        ..described.table.clone()
+    };
+    let mut survey = Survey::of(path, &clock, &table, &columns)?;
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
     let dropped = survey.dropped.clone();
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
-    column::assign(&mut columns, told).map_err(&unfit)?;
+    column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
     survey.take_changes(&mut columns, &clock);
-    survey.leave_out_slow(&mut columns, &clock, told);
+    survey.leave_out_slow(&mut columns, &clock, request);
     survey.leave_out_faults(&mut columns);
-    survey.tell_of_thousands(path, &described, &mut columns)?;
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {
@@ -114,16 +115,16 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
     let columns_taken = columns.iter().map(Column::facts).collect();
+    table.lenient = survey.needs_lenience(&columns);
     Ok(Starter {
-        text: text::graph(path, &clock, &columns, &survey, &choice),
+        text: text::graph(path, (&clock, &table), &columns, &survey, &choice),
         remarks,
         windows: choice.facts(&columns),
         columns: columns_taken,
-        lenient: survey.needs_lenience(&columns),
     })
 }
 
-/// Why a log of which there is hardly anything tells nothing.
+/// Why a log has too few rows.
 fn too_few(described: &Description) -> Option<String> {
     let rows = match described.rows.len() {
         0 => "no row",

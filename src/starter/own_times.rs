@@ -22,7 +22,7 @@ const CALLED: [&str; 6] = [
 ];
 
 /// Why rows of a log have no one time.
-pub fn told(described: &Description, clock: &Clock) -> Option<String> {
+pub fn refusal(described: &Description, clock: &Clock) -> Option<String> {
     let own: BTreeMap<usize, i64> = instants(described, clock);
     let mut steps: Vec<i64> = own
         .values()

@@ -28,7 +28,7 @@ impl Survey {
             series.leave_out(value);
             let (low, high) = series.extremes();
             let then = if (low..=high).contains(&value) {
-                "leave such cells empty: a graph cannot tell them from others"
+                "leave such cells empty: a graph cannot know them from others"
             } else {
                 "leave such cells empty"
             };

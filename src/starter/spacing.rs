@@ -1,7 +1,7 @@
 //! Decides which values of what drifts say how often it is measured: of a register that is read oftener than it is written only the
 //! changes, and of axes with very different rates those of most. Not which windows follow.
 
-use super::Told;
+use super::Request;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
@@ -35,7 +35,7 @@ fn held(values: &[f64]) -> Option<Vec<usize>> {
 }
 
 impl Survey {
-    /// Takes of what drifts only the changes where a register holds it, and tells so.
+    /// Takes of what drifts only the changes where a register holds it, and warns of it.
     pub fn take_changes(&mut self, columns: &mut [Column], clock: &Clock) {
         for (series, column) in self.series.iter_mut().zip(columns) {
             if column.kind != Kind::Drifting {
@@ -58,8 +58,8 @@ impl Survey {
     }
 
     /// Leaves out what drifts and is measured so rarely that windows for it would be far too wide for most others, unless the user named it.
-    pub fn leave_out_slow(&self, columns: &mut [Column], clock: &Clock, told: &Told) {
-        if !told.drifting.is_empty() {
+    pub fn leave_out_slow(&self, columns: &mut [Column], clock: &Clock, request: &Request) {
+        if !request.drifting.is_empty() {
             return;
         }
         let of = |series: &Series| series.interval_s().unwrap_or(0.0);
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_that_a_register_holds_are_told_from_those_of_a_coarse_scale() {
+    fn values_that_a_register_holds_are_no_values_of_a_coarse_scale() {
         let wild = |at: usize| ((at as f64 * 12.9898).sin() * 43_758.545_3).fract().abs();
         let register: Vec<f64> = (0..900).map(|at| wild(at / 9)).collect();
         assert_eq!(held(&register).unwrap().len(), 100);

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use athermal::core::document::{TableBase, TableFormat};
 use athermal::files::{
-    ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock, thousands_mark,
+    ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -11,7 +12,7 @@ use athermal::diagnosis::leap::{Finder, Leaps};
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
-use super::dropped::{self, Steps};
+use super::dropped;
 use athermal_analysis::figures::{count, counted};
 
 /// The values of a log, column by column.
@@ -23,7 +24,7 @@ pub struct Survey {
     pub duration_s: f64,
     /// Rows.
     pub rows: u64,
-    /// What is told of rows that are not taken, or not alone.
+    /// Remarks on rows that are not taken, or not alone.
     pub dropped: Vec<String>,
     /// Whether there are rows that only a lenient reader passes over.
     has_broken_rows: bool,
@@ -50,11 +51,11 @@ pub struct Series {
 #[derive(Debug)]
 pub struct Unreadable {
     /// Its text and its line.
-    told: String,
+    example: String,
     /// Its text.
     found: String,
-    /// For a number with another decimal mark than those before it, their mark and the line of the first.
-    mark: Option<(char, u64)>,
+    /// For a number with another decimal mark than others, their mark and the line of the first.
+    mark: Option<(char, Option<u64>)>,
 }
 
 impl Unreadable {
@@ -72,7 +73,7 @@ impl Unreadable {
         };
         let found = found.replace(char::is_control, "\u{fffd}");
         Some(Self {
-            told: format!("`{found}` in line {line}"),
+            example: format!("`{found}` in line {line}"),
             found,
             mark,
         })
@@ -106,23 +107,7 @@ const NO_VALUES: [&str; 23] = [
     "1.#qnan",
 ];
 
-/// Signs that word processors and web pages put in the place of a minus: hyphens, dashes and U+2212.
-const MINUS_SIGNS: [char; 8] = [
-    '\u{2212}', '\u{2010}', '\u{2011}', '\u{2012}', '\u{2013}', '\u{2014}', '\u{fe63}', '\u{ff0d}',
-];
-
 impl Unreadable {
-    /// The sign before a number that is meant for a minus.
-    fn minus_sign(&self) -> Option<char> {
-        let sign = self.found.trim_start().chars().next()?;
-        let number = self.found.trim().strip_prefix(MINUS_SIGNS)?;
-        let is_number = number.starts_with(|c: char| c.is_ascii_digit())
-            && number
-                .chars()
-                .all(|c| c.is_ascii_digit() || ".,eE+-".contains(c));
-        is_number.then_some(sign)
-    }
-
     /// Whether it is what stands for no value.
     fn is_none(&self) -> bool {
         NO_VALUES.contains(&&*self.found.to_lowercase())
@@ -203,7 +188,12 @@ impl Survey {
     ///
     /// # Errors
     /// When the file cannot be read, or has less than two rows.
-    pub fn of(path: &Path, clock: &Clock, columns: &[Column]) -> Result<Self, NoStarter> {
+    pub fn of(
+        path: &Path,
+        clock: &Clock,
+        table: &TableFormat,
+        columns: &[Column],
+    ) -> Result<Self, NoStarter> {
         let layout = Layout {
             time: TimeColumn {
                 columns: clock.columns.clone(),
@@ -217,6 +207,10 @@ impl Survey {
                     optional: true,
                 })
                 .collect(),
+            table: TableBase {
+                base: table.clone(),
+                files: Vec::new(),
+            },
         };
         let options = Options {
             lenient: true,
@@ -226,12 +220,10 @@ impl Survey {
         let mut reader = Reader::open(path, layout, options)?;
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
-        let mut steps = Steps::default();
         while reader.next_into(&mut row)? {
             let first = *first.get_or_insert(row.time_ns);
             last = row.time_ns;
             rows += 1;
-            steps.push(last);
             let time_s = (row.time_ns - first) as f64 / 1e9;
             for (series, &value) in series.iter_mut().zip(&row.values) {
                 if value.is_finite() {
@@ -259,12 +251,12 @@ impl Survey {
             series,
             duration_s,
             rows,
-            dropped: dropped::remarks(reader.report(), steps, clock),
+            dropped: dropped::remarks(reader.report(), clock),
             has_broken_rows: reader.report().refused_rows.count > 0,
         })
     }
 
-    /// Leaves out the columns that say nothing, and tells of cells that cannot be read in those that stay.
+    /// Leaves out the columns that say nothing, and warns of cells that cannot be read in those that stay.
     pub fn judge(&self, columns: &mut [Column]) {
         for (series, column) in self.series.iter().zip(columns) {
             let (low, high) = series.extremes();
@@ -273,13 +265,10 @@ impl Survey {
             let example = series
                 .first_unreadable
                 .as_ref()
-                .map_or("", |first| first.told.as_str());
+                .map_or("", |first| first.example.as_str());
             let first = series.first_unreadable.as_ref();
             let mark = first.and_then(|first| first.mark);
             let has_none = first.is_some_and(Unreadable::is_none);
-            let minus = first.and_then(Unreadable::minus_sign);
-            let thousands = first.filter(|_| minus.is_none());
-            let thousands = thousands.and_then(|first| thousands_mark(&first.found));
             if column.name.is_empty() && values > 0 {
                 column.leave_out("a graph knows columns by their names; give it one");
             } else if column.name.contains(['{', '}']) {
@@ -291,22 +280,14 @@ impl Survey {
             {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
-                    Some((mark, since)) => format!(
-                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write \
-                         all numbers of a file with one mark{}",
-                        if thousands.is_some() { " and none between thousands" } else { "" }
+                    Some((mark, Some(since))) => format!(
+                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write all numbers of a \
+                         file with one mark"
                     ),
-                    None if let Some(sign) = minus => {
-                        let n = counted(series.unreadable, "number");
-                        format!(
-                            "it has {n} with the sign U+{:04X} for a minus, such as {example}; write the `-` of a keyboard instead",
-                            u32::from(sign)
-                        )
-                    }
-                    None if let Some(mark) = thousands => {
-                        let n = counted(series.unreadable, "number");
-                        format!("it has {n} with {mark} between thousands, such as {example}; write numbers without it")
-                    }
+                    Some((mark, None)) => format!(
+                        "it has numbers such as {example}, but the decimal mark of the others is `{mark}`; write all numbers of a file \
+                         with one mark"
+                    ),
                     None if first.is_some_and(|first| has_clock(&first.found)) => {
                         format!("it has other times, such as {example}")
                     }
@@ -330,22 +311,12 @@ impl Survey {
                     "{many} of {} cannot be read{the_first} {example}",
                     count(cells)
                 );
-                column.warn(match thousands {
-                    _ if has_none => {
-                        format!("{many}, which is no number: --lenient takes them as missing")
-                    }
-                    Some(mark) => format!("{many}: write numbers without {mark} between thousands"),
-                    None if let Some(sign) = minus => format!(
-                        "{many}, where a minus is the sign U+{:04X}: write the `-` of a keyboard instead",
-                        u32::from(sign)
-                    ),
-                    None => format!("{many}: mend the log, or read it with --lenient"),
-                });
+                column.warn(format!("{many}, and is taken as missing"));
             }
         }
     }
 
-    /// Takes the values out of temperatures that only a failed sensor gives, and tells of leaps in these and in what drifts.
+    /// Takes the values out of temperatures that only a failed sensor gives, and warns of leaps in these and in what drifts.
     pub fn leave_out_faults(&mut self, columns: &mut [Column]) {
         for (series, column) in self.series.iter_mut().zip(columns) {
             let is_temperature = column.is_temperature();

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use athermal::core::document::{DecimalMark, TableFormat};
 use athermal::core::unit::Unit;
 
 use super::clock::Clock;
@@ -16,7 +17,7 @@ use athermal_analysis::figures::{count, number};
 /// The text of the graph.
 pub fn graph(
     path: &Path,
-    clock: &Clock,
+    (clock, table): (&Clock, &TableFormat),
     columns: &[Column],
     survey: &Survey,
     choice: &Choice,
@@ -45,6 +46,7 @@ pub fn graph(
     let _ = writeln!(text, "name = {}", toml_string(&stem));
     writer.sets(&mut text);
     writer.time(&mut text);
+    lay_out(table, &mut text);
     writer.signals(&mut text);
     writer.features(&mut text);
     writer.estimators(&mut text);
@@ -248,7 +250,7 @@ impl Writer<'_> {
             .iter()
             .filter(|(width_s, _)| *width_s <= 6.0 * self.choice.drift_s);
         for (width_s, ratios) in shown {
-            let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
+            let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
             let mark = match (*width_s == self.choice.drift_s, self.choice.enough) {
                 (false, _) => String::new(),
                 (_, true) => format!("  <- chosen: the narrowest with {ENOUGH} on half of them"),
@@ -258,11 +260,11 @@ impl Writer<'_> {
                 text,
                 "#   {:>10}  {}{mark}",
                 self.clock.length(*width_s),
-                told.join("  ")
+                ratios.join("  ")
             );
         }
         if let Some(bound) = &self.choice.bound {
-            let _ = writeln!(text, "# ({})", bound.told(self.clock));
+            let _ = writeln!(text, "# ({})", bound.text(self.clock));
         }
         let _ = writeln!(
             text,
@@ -414,6 +416,46 @@ impl Writer<'_> {
         };
         per_s * factor().unwrap_or(1.0)
     }
+}
+
+/// `[table]`, where the layout of the log is not the usual one.
+fn lay_out(table: &TableFormat, text: &mut String) {
+    if *table == TableFormat::default() {
+        return;
+    }
+    text.push_str("\n[table]\n");
+    let mut key = |key: &str, value: Option<String>, comment: &str| {
+        if let Some(value) = value {
+            let _ = writeln!(text, "{}", beside(&format!("{key} = {value}"), comment));
+        }
+    };
+    let separator = table.separator;
+    let separator = separator.map(|of| toml_string(&char::from(of.0).to_string()));
+    key("separator", separator, "what stands between cells");
+    let decimal = table.decimal.map(|mark| match mark {
+        DecimalMark::Comma => toml_string(","),
+        DecimalMark::Point => toml_string("."),
+    });
+    key("decimal", decimal, "the decimal mark of values");
+    let encoding = table.encoding.map(|of| toml_string(of.name()));
+    key("encoding", encoding, "how bytes become text");
+    let rows = |rows: Option<u32>| rows.map(|rows| rows.to_string());
+    key(
+        "skip",
+        rows(table.skip),
+        "lines above the names of the columns",
+    );
+    key(
+        "units",
+        rows(table.units),
+        "the row below them that has the units",
+    );
+    let lenient = table.lenient.then(|| true.to_string());
+    key(
+        "lenient",
+        lenient,
+        "some cells or rows cannot be read, and are taken as missing",
+    );
 }
 
 /// What stands in a line, and a comment beside it.

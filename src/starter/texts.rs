@@ -67,7 +67,7 @@ impl Texts {
             written,
             rows,
             columns,
-            decimal_comma: described.delimiter.is_some_and(|between| between != b','),
+            decimal_comma: described.table.separator.is_some(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use athermal::core::document::TableBase;
 use athermal::files::{FileError, Layout, Options, Reader, Row, TimeColumn, TimeForm};
 
 use super::clock::Clock;
@@ -19,6 +20,7 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError>
             zone: None,
         },
         channels: Vec::new(),
+        table: TableBase::default(),
     };
     let options = Options {
         lenient: true,
@@ -35,7 +37,7 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError>
     Ok(leaps + report.refused_rows.count + report.refused_time.count)
 }
 
-/// The clock of a log in the form against which fewer rows speak, where that can be told.
+/// The clock of a log in the form against which fewer rows speak, where rows decide.
 ///
 /// # Errors
 /// The file cannot be read.

@@ -59,7 +59,7 @@ pub struct Bound {
 impl Bound {
     /// Why narrower windows were not tried, for people.
     #[must_use]
-    pub fn told(&self, clock: &Clock) -> String {
+    pub fn text(&self, clock: &Clock) -> String {
         format!(
             "narrower ones were not tried: {} has a value every {}, and its slope takes {FEWEST_OF_FEATURE}",
             self.column,
@@ -203,7 +203,7 @@ impl Choice {
         let width = clock.length(self.drift_s);
         let here = self.candidates.iter().find(|(at, _)| *at == self.drift_s);
         let ratios = here.map_or(&[][..], |(_, ratios)| ratios);
-        let told: Vec<String> = names
+        let names: Vec<String> = names
             .iter()
             .zip(ratios)
             .map(|(name, ratio)| format!("{name} {ratio:.1}"))
@@ -219,9 +219,9 @@ impl Choice {
         };
         let mut remarks = vec![format!(
             "drift window: {width}, {why} ({})",
-            told.join(", ")
+            names.join(", ")
         )];
-        remarks.extend(self.bound.iter().map(|bound| bound.told(clock)));
+        remarks.extend(self.bound.iter().map(|bound| bound.text(clock)));
         for &index in &self.rare {
             remarks.push(format!(
                 "{}: its values are too far apart for slopes over {width}, so its last value is taken as it stands",

@@ -2,7 +2,7 @@
 
 use super::declare::Declaring;
 use super::expectation::{Check, Expectation, Period, Rival, Tolerance};
-use super::problem::TrialProblem;
+use super::problem;
 use super::table::{ExpectTable, Within};
 use crate::compile::Plan;
 use crate::diagnostic::Place;
@@ -129,15 +129,11 @@ impl Declaring<'_> {
         // A key that needs one that checks something says so itself.
         if nothing && !wrong.iter().any(|(wrong, ..)| *wrong) {
             let what = "the expectation";
-            let problem = TrialProblem::NothingExpected { what };
+            let problem = problem::NothingExpected { what };
             self.diagnostics.report(value.place, problem);
         }
         for (_, key, with, excluded) in wrong.into_iter().filter(|(wrong, ..)| *wrong) {
-            let problem = TrialProblem::Keys {
-                key,
-                with,
-                excluded,
-            };
+            let problem = problem::keys(key, with, excluded);
             self.diagnostics.report(value.place_of(key), problem);
         }
     }
@@ -212,7 +208,7 @@ impl Declaring<'_> {
         let first = prediction_keys.map(Check::key).chain(limit).next();
         if let Some(key) = first.filter(|_| truth.is_none()) {
             let channel = name.clone();
-            let problem = TrialProblem::NotAPrediction { key, channel };
+            let problem = problem::NotAPrediction { key, channel };
             self.diagnostics.report(value.place_of(key), problem);
         }
         let mut quantities: Vec<(&'static str, &Quantity, Unit)> = Vec::new();
@@ -242,7 +238,7 @@ impl Declaring<'_> {
         }
         for (key, quantity, unit) in quantities {
             if !quantity.unit.measures_same(&unit) {
-                let problem = TrialProblem::Units {
+                let problem = problem::Units {
                     key,
                     found: quantity.unit.clone(),
                     channel: name.clone(),
@@ -261,7 +257,7 @@ impl Declaring<'_> {
             if let Rival::Channels(name, slots) = rival
                 && rival_of(plan, slot, slots).is_none()
             {
-                let problem = TrialProblem::NoRival {
+                let problem = problem::NoRival {
                     rival: name.clone(),
                     channel: plan.channels[slot].name.clone(),
                     truth: plan.channels[truth].name.clone(),

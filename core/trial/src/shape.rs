@@ -1,6 +1,6 @@
 //! Decides how made-up measurements are written: which keys go together, and quantities in the unit of the channel.
 
-use super::problem::TrialProblem;
+use super::problem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
 use crate::diagnostic::Diagnostics;
@@ -93,7 +93,7 @@ impl Shaping<'_> {
         let shapeless = given.is_empty() && table.noise.is_none();
         if shapeless {
             self.diagnostics
-                .report(self.value.place, TrialProblem::NoShape);
+                .report(self.value.place, problem::NoShape {});
         }
         if table.constant.is_some() {
             for key in given.into_iter().filter(|key| *key != "constant") {
@@ -178,7 +178,7 @@ impl Shaping<'_> {
                 let place = samples
                     .and_then(|samples| samples.get(nth))
                     .map_or(self.value.place, |value| value.place);
-                let problem = TrialProblem::BareSample {
+                let problem = problem::BareSample {
                     number: *number,
                     unit: self.unit.clone(),
                 };
@@ -211,7 +211,7 @@ impl Shaping<'_> {
             return 0.0;
         };
         convert(quantity).unwrap_or_else(|| {
-            let problem = TrialProblem::Units {
+            let problem = problem::Units {
                 key,
                 found: quantity.unit.clone(),
                 channel: self.channel.to_owned(),
@@ -223,16 +223,12 @@ impl Shaping<'_> {
     }
 
     fn keys(&mut self, key: &'static str, with: &'static str, excluded: bool) {
-        let problem = TrialProblem::Keys {
-            key,
-            with,
-            excluded,
-        };
+        let problem = problem::keys(key, with, excluded);
         self.diagnostics.report(self.value.place_of(key), problem);
     }
 
     fn range(&mut self, key: &'static str, found: String, allowed: &'static str) {
-        let problem = TrialProblem::Range {
+        let problem = problem::Range {
             key,
             found,
             allowed,

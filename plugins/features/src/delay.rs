@@ -53,9 +53,7 @@ impl TryFrom<String> for Lateness {
         }
         match text.parse::<Duration>() {
             Ok(time) if time > Duration::ZERO => Ok(Self::Time(time)),
-            Ok(_) => Err(format!(
-                "a delay must be longer than nothing, found {text:?}"
-            )),
+            Ok(_) => Err(format!("a delay must be greater than 0, found {text:?}")),
             Err(error) => Err(format!(
                 "{error}; a delay is a duration such as \"5min\", or \"1 tick\""
             )),

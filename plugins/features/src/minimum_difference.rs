@@ -23,6 +23,7 @@ use crate::rounding::rounding;
 #[serde(deny_unknown_fields)]
 pub struct MinimumDifference {
     /// The least change that is passed on, above 0: `"5 mK"`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub difference: Quantity,
 }
 
@@ -30,20 +31,13 @@ impl MinimumDifference {
     /// The least change in the unit of a channel.
     fn least(&self, of: &Channel) -> Result<f64, Mistake> {
         let unit = of.unit.difference();
-        match self.difference.as_difference(&unit) {
-            Some(least) if least > 0.0 && least.is_finite() => Ok(least),
-            Some(_) => {
-                let message = format!("`difference` is {} and must be above 0", self.difference);
-                Err(Mistake::at("difference", message))
-            }
-            None => {
-                let message = format!(
-                    "`difference` is in {}, and `{}` differs in {unit}",
-                    self.difference.unit, of.name
-                );
-                Err(Mistake::at("difference", message).help(format!("give it in {unit}")))
-            }
-        }
+        self.difference.as_difference(&unit).ok_or_else(|| {
+            let message = format!(
+                "`difference` is in {}, and `{}` differs in {unit}",
+                self.difference.unit, of.name
+            );
+            Mistake::at("difference", message).help(format!("give it in {unit}"))
+        })
     }
 }
 

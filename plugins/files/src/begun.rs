@@ -5,6 +5,7 @@ use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
+use athermal_core::document::{Separator, TableBase, TableFormat};
 use athermal_core::time::{Civil, Instant};
 
 use crate::csv_rows::CsvRows;
@@ -215,8 +216,8 @@ impl Ends {
     }
 
     fn csv_names(&self) -> Result<Vec<String>, FileError> {
-        let lines = Lines::new(FIRST_LINE.into(), Cursor::new(self.first.clone()));
-        let rows = CsvRows::headed(lines, Some(b','), None)?;
+        let lines = Lines::new(FIRST_LINE.into(), None, Cursor::new(self.first.clone()));
+        let rows = CsvRows::headed(lines, &own(), None)?;
         Ok(rows.names().to_vec())
     }
 
@@ -237,6 +238,14 @@ fn last_row(
     Ok(reader.next_into(&mut row)?.then_some(row))
 }
 
+/// How rows are laid out that were written.
+fn own() -> TableFormat {
+    TableFormat {
+        separator: Some(Separator(b',')),
+        ..TableFormat::default()
+    }
+}
+
 /// Reads the times of rows that were written.
 fn reader(
     file: &str,
@@ -247,10 +256,13 @@ fn reader(
     let layout = Layout {
         time: time.clone(),
         channels: Vec::new(),
+        table: TableBase {
+            base: own(),
+            files: Vec::new(),
+        },
     };
     let options = Options {
         format: Some(format),
-        delimiter: Some(b','),
         ..Options::default()
     };
     Reader::from_read(file, rows, layout, options)

@@ -65,39 +65,6 @@ pub fn with_decimal_point(time: &str) -> Cow<'_, str> {
     }
 }
 
-/// The mark that stands between the thousands of a number, for a message; none where there is no such number.
-///
-/// A point or a comma before three digits may be a decimal mark too: whoever reads those knows better.
-#[must_use]
-pub fn thousands_mark(number: &str) -> Option<&'static str> {
-    const MARKS: [(char, &str); 6] = [
-        ('.', "a point"),
-        (',', "a comma"),
-        (' ', "a space"),
-        ('\u{a0}', "a space"),
-        ('\u{202f}', "a space"),
-        ('\'', "an apostrophe"),
-    ];
-    let unsigned = number.trim().trim_start_matches(['-', '+', '\u{2212}']);
-    let are_digits =
-        |digits: &str| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-    let is_such = |mark: char| {
-        let decimals = unsigned.rsplit_once(|c| matches!(c, '.' | ',') && c != mark);
-        let (whole, fraction) = decimals.unwrap_or((unsigned, "0"));
-        let mut groups = whole.split(mark);
-        let first = groups.next().unwrap_or_default();
-        let mut rest = groups.peekable();
-        let has_more = rest.peek().is_some();
-        has_more
-            && are_digits(fraction)
-            && are_digits(first)
-            && first.len() <= 3
-            && rest.all(|group| group.len() == 3 && are_digits(group))
-    };
-    let found = MARKS.iter().find(|(mark, _)| is_such(*mark));
-    found.map(|(_, told)| *told)
-}
-
 /// The decimal mark of a number; none in one that has none.
 pub(crate) fn decimal_mark(number: &[u8]) -> Option<u8> {
     let mut marks = number.iter().filter(|b| matches!(b, b',' | b'.'));
@@ -207,28 +174,6 @@ mod tests {
         assert_eq!(value(b" -0,25e2 ", true), Some(-25.0));
         assert_eq!(value(b"1.234,5", true), None);
         assert_eq!(value(b"1,234,5", true), None);
-    }
-
-    #[test]
-    fn a_mark_between_thousands_is_told_from_others() {
-        for (text, mark) in [
-            ("1.004,5", Some("a point")),
-            ("-1,031.6", Some("a comma")),
-            ("1 004,5", Some("a space")),
-            ("1\u{a0}234\u{a0}567", Some("a space")),
-            ("12'345", Some("an apostrophe")),
-            ("-1.032", Some("a point")),
-            ("1,234,567", Some("a comma")),
-            ("1,5", None),
-            ("1.2.3", None),
-            ("10.03.2026", None),
-            ("1 2", None),
-            ("off", None),
-            ("", None),
-            ("-", None),
-        ] {
-            assert_eq!(thousands_mark(text), mark, "{text}");
-        }
     }
 
     #[test]

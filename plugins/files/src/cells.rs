@@ -11,8 +11,6 @@ pub(crate) trait Cells {
     fn time(&self) -> &[u8];
     /// The cell of a channel of the layout; empty if there is none.
     fn channel(&self, index: usize) -> &[u8];
-    /// Whether `1,5` is a number.
-    fn decimal_comma(&self) -> bool;
     fn place(&self) -> Place;
     /// Takes the columns from here on as the current row names them, if that is what it does.
     fn take_header(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {

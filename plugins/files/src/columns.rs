@@ -1,5 +1,4 @@
-//! The columns that a file has against those that are wanted: the delimiter, where each stands, missing and doubled names. Not their
-//! cells.
+//! The columns that a file has against those that are wanted: where each stands, missing and doubled names. Not their cells.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,39 +8,18 @@ use crate::cell::{self, trim};
 use crate::error::excerpt;
 use crate::{FileError, Layout, MissingColumn, Place};
 
-/// What may stand between cells, the most usual first.
-pub(crate) const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
-
 /// How alike two names must be for one to be suggested for the other (Jaro–Winkler, 0 to 1).
 const ALIKE: f64 = 0.8;
 
 /// How many missing columns are compared with those found. A file that lacks more is another file.
 const COMPARED: usize = 50;
 
-/// The delimiter under which a header line shows the most of the wanted columns, then the most columns.
-pub(crate) fn choose_delimiter<'a>(
-    header: &[u8],
-    wanted: impl Iterator<Item = &'a str> + Clone,
-) -> u8 {
-    let score = |delimiter: u8| {
-        let names = names_in(header, delimiter);
-        let known: HashSet<&str> = names.iter().map(String::as_str).collect();
-        let wanted = wanted.clone().filter(|name| known.contains(name));
-        (wanted.count(), names.len())
-    };
-    // `max_by_key` takes the last of equals; the most usual delimiter is to win.
-    DELIMITERS
-        .into_iter()
-        .rev()
-        .max_by_key(|&delimiter| score(delimiter))
-        .unwrap_or(b',')
-}
-
-pub(crate) fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
+/// The names in a header, between these separators.
+pub(crate) fn names_in(header: &[u8], separator: u8) -> Vec<String> {
     let mut record = ByteRecord::new();
     let read = ReaderBuilder::new()
         .has_headers(false)
-        .delimiter(delimiter)
+        .delimiter(separator)
         .from_reader(header)
         .read_byte_record(&mut record);
     match read {
@@ -136,12 +114,12 @@ pub(crate) fn check_unique(
     }
 }
 
-/// The error for columns that are not among the names found, which may have been taken for Windows-1252.
+/// The error for columns that are not among the names found, with what may be why.
 pub(crate) fn missing<'a>(
     place: Place,
     columns: impl IntoIterator<Item = &'a str>,
     found: &[String],
-    windows_1252: bool,
+    note: &'static str,
 ) -> FileError {
     let lower: Vec<_> = found.iter().map(|name| name.to_lowercase()).collect();
     let nearest = |column: &str| {
@@ -154,9 +132,9 @@ pub(crate) fn missing<'a>(
             .map(|(_, name)| name.clone())
     };
     let mut missing: Vec<MissingColumn> = Vec::new();
-    let mut told = HashSet::new();
+    let mut named = HashSet::new();
     // Two channels may have one column.
-    for column in columns.into_iter().filter(|column| told.insert(*column)) {
+    for column in columns.into_iter().filter(|column| named.insert(*column)) {
         missing.push(MissingColumn {
             name: column.to_owned(),
             nearest: (missing.len() < COMPARED)
@@ -168,33 +146,13 @@ pub(crate) fn missing<'a>(
         place,
         missing,
         found: found.iter().map(|name| excerpt(name.as_bytes())).collect(),
-        windows_1252,
+        note,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn chosen(header: &str, wanted: &[&str]) -> char {
-        char::from(choose_delimiter(header.as_bytes(), wanted.iter().copied()))
-    }
-
-    #[test]
-    fn the_delimiter_is_the_one_that_shows_the_wanted_columns() {
-        assert_eq!(chosen("t,a,b", &["a"]), ',');
-        assert_eq!(chosen("t;a;b", &["a"]), ';');
-        assert_eq!(chosen("t\ta\tb", &["a"]), '\t');
-        assert_eq!(chosen("t|a|b", &["a"]), '|');
-        assert_eq!(chosen("t;a, b, c, d;e", &["a, b, c, d"]), ';');
-        assert_eq!(chosen("t", &[]), ',');
-        assert_eq!(chosen("x;y;z", &["a"]), ';');
-    }
-
-    #[test]
-    fn a_delimiter_within_quotes_does_not_count() {
-        assert_eq!(chosen("\"p;q;r;s\",x", &[]), ',');
-    }
 
     #[test]
     fn the_nearest_name_is_suggested_and_a_distant_one_is_not() {
@@ -207,7 +165,7 @@ mod tests {
             file: "a".into(),
             line: 1,
         };
-        let nearest = |wanted: &str| match missing(place.clone(), [wanted], &found, false) {
+        let nearest = |wanted: &str| match missing(place.clone(), [wanted], &found, "") {
             FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
             other => panic!("{other}"),
         };

@@ -1,17 +1,15 @@
 //! CSV as rows of cells: header, quoting, ragged and cut-off rows. Not what a cell means.
 
-use athermal_core::time::Civil;
+use athermal_core::document::{Encoding, TableFormat};
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
 use crate::cell::{self, is_number, trim};
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
-use crate::glued::{bare_time, names_behind};
-use crate::header::{self, Head};
+use crate::detect::{self, Head, LongFormat, are_units};
 use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
-use crate::units::{self, are_units};
-use crate::{FileError, Layout, LongFormat, Place};
+use crate::{FileError, Layout, Place};
 
 /// The rows of a CSV file.
 pub(crate) struct CsvRows {
@@ -20,30 +18,23 @@ pub(crate) struct CsvRows {
     cells: Vec<u8>,
     ends: Vec<usize>,
     row_line: u64,
-    delimiter: u8,
+    head: Head,
+    table: TableFormat,
     names: Vec<String>,
-    /// The first cells of the lines above the names.
-    above: Vec<String>,
     /// The units in the row below the names; none where there is no such row.
     units: Vec<String>,
+    /// How many rows below the names are no data, the last of them the units.
+    below_names: Option<u32>,
     /// How many cells a row has; 0 until the first row below the names.
     width: usize,
-    /// Whether rows, but not the names, end in a delimiter.
-    ends_in_delimiter: bool,
+    /// Whether rows, but not the names, end in a separator.
+    ends_in_separator: bool,
+    /// Whether the names are not in UTF-8.
+    windows_1252: bool,
     layout: Option<Layout>,
     columns: Columns,
     /// The text of the time of the current row, where it is put together from several cells.
     joined: Option<Vec<u8>>,
-    /// The last header, where it lacks columns, until the row below it tells whether it was cut off.
-    doubted: Option<NamesAgain>,
-}
-
-/// The names of the columns where they stand within the log again.
-struct NamesAgain {
-    place: Place,
-    names: Vec<String>,
-    columns: Columns,
-    lacking: Vec<String>,
 }
 
 /// How a row came out of the stream.
@@ -55,11 +46,11 @@ enum Record {
     },
     /// The stream ends within a quoted cell, and within a line.
     Cut,
-    /// A quoted cell does not end: the row is its first line, which is this, and those after it are read anew.
-    Unclosed(Vec<u8>),
+    /// A quoted cell does not end: the row is its first line, and those after it are read anew.
+    Unclosed,
 }
 
-/// How many rows are looked at to tell why a column is missing.
+/// How many rows are looked at to find why a column is missing.
 const LOOKED_AT: usize = 20;
 
 /// Over how many lines a row can go, by line breaks in quotes.
@@ -67,8 +58,8 @@ const LINES_OF_ROW: usize = 50;
 
 impl CsvRows {
     /// Reads the header and finds the wanted columns in it.
-    pub fn new(lines: Lines, layout: &Layout, delimiter: Option<u8>) -> Result<Self, FileError> {
-        let mut rows = Self::headed(lines, delimiter, Some(layout))?;
+    pub fn new(lines: Lines, layout: &Layout, table: &TableFormat) -> Result<Self, FileError> {
+        let mut rows = Self::headed(lines, table, Some(layout))?;
         rows.columns = Columns::of(layout, &rows.names);
         let lacking = rows.columns.lacking(layout);
         if lacking.is_empty() {
@@ -92,8 +83,14 @@ impl CsvRows {
     }
 
     fn missing(&self, lacking: Vec<&str>, names: &[String]) -> FileError {
-        let assumed = std::str::from_utf8(self.lines.text()).is_err();
-        columns::missing(self.place(), lacking, names, assumed)
+        let note = match self.table.encoding {
+            _ if self.table.skip.is_some() || self.table.names.is_some() => {
+                " in the row that `[table]` declares for them"
+            }
+            None if self.windows_1252 => " (read as Windows-1252, since they are not in UTF-8)",
+            _ => "",
+        };
+        columns::missing(self.place(), lacking, names, note)
     }
 
     /// Whether the current row is a comment; only where the header was one are others read.
@@ -101,15 +98,15 @@ impl CsvRows {
         self.lines.comments_count && self.column(0).trim_ascii_start().starts_with(b"#")
     }
 
-    /// Reads the header, which a layout tells from what may stand above it; the delimiter, unless stated, is found with it.
+    /// Reads the header where it is declared, or else found by the layout among what may stand above it.
     pub fn headed(
         mut lines: Lines,
-        delimiter: Option<u8>,
+        table: &TableFormat,
         layout: Option<&Layout>,
     ) -> Result<Self, FileError> {
-        let Head { delimiter, above } = header::seek(&mut lines, delimiter, layout)?;
+        let head = detect::seek(&mut lines, table, layout)?;
         let splitter = ReaderBuilder::new()
-            .delimiter(delimiter)
+            .delimiter(head.separator)
             .terminator(Terminator::Any(b'\n'))
             .build();
         let mut rows = Self {
@@ -118,22 +115,23 @@ impl CsvRows {
             cells: vec![0; 1024],
             ends: vec![0; 64],
             row_line: 0,
-            delimiter,
+            head,
+            table: table.clone(),
             names: Vec::new(),
-            above,
             units: Vec::new(),
+            below_names: None,
             width: 0,
-            ends_in_delimiter: false,
+            ends_in_separator: false,
+            windows_1252: false,
             layout: layout.cloned(),
             columns: Columns::default(),
             joined: layout
                 .filter(|layout| !layout.time.columns.is_one())
                 .map(|_| Vec::new()),
-            doubted: None,
         };
         let cells = match rows.read_record()? {
             Record::Row { cells, .. } => cells,
-            Record::Unclosed(_) | Record::Cut => {
+            Record::Unclosed | Record::Cut => {
                 return Err(FileError::UnclosedQuote {
                     place: rows.place(),
                 });
@@ -144,9 +142,24 @@ impl CsvRows {
                 });
             }
         };
+        rows.windows_1252 = std::str::from_utf8(rows.lines.text()).is_err();
+        if rows.windows_1252 && table.encoding == Some(Encoding::Utf8) {
+            return Err(FileError::NotAsDeclared {
+                place: rows.place(),
+                key: "encoding",
+                found: "these names are not in UTF-8".to_owned(),
+            });
+        }
         rows.names = rows.current(cells);
+        rows.expect_below_names();
         columns::check_unique(&rows.names, || rows.place())?;
         Ok(rows)
+    }
+
+    fn expect_below_names(&mut self) {
+        let names = self.table.names.unwrap_or(1);
+        let below = self.table.units.map(|units| units.saturating_sub(names));
+        self.below_names = below;
     }
 
     /// The names in the header.
@@ -160,8 +173,18 @@ impl CsvRows {
     }
 
     /// What stands between cells.
-    pub fn delimiter(&self) -> u8 {
-        self.delimiter
+    pub fn separator(&self) -> u8 {
+        self.head.separator
+    }
+
+    /// How many lines stand above the names.
+    pub fn skip(&self) -> u32 {
+        self.head.skip
+    }
+
+    /// Whether the names are not in UTF-8, and were taken for Windows-1252.
+    pub fn is_windows_1252(&self) -> bool {
+        self.windows_1252
     }
 
     /// The texts of the current row.
@@ -184,22 +207,15 @@ impl CsvRows {
         if self.takes_header(cells, ledger)? || self.is_comment() {
             return Ok(None);
         }
-        if let Some(again) = self.doubted.take() {
-            self.resolve(again, cells, ledger)?;
-        }
         let expected = self.names.len();
         if self.width == 0 {
             let row = self.current(cells);
-            let is_below_names = self.units.is_empty();
-            if is_below_names && cells <= expected + 1 && are_units(&row) {
-                self.units = row;
-                self.units.resize(expected, String::new());
-                self.report_units(&mut ledger.report);
+            if self.takes_units(&row, ledger)? {
                 return Ok(None);
             }
             self.width = expected;
-            self.ends_in_delimiter = cells == expected + 1 && row[expected].is_empty();
-            if cells == expected || self.ends_in_delimiter {
+            self.ends_in_separator = cells == expected + 1 && row[expected].is_empty();
+            if cells == expected || self.ends_in_separator {
                 return Ok(Some(true));
             }
         }
@@ -216,20 +232,49 @@ impl CsvRows {
         Ok(None)
     }
 
+    /// Whether this row, below the names and above the data, is one of units, or one that is declared to be no data.
+    fn takes_units(&mut self, row: &[String], ledger: &mut Ledger) -> Result<bool, FileError> {
+        let is_units = match &mut self.below_names {
+            Some(0) => return Ok(false),
+            Some(rows) => {
+                *rows -= 1;
+                *rows == 0
+            }
+            None => {
+                let fits = self.units.is_empty() && row.len() <= self.names.len() + 1;
+                if !fits || !are_units(row) {
+                    return Ok(false);
+                }
+                true
+            }
+        };
+        if !is_units {
+            return Ok(true);
+        }
+        if let Some(found) = row.iter().find(|cell| is_number(cell)) {
+            return Err(FileError::NotAsDeclared {
+                place: self.place(),
+                key: "units",
+                found: format!("`{found}` stands here"),
+            });
+        }
+        self.units = row.to_vec();
+        self.units.resize(self.names.len(), String::new());
+        self.report_units(&mut ledger.report);
+        Ok(true)
+    }
+
     fn report_units(&self, report: &mut Report) {
         let channels = self.layout.iter().flat_map(|layout| &layout.channels);
         for channel in channels {
             let at = self.names.iter().position(|name| *name == channel.column);
-            let known = report
+            let mut known = report.units.iter();
+            let is_known = known.any(|(column, _)| *column == channel.column);
+            let unit = at.filter(|_| !is_known);
+            let unit = unit.and_then(|at| detect::unit(&self.units[at]));
+            report
                 .units
-                .iter()
-                .any(|(column, _)| *column == channel.column);
-            if let Some(unit) = at
-                .filter(|_| !known)
-                .and_then(|at| units::unit(&self.units[at]))
-            {
-                report.units.push((channel.column.clone(), unit));
-            }
+                .extend(unit.map(|unit| (channel.column.clone(), unit)));
         }
     }
 
@@ -244,11 +289,9 @@ impl CsvRows {
             let text = cell::text(cell::trim(self.column(at)));
             is_number(&text) && !self.names.iter().any(|name| *name == text)
         };
-        let is_above = self.above.contains(&columns::name(self.column(0)));
-        if let Some(last) = (0..cells).rev().find(|&at| is_value(at)) {
-            let is_behind = !is_above && ledger.is_lenient();
-            let names = self.current(cells).split_off(last + 1);
-            return Ok(is_above || is_behind && self.takes_names_behind(names, ledger)?);
+        let is_above = self.head.above.contains(&columns::name(self.column(0)));
+        if (0..cells).any(is_value) {
+            return Ok(is_above);
         }
         let mut names = self.current(cells);
         if self.is_comment() {
@@ -258,135 +301,38 @@ impl CsvRows {
         let columns = Columns::of(layout, &names);
         let lacking = columns.lacking(layout);
         if !lacking.is_empty() && is_above || !columns.are_named(layout) {
-            let may_be_glued = !is_above && ledger.is_lenient();
-            return Ok(is_above || may_be_glued && self.takes_names_behind(names, ledger)?);
+            return Ok(is_above);
         }
         if !lacking.is_empty() && !self.lines.is_complete() {
             ledger.report.truncated = Some(self.place());
             return Ok(true);
         }
-        if !lacking.is_empty()
-            && ledger.is_lenient()
-            && let Some(names) = self.names_behind()
-        {
-            self.take_names_behind(names, ledger)?;
-            return Ok(true);
-        }
+        // Shorter names that lack columns were cut off, or rows below them will not fit those before.
+        let is_whole = cells >= self.names.len() && columns.have_time();
         let unusable = match columns::check_unique(&names, || self.place()) {
-            Ok(()) if lacking.is_empty() || ledger.is_lenient() && columns.have_time() => None,
+            Ok(()) if lacking.is_empty() || ledger.is_lenient() && is_whole => None,
             Ok(()) => Some(self.missing(lacking.clone(), &names)),
             Err(error) => Some(error),
         };
         if let Some(error) = unusable {
             ledger.refuse_header(error)?;
-            if !columns.agree_with(&self.columns) {
+            if cells >= self.names.len() && !columns.agree_with(&self.columns) {
                 // Rows have no time until the columns are named so that they can be told apart.
                 self.columns.time.fill(None);
             }
             return Ok(true);
         }
-        let again = NamesAgain {
-            place: self.place(),
-            lacking: lacking.into_iter().map(str::to_owned).collect(),
-            names,
-            columns,
-        };
-        self.width = 0;
-        if again.lacking.is_empty() {
-            self.take_names(again, ledger);
-        } else {
-            self.doubted = Some(again);
-        }
-        Ok(true)
-    }
-
-    /// All names that are known, where they stand behind the beginning of a row in the current line.
-    fn names_behind(&self) -> Option<Vec<String>> {
-        names_behind(self.lines.text(), self.delimiter, &self.names)
-    }
-
-    /// Takes the columns by names that stand behind the beginning of a row, up to its last value, if they do. Where they are not those
-    /// known before, it is not known where rows from here on have what.
-    fn takes_names_behind(
-        &mut self,
-        mut names: Vec<String>,
-        ledger: &mut Ledger,
-    ) -> Result<bool, FileError> {
-        if let Some(names) = self.names_behind() {
-            self.take_names_behind(names, ledger)?;
-            return Ok(true);
-        }
-        let moved = self.layout.as_ref().is_some_and(|layout| {
-            bare_time(&mut names, layout.time.columns.names(), self.delimiter);
-            let columns = Columns::of(layout, &names);
-            columns.are_named(layout) && !columns.agree_with(&self.columns)
-        });
-        if moved {
-            ledger.refuse_row(|| FileError::HeaderBehind {
-                place: self.place(),
-                taken: false,
-            })?;
-            self.columns.time.fill(None);
-        }
-        Ok(moved)
-    }
-
-    fn take_names_behind(
-        &mut self,
-        names: Vec<String>,
-        ledger: &mut Ledger,
-    ) -> Result<(), FileError> {
-        ledger.refuse_row(|| FileError::HeaderBehind {
-            place: self.place(),
-            taken: true,
-        })?;
-        let Some(layout) = &self.layout else {
-            return Ok(());
-        };
-        let columns = Columns::of(layout, &names);
-        let lacking = columns.lacking(layout).into_iter().map(str::to_owned);
-        let again = NamesAgain {
-            place: self.place(),
-            lacking: lacking.collect(),
-            names,
-            columns,
-        };
-        self.take_names(again, ledger);
-        Ok(())
-    }
-
-    /// Takes the columns by these names from here on.
-    fn take_names(&mut self, again: NamesAgain, ledger: &mut Ledger) {
         ledger.header(FileError::HeaderAgain {
-            place: again.place,
-            moved: again.columns != self.columns,
-            lacking: again.lacking,
+            place: self.place(),
+            moved: columns != self.columns,
+            lacking: lacking.into_iter().map(str::to_owned).collect(),
         });
-        (self.names, self.columns) = (again.names, again.columns);
+        (self.names, self.columns) = (names, columns);
         self.units.clear();
+        self.expect_below_names();
         self.width = 0;
-        self.ends_in_delimiter = false;
-        self.doubted = None;
-    }
-
-    /// Takes the columns by a header that lacks some, save where it was cut off: the row below it is then as wide as those before.
-    fn resolve(
-        &mut self,
-        again: NamesAgain,
-        cells: usize,
-        ledger: &mut Ledger,
-    ) -> Result<(), FileError> {
-        let (before, found) = (self.names.len(), again.names.len());
-        let is_as_before = cells == before || cells == before + 1;
-        if cells == found || !is_as_before {
-            self.take_names(again, ledger);
-            return Ok(());
-        }
-        ledger.refuse_header(FileError::CellCount {
-            place: again.place,
-            expected: before,
-            found,
-        })
+        self.ends_in_separator = false;
+        Ok(true)
     }
 
     /// Reads one record into `cells`, over several lines if it has line breaks in quotes.
@@ -415,7 +361,7 @@ impl CsvRows {
                 }
                 ReadRecordResult::Record => {
                     self.drop_carriage_return(counted);
-                    let beyond = self.ends_in_delimiter && counted == self.width + 1;
+                    let beyond = self.ends_in_separator && counted == self.width + 1;
                     let beyond = beyond && self.column(self.width).trim_ascii().is_empty();
                     return Ok(Record::Row {
                         cells: counted - usize::from(beyond),
@@ -441,62 +387,29 @@ impl CsvRows {
     /// Whether a row over several lines may have so many cells. Of the names, none are known before.
     fn is_width(&self, cells: usize) -> bool {
         let names = self.names.len();
-        let may_end_so = self.width == 0 || self.ends_in_delimiter;
+        let may_end_so = self.width == 0 || self.ends_in_separator;
         names == 0 || cells == names || cells == names + 1 && may_end_so
     }
 
     /// Leaves only the first of these lines to a row whose quoted cell began in it, and gives the others and the current one again.
     fn unclosed(&mut self, before: Vec<(u64, Vec<u8>)>) -> Record {
-        let mut lines = before.into_iter();
-        let (_, first) = lines.next().unwrap_or_default();
-        let mut after: Vec<_> = lines.collect();
+        let mut after: Vec<_> = before.into_iter().skip(1).collect();
         after.extend(self.lines.take_any());
         self.lines.hold(after);
         self.splitter.reset();
-        Record::Unclosed(first)
+        Record::Unclosed
     }
 
-    /// Goes to the next line of a quoted cell that began within these. It does not go on for long, nor in what is a row by itself.
+    /// Goes to the next line of a quoted cell that began within these. It does not go on for long.
     fn goes_on(&mut self, before: &[(u64, Vec<u8>)]) -> Result<bool, FileError> {
         let bytes: usize = before.iter().map(|(_, line)| line.len()).sum();
         if before.len() >= LINES_OF_ROW || bytes > LONGEST_ROW {
             return Ok(false);
         }
         match self.lines.advance() {
-            Ok(more) => Ok(more && !self.is_row_by_itself()),
             Err(error) if error.is_of_line() => Ok(false),
-            Err(error) => Err(error),
+            more => more,
         }
-    }
-
-    /// Whether the current line has as many cells as a row, and a time, be its quotes taken for such or not.
-    fn is_row_by_itself(&self) -> bool {
-        let line = self.lines.text();
-        let line = line.strip_suffix(b"\n").unwrap_or(line);
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        let plain = line.split(|&byte| byte == self.delimiter);
-        let plain: Vec<String> = plain.map(columns::name).collect();
-        [plain, columns::names_in(line, self.delimiter)]
-            .iter()
-            .any(|cells| header::is_of_width(cells, self.names.len()) && self.have_time(cells))
-    }
-
-    /// Whether these cells have a time where the columns have it.
-    fn have_time(&self, cells: &[String]) -> bool {
-        let Some(layout) = &self.layout else {
-            return cells.first().is_some_and(|first| header::is_value(first));
-        };
-        let cell = |column: usize| {
-            let at = self.columns.time.get(column).copied().flatten();
-            at.map_or(&[][..], |at| cells[at].as_bytes())
-        };
-        let mut time = Vec::new();
-        layout.time.columns.join(&mut time, cell);
-        let time = cell::text(&time);
-        let read = layout
-            .time
-            .read(cell::with_decimal_point(&time).as_bytes(), None);
-        matches!(read, Some(Civil::At(_)))
     }
 
     /// A line may end in CR LF; only LF ends a record, so that a stray CR cannot shift the rest of a line.
@@ -539,14 +452,10 @@ impl Cells for CsvRows {
                     ledger.report.truncated = Some(self.place());
                     return Ok(false);
                 }
-                Ok(Record::Unclosed(line)) => {
-                    let behind = names_behind(&line, self.delimiter, &self.names);
-                    match behind.filter(|_| ledger.is_lenient()) {
-                        Some(names) => self.take_names_behind(names, ledger)?,
-                        None => ledger.refuse_row(|| FileError::UnclosedQuote {
-                            place: self.place(),
-                        })?,
-                    }
+                Ok(Record::Unclosed) => {
+                    ledger.refuse_row(|| FileError::UnclosedQuote {
+                        place: self.place(),
+                    })?;
                     continue;
                 }
                 Err(error) if error.is_of_line() => {
@@ -577,10 +486,6 @@ impl Cells for CsvRows {
 
     fn channel(&self, index: usize) -> &[u8] {
         self.cell(self.columns.channels[index])
-    }
-
-    fn decimal_comma(&self) -> bool {
-        self.delimiter != b','
     }
 
     fn place(&self) -> Place {

@@ -8,8 +8,8 @@ use athermal_core::document::{TimeBase, TimeForm as Declared};
 use athermal_core::time::Duration;
 use athermal_run::recording::{self, Samples, Source, SourceError};
 
-use crate::stream::read_into;
-use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, TimeColumn, TimeForm};
+use crate::stream::next_of;
+use crate::{ChannelColumn, Layout, Options, Recording, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -53,6 +53,7 @@ pub fn layout(plan: &Plan) -> Layout {
                 optional: source.optional,
             })
             .collect(),
+        table: plan.table.clone(),
     }
 }
 
@@ -105,14 +106,10 @@ struct Reading<'a> {
 
 impl Source for Reading<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
-        let (event, time) = read_into(samples, |row| self.recording.next_into(row))?;
-        Ok(match event {
-            Event::Row => Some(recording::Event::Row(time)),
-            Event::Segment => Some(recording::Event::Segment),
-            Event::End => {
-                *self.reports.borrow_mut() = self.recording.reports().to_vec();
-                None
-            }
-        })
+        let next = next_of(samples, |row| self.recording.next_into(row))?;
+        if next.is_none() {
+            *self.reports.borrow_mut() = self.recording.reports().to_vec();
+        }
+        Ok(next)
     }
 }

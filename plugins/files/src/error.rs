@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::cell;
-use crate::long::LongFormat;
+use crate::detect::LongFormat;
 
-mod told;
+mod message;
 
 /// Longest piece of a file that a message repeats, in characters.
 const EXCERPT: usize = 60;
@@ -92,18 +92,6 @@ pub enum FileError {
         /// The longest row that is read, in bytes.
         limit: usize,
     },
-    /// A row beyond that, with no names of columns above it.
-    HeaderTooLong {
-        /// Where it starts.
-        place: Place,
-        /// The longest row that is read, in bytes.
-        limit: usize,
-    },
-    /// Lines that end in carriage returns alone, so that all of them are one.
-    CarriageReturns {
-        /// The line that is all of them.
-        place: Place,
-    },
     /// A quoted cell that does not end, in its line or soon after.
     UnclosedQuote {
         /// The row in which the cell starts.
@@ -126,8 +114,8 @@ pub enum FileError {
         missing: Vec<MissingColumn>,
         /// The names that are there.
         found: Vec<String>,
-        /// Whether these are not in UTF-8, and were taken for Windows-1252.
-        windows_1252: bool,
+        /// How these were read, where that may be why; to stand behind them.
+        note: &'static str,
     },
     /// A cell that is neither a number nor "no value".
     BadCell {
@@ -148,8 +136,8 @@ pub enum FileError {
         found: String,
         /// The mark that the numbers before it have: `,` or `.`.
         mark: char,
-        /// The line of the first of them.
-        since: u64,
+        /// The line of the first of them; none where `[table]` declares the mark.
+        since: Option<u64>,
     },
     /// A time cell beyond 64 bits of nanoseconds.
     TimeBeyond {
@@ -213,19 +201,8 @@ pub enum FileError {
         /// The time after it, if a row follows.
         next: Option<String>,
     },
-    /// Rows one after the other, none of them after the one before them; told only while the recording is read.
-    TimeStaysBehind {
-        /// The newest of them.
-        place: Place,
-        /// Its time, as the file gives it.
-        time: String,
-        /// How many they are.
-        rows: u64,
-        /// The newest time before them.
-        previous: String,
-    },
-    /// Rows that cannot be read, and none since the last one that was taken that can; told only while the recording is read leniently.
-    StaysUnreadable {
+    /// Rows one after the other that are left out; only reported while the recording is read.
+    StillRefused {
         /// What is wrong with the newest of them.
         newest: Box<FileError>,
         /// How many they are.
@@ -240,12 +217,23 @@ pub enum FileError {
         /// Those that must be there and are not; only when reading leniently.
         lacking: Vec<String>,
     },
-    /// The names of the columns stand behind the beginning of a row; only when reading leniently.
-    HeaderBehind {
+    /// The file is otherwise than `[table]` declares.
+    NotAsDeclared {
+        /// The line.
+        place: Place,
+        /// The key that declares it.
+        key: &'static str,
+        /// What is found, as a clause.
+        found: String,
+    },
+    /// A row of a long layout whose time is before the one before.
+    LongOutOfOrder {
         /// The row.
         place: Place,
-        /// Whether they are those known before, and values are taken by them.
-        taken: bool,
+        /// Its time, as the file gives it.
+        time: String,
+        /// The newest time before it.
+        previous: String,
     },
     /// The log has a row for each value.
     LongFormat {
@@ -312,12 +300,10 @@ impl FileError {
             | Self::Empty { .. }
             | Self::NotBegun { .. }
             | Self::ValueCount { .. } => None,
-            Self::StaysUnreadable { newest, .. } => newest.place(),
+            Self::StillRefused { newest, .. } => newest.place(),
             Self::Read { place, .. }
             | Self::NotText { place }
             | Self::TooLong { place, .. }
-            | Self::HeaderTooLong { place, .. }
-            | Self::CarriageReturns { place }
             | Self::UnclosedQuote { place }
             | Self::DuplicateColumn { place, .. }
             | Self::MissingColumns { place, .. }
@@ -329,9 +315,9 @@ impl FileError {
             | Self::TimeAgain { place, .. }
             | Self::TimeNotAfter { place, .. }
             | Self::TimeLeaps { place, .. }
-            | Self::TimeStaysBehind { place, .. }
             | Self::HeaderAgain { place, .. }
-            | Self::HeaderBehind { place, .. }
+            | Self::NotAsDeclared { place, .. }
+            | Self::LongOutOfOrder { place, .. }
             | Self::LongFormat { place, .. }
             | Self::CellCount { place, .. }
             | Self::BadObject { place, .. }

@@ -1,4 +1,4 @@
-//! Decides whether rows of one time are one, and holds the row that was read to find out. Not where they are put together.
+//! Whether rows of one time are one, and the row that was read to find out. The reader puts them together.
 
 use crate::{FileError, Row};
 
@@ -32,14 +32,14 @@ pub(crate) fn join(row: &mut [f64], other: &[f64]) -> Joined {
 
 /// What was read to find out whether it belongs to the row before.
 #[derive(Default)]
-pub(crate) struct Held {
+pub(crate) struct Lookahead {
     /// The row, if it is one.
     pub row: Row,
     /// What came of reading it; nothing where it was given.
     pub read: Option<Result<bool, FileError>>,
 }
 
-impl Held {
+impl Lookahead {
     /// Gives what was read, if anything was; the end stays the end.
     pub fn give(&mut self, row: &mut Row) -> Option<Result<bool, FileError>> {
         let read = self.read.take()?;

@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 use crate::cell::trim;
 use crate::cells::Cells;
 use crate::columns;
-use crate::format::begins_json_array;
+use crate::detect::begins_json_array;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 use crate::{FileError, Layout, Place};
@@ -107,7 +107,7 @@ impl JsonRows {
         let mut never = never.map(|key| key.name.as_str()).peekable();
         match &self.found {
             Some(found) if never.peek().is_some() => {
-                Some(columns::missing(self.lines.place(), never, found, false))
+                Some(columns::missing(self.lines.place(), never, found, ""))
             }
             _ => None,
         }
@@ -146,7 +146,7 @@ impl Cells for JsonRows {
                     // Most likely misspelt, though a later object may have them.
                     let is_first = !std::mem::replace(&mut self.has_begun, true);
                     if is_first && let Some(error) = self.never_seen() {
-                        ledger.tell_early(|| error);
+                        ledger.report_early(|| error);
                     }
                     if !self.time.is_one() {
                         self.join_time();
@@ -158,7 +158,7 @@ impl Cells for JsonRows {
                     let found = self.found.as_deref().unwrap_or_default();
                     let time = self.of_time().filter(|key| !key.ever_seen);
                     let time = time.map(|key| key.name.as_str());
-                    let missing = columns::missing(self.lines.place(), time, found, false);
+                    let missing = columns::missing(self.lines.place(), time, found, "");
                     ledger.refuse_row(|| missing)?;
                 }
                 Err(_) if !self.lines.is_complete() => {
@@ -173,7 +173,7 @@ impl Cells for JsonRows {
         }
         // Of what never ends whoever asked was told at the first object, and another may have them when it goes on.
         match self.never_seen() {
-            Some(error) if ledger.tell.is_none() => Err(error),
+            Some(error) if ledger.on_first.is_none() => Err(error),
             _ => Ok(false),
         }
     }
@@ -187,10 +187,6 @@ impl Cells for JsonRows {
 
     fn channel(&self, index: usize) -> &[u8] {
         self.cell(self.channels[index])
-    }
-
-    fn decimal_comma(&self) -> bool {
-        false
     }
 
     fn place(&self) -> Place {

@@ -1,5 +1,8 @@
 //! What is wanted from a recording: which columns give time, and which channels. Not where they stand in a file.
 
+use std::path::Path;
+
+use athermal_core::document::{TableBase, TableFormat};
 use athermal_core::time::{TimeColumns, TimeFormat, Zone};
 
 /// The columns to read, by name; a column that is not named here is skipped.
@@ -9,6 +12,8 @@ pub struct Layout {
     pub time: TimeColumn,
     /// The columns that give values, in the order of [`Row::values`](crate::Row::values).
     pub channels: Vec<ChannelColumn>,
+    /// How the text is laid out, as far as that is declared.
+    pub table: TableBase,
 }
 
 /// What gives the instant of each row.
@@ -91,7 +96,15 @@ impl Layout {
                 zone: None,
             },
             channels,
+            table: TableBase::default(),
         }
+    }
+
+    /// What is declared of a file.
+    #[must_use]
+    pub fn table_of(&self, path: &Path) -> &TableFormat {
+        let name = path.file_name().unwrap_or_default();
+        self.table.of(&name.to_string_lossy())
     }
 
     /// The names of all columns wanted, time first.

@@ -1,5 +1,6 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
+use athermal_core::document::DecimalMark;
 use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
 
@@ -49,28 +50,46 @@ pub struct Count {
 }
 
 impl Count {
-    fn add(&mut self, error: impl FnOnce() -> FileError, tell: &mut Option<Tell>) {
+    fn add(&mut self, error: impl FnOnce() -> FileError, on_first: &mut Option<OnFirst>) {
         self.count += 1;
         if self.first.is_none() {
             let first = self.first.insert(error());
-            tell.iter_mut().for_each(|tell| tell(first));
+            on_first.iter_mut().for_each(|report| report(first));
+        }
+    }
+
+    /// The same of the newest of so many rows, one after the other: nothing comes of the data while it goes on. That is reported at
+    /// once of the first, the tenth, the hundredth and so on.
+    fn add_again(
+        &mut self,
+        error: impl FnOnce() -> FileError,
+        rows: u64,
+        on_first: &mut Option<OnFirst>,
+    ) {
+        match on_first {
+            Some(report) if stays_behind(rows) => {
+                self.count += 1;
+                let newest = Box::new(error());
+                report(&FileError::StillRefused { newest, rows });
+            }
+            _ => self.add(error, on_first),
         }
     }
 }
 
-/// A decimal mark, with the line since which numbers have it.
-type Mark = Option<(u8, u64)>;
+/// A decimal mark, with the line since which numbers have it; no line where `[table]` declares it.
+type Mark = Option<(u8, Option<u64>)>;
 
 fn other_mark(known: &mut Mark, number: &[u8], line: impl FnOnce() -> u64) -> Mark {
     let mark = decimal_mark(number)?;
-    let first = *known.get_or_insert_with(|| (mark, line()));
+    let first = *known.get_or_insert_with(|| (mark, Some(line())));
     (first.0 != mark).then_some(first)
 }
 
-/// Who is told at once of what is met for the first time.
-pub(crate) type Tell = Box<dyn FnMut(&FileError) + Send>;
+/// What is called at once with what is met for the first time.
+pub(crate) type OnFirst = Box<dyn FnMut(&FileError) + Send>;
 
-/// Whether so many rows, one after the other, that are left out are worth another word: nothing comes of the data while it goes on. That is at 10, 100 and so on.
+/// Whether it is the tenth, the hundredth and so on.
 fn stays_behind(rows: u64) -> bool {
     rows >= 10 && 10_u64.pow(rows.ilog10()) == rows
 }
@@ -94,7 +113,7 @@ const LEAP_STEPS: i64 = 30;
 /// The account that a reader keeps.
 pub(crate) struct Ledger {
     pub report: Report,
-    pub tell: Option<Tell>,
+    pub on_first: Option<OnFirst>,
     /// Whether rows of one time are put together.
     pub joins: bool,
     /// Whether what is read goes on later.
@@ -105,10 +124,6 @@ pub(crate) struct Ledger {
     /// The last instant known before the first row, if anything was read before this.
     before_ns: Option<i64>,
     last_ns: Option<i64>,
-    /// Where the first row stands, while the next may show that its time is wrong.
-    first: Option<Place>,
-    /// Whether that was shown by the row taken last.
-    first_is_wrong: bool,
     /// How long after the one before it that was.
     step_ns: i64,
     /// How many rows one after the other were not after it.
@@ -124,31 +139,32 @@ pub(crate) struct Ledger {
 }
 
 impl Ledger {
-    pub fn new(lenient: bool) -> Self {
+    pub fn new(lenient: bool, decimal: Option<DecimalMark>) -> Self {
         Self {
             report: Report::default(),
-            tell: None,
+            on_first: None,
             joins: false,
             goes_on: false,
             lenient,
             unusable_headers: Count::default(),
             before_ns: None,
             last_ns: None,
-            first: None,
-            first_is_wrong: false,
             step_ns: 0,
             behind: 0,
             unreadable: 0,
             last_time: Vec::new(),
             time_mark: None,
-            value_mark: None,
+            value_mark: match decimal {
+                Some(DecimalMark::Comma) => Some((b',', None)),
+                _ => None,
+            },
         }
     }
 
-    /// Goes on after an instant, which is told so.
-    pub fn begin_after(&mut self, before: Instant, told: &str) {
+    /// Goes on after an instant, with its text for messages.
+    pub fn begin_after(&mut self, before: Instant, text: &str) {
         self.before_ns = Some(before.as_ns());
-        self.last_time = told.as_bytes().to_vec();
+        self.last_time = text.as_bytes().to_vec();
     }
 
     /// The instant of the last row taken, and how long after the one before it that was, in ns. Before the first row of what is still
@@ -201,52 +217,17 @@ impl Ledger {
         }
     }
 
-    /// Takes a row that is after the last one, by its time cell.
+    /// Takes a row that is after the last one, or begins a segment, by its time cell.
     #[inline]
-    pub fn take(&mut self, time_ns: i64, cell: &[u8]) {
-        let last_ns = self.last_ns.or(self.before_ns).unwrap_or(time_ns);
+    pub fn take(&mut self, time_ns: i64, cell: &[u8], begins_segment: bool) {
+        let last_ns = self.last_ns.or(self.before_ns).filter(|_| !begins_segment);
+        let last_ns = last_ns.unwrap_or(time_ns);
         self.step_ns = time_ns.saturating_sub(last_ns).max(0);
         self.last_ns = Some(time_ns);
         (self.behind, self.unreadable) = (0, 0);
         self.last_time.clear();
         self.last_time.extend_from_slice(cell);
         self.report.rows += 1;
-    }
-
-    /// Lets the time of the first row, where it has just been taken and is held, be doubted until the next.
-    #[inline]
-    pub fn doubt_first(&mut self, place: impl FnOnce() -> Place) {
-        self.first = None;
-        if self.joins && self.report.rows == 1 && self.report.refused_time.count == 0 {
-            self.first = Some(place());
-        }
-    }
-
-    /// Leaves out the first row, since it is far after the next one, by its time cell and instant; whether it is.
-    #[cold]
-    pub fn refuse_first(&mut self, time_ns: i64, cell: &[u8]) -> bool {
-        let is_far = |last_ns: i64| last_ns.saturating_sub(time_ns) > LEAP_NS;
-        let is_wrong = self.report.rows == 1 && self.last_ns.is_some_and(is_far);
-        let Some(place) = self.first.take().filter(|_| is_wrong) else {
-            return false;
-        };
-        let error = || FileError::TimeLeaps {
-            place,
-            time: excerpt(&self.last_time),
-            previous: None,
-            next: Some(excerpt(cell)),
-        };
-        self.report.refused_time.add(error, &mut self.tell);
-        self.report.rows -= 1;
-        self.last_ns = None;
-        self.first_is_wrong = true;
-        true
-    }
-
-    /// Whether the row taken last has shown that the time of the first is wrong; told once.
-    #[inline]
-    pub fn takes_place_of_first(&mut self) -> bool {
-        std::mem::take(&mut self.first_is_wrong)
     }
 
     /// Leaves out a row that is not put together with the last one, whose time it has.
@@ -257,36 +238,23 @@ impl Ledger {
             time: excerpt(cell),
             why,
         };
-        self.report.repeated_time.add(error, &mut self.tell);
+        self.report.repeated_time.add(error, &mut self.on_first);
     }
 
     /// Leaves out a row that is not after the last one.
     #[cold]
     pub fn refuse(&mut self, follows: Follows, cell: &[u8], place: impl FnOnce() -> Place) {
         self.behind += 1;
-        if follows == Follows::Again && (self.tell.is_none() || !stays_behind(self.behind)) {
+        if follows == Follows::Again && (self.on_first.is_none() || !stays_behind(self.behind)) {
             return self.refuse_again(cell, place, Again::Live);
         }
-        let (time, previous) = (excerpt(cell), excerpt(&self.last_time));
-        let (place, rows) = (place(), self.behind);
-        if let Some(tell) = &mut self.tell
-            && stays_behind(rows)
-        {
-            self.report.refused_time.count += 1;
-            tell(&FileError::TimeStaysBehind {
-                place,
-                time,
-                rows,
-                previous,
-            });
-        } else {
-            let error = || FileError::TimeNotAfter {
-                place,
-                time,
-                previous,
-            };
-            self.report.refused_time.add(error, &mut self.tell);
-        }
+        let error = || FileError::TimeNotAfter {
+            place: place(),
+            time: excerpt(cell),
+            previous: excerpt(&self.last_time),
+        };
+        let refused = &mut self.report.refused_time;
+        refused.add_again(error, self.behind, &mut self.on_first);
     }
 
     /// Leaves out a row that leaps, since the next one, by its time cell, does not leap as far, or none follows.
@@ -298,7 +266,16 @@ impl Ledger {
             previous: Some(excerpt(&self.last_time)),
             next: next.map(excerpt),
         };
-        self.report.refused_time.add(error, &mut self.tell);
+        self.report.refused_time.add(error, &mut self.on_first);
+    }
+
+    /// What is wrong with a row of a long layout that is before the last one taken.
+    pub fn out_of_order(&self, cell: &[u8], place: Place) -> FileError {
+        FileError::LongOutOfOrder {
+            place,
+            time: excerpt(cell),
+            previous: excerpt(&self.last_time),
+        }
     }
 
     /// The decimal mark that times have, and since which line, where this one has another. That of values may be another
@@ -325,15 +302,15 @@ impl Ledger {
         let report = &mut self.report;
         let channels = report.bad_cells_of.len().max(channel + 1);
         report.bad_cells_of.resize_with(channels, Count::default);
-        report.bad_cells_of[channel].add(&error, &mut self.tell);
+        report.bad_cells_of[channel].add(&error, &mut self.on_first);
         report.bad_cells.add(error, &mut None);
         Ok(())
     }
 
     /// Something that is an error at the end only, where the data ever end: whoever asked is told of it now.
-    pub fn tell_early(&mut self, error: impl FnOnce() -> FileError) {
-        if let Some(tell) = &mut self.tell {
-            tell(&error());
+    pub fn report_early(&mut self, error: impl FnOnce() -> FileError) {
+        if let Some(report) = &mut self.on_first {
+            report(&error());
         }
     }
 
@@ -345,7 +322,7 @@ impl Ledger {
     /// A row that names the columns again. Each that moves them is told.
     pub fn header(&mut self, again: FileError) {
         let report = &mut self.report;
-        match (&again, &mut self.tell) {
+        match (&again, &mut self.on_first) {
             (FileError::HeaderAgain { moved: true, .. }, Some(tell)) => tell(&again),
             (FileError::HeaderAgain { moved: true, .. }, None) => {
                 report.headers_moved.add(|| again, &mut None);
@@ -358,7 +335,8 @@ impl Ledger {
     #[cold]
     pub fn refuse_header(&mut self, error: FileError) -> Result<(), FileError> {
         if self.is_lenient() {
-            self.unusable_headers.add(|| error.clone(), &mut self.tell);
+            self.unusable_headers
+                .add(|| error.clone(), &mut self.on_first);
             self.report.refused_rows.add(|| error, &mut None);
             return Ok(());
         }
@@ -372,15 +350,8 @@ impl Ledger {
             return Err(error());
         }
         self.unreadable += 1;
-        let (refused, rows) = (&mut self.report.refused_rows, self.unreadable);
-        match &mut self.tell {
-            Some(tell) if stays_behind(rows) => {
-                refused.count += 1;
-                let newest = Box::new(error());
-                tell(&FileError::StaysUnreadable { newest, rows });
-            }
-            tell => refused.add(error, tell),
-        }
+        let refused = &mut self.report.refused_rows;
+        refused.add_again(error, self.unreadable, &mut self.on_first);
         Ok(())
     }
 }
@@ -402,7 +373,7 @@ mod tests {
         let text = std::io::Cursor::new(text.into_bytes());
         let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
         let told = Arc::new(Mutex::new(Vec::new()));
-        reader.tell_first({
+        reader.report_first({
             let told = Arc::clone(&told);
             move |error| told.lock().unwrap().push(error.to_string())
         });
@@ -410,8 +381,8 @@ mod tests {
         while reader.next_into(&mut row).unwrap() {}
         let behind = |line: u32, rows: u32| {
             format!(
-                "pipe:{line}: the last {rows} rows were all left out, up to the time `{rows}`, since `5000` came before them: has the \
-                 clock been set back, or was that time wrong? Rows are taken again once they are after it"
+                "pipe:{line}: the time `{rows}` is not after `5000`; the row was left out; {rows} rows were left out since the last one \
+                 that was taken: was the clock set back?"
             )
         };
         assert_eq!(
@@ -445,7 +416,7 @@ mod tests {
         let text = std::io::Cursor::new(text.into_bytes());
         let mut reader = Reader::from_read("pipe", text, layout, options).unwrap();
         let told = Arc::new(Mutex::new(Vec::new()));
-        reader.tell_first({
+        reader.report_first({
             let told = Arc::clone(&told);
             move |error| told.lock().unwrap().push(error.to_string())
         });
@@ -454,8 +425,8 @@ mod tests {
         let first = "pipe:3: 3 cells where the header has 2; correct the row, or read leniently (`--lenient`) to leave it out";
         let stays = |line: u32, rows: u32| {
             format!(
-                "pipe:{line}: 3 cells where the header has 2; correct the row; {rows} rows could not be read and were left out since the \
-                 last one that was taken"
+                "pipe:{line}: 3 cells where the header has 2; correct the row; {rows} rows were left out since the last one that was \
+                 taken"
             )
         };
         assert_eq!(

@@ -6,9 +6,11 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
+use athermal_core::document::Encoding;
+use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
-use crate::format::begins_json_array;
+use crate::detect::begins_json_array;
 use crate::{FileError, Format, Place};
 
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
@@ -20,7 +22,7 @@ pub(crate) const BUFFER: usize = 64 * 1024;
 /// What begins a text in UTF-8 that says so. Where files are put behind each other it begins a line.
 pub(crate) const MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// What `-` is called where something is told of it.
+/// The name of `-` in messages.
 pub const STANDARD_INPUT: &str = "standard input";
 
 /// A stream cut into lines.
@@ -40,8 +42,20 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    pub fn new(file: Arc<str>, input: impl Read + Send + 'static) -> Self {
+    pub fn new(
+        file: Arc<str>,
+        encoding: Option<Encoding>,
+        input: impl Read + Send + 'static,
+    ) -> Self {
+        let declared = encoding.and_then(|encoding| match encoding {
+            Encoding::Utf8 => None,
+            Encoding::Utf16Le => Some(UTF_16LE),
+            Encoding::Utf16Be => Some(UTF_16BE),
+            Encoding::Windows1252 => Some(WINDOWS_1252),
+        });
         let decoded = DecodeReaderBytesBuilder::new()
+            .encoding(declared)
+            .bom_sniffing(encoding.is_none())
             .utf8_passthru(true)
             .strip_bom(true)
             .build(input);
@@ -58,24 +72,26 @@ impl Lines {
     }
 
     /// A file, or standard input for `-`.
-    pub fn open(path: &Path) -> Result<Self, FileError> {
-        Self::open_through(path, |input| input)
+    pub fn open(path: &Path, encoding: Option<Encoding>) -> Result<Self, FileError> {
+        Self::open_through(path, encoding, |input| input)
     }
 
     /// The same, with something between it and the lines.
     pub fn open_through(
         path: &Path,
+        encoding: Option<Encoding>,
         through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
     ) -> Result<Self, FileError> {
         if path == Path::new("-") {
             return Ok(Self::new(
                 STANDARD_INPUT.into(),
+                encoding,
                 through(Box::new(io::stdin())),
             ));
         }
         let file: Arc<str> = path.display().to_string().into();
         match File::open(path) {
-            Ok(input) => Ok(Self::new(file, through(Box::new(input)))),
+            Ok(input) => Ok(Self::new(file, encoding, through(Box::new(input)))),
             Err(source) => Err(FileError::cannot_open(path, source)),
         }
     }
@@ -119,9 +135,6 @@ impl Lines {
         let place = self.place();
         Err(match begins_json_array(&self.line) {
             true => FileError::JsonArray { place },
-            false if self.number == 1 && has_bare_returns(&self.line) => {
-                FileError::CarriageReturns { place }
-            }
             false => FileError::TooLong {
                 place,
                 limit: LONGEST_ROW,
@@ -225,21 +238,12 @@ pub(crate) fn is_content(line: &[u8]) -> bool {
     !matches!(line.trim_ascii_start().first(), None | Some(b'#'))
 }
 
-/// Whether a line goes on after a carriage return that stands in no quoted cell.
-pub(crate) fn has_bare_returns(line: &[u8]) -> bool {
-    let mut unquoted = line.split(|byte| *byte == b'"').step_by(2);
-    unquoted.any(|piece| {
-        let mut pairs = piece.windows(2);
-        pairs.any(|pair| pair[0] == b'\r' && !matches!(pair[1], b'\r' | b'\n'))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn lines(bytes: impl Read + Send + 'static) -> Lines {
-        Lines::new("test".into(), bytes)
+        Lines::new("test".into(), None, bytes)
     }
 
     #[test]

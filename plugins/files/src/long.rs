@@ -1,155 +1,75 @@
-//! Whether a table is in long format, a row for each value, and what its columns then are. It is not read: whoever wrote it knows best
-//! which rows belong to one instant.
+//! A long layout: which channel a row is of, by the name in one of its cells. Not whether a table that declares none has one.
 
-use std::collections::BTreeSet;
-use std::fmt;
+use std::collections::{BTreeSet, HashMap};
 
-use crate::cell::is_number;
-use crate::instant::has_clock;
+use crate::columns::{self, name};
+use crate::{FileError, Layout, Place};
 
-/// The columns of a log in long format.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LongFormat {
-    /// That of the time.
-    pub time: String,
-    /// That which names what a row has.
-    pub names: String,
-    /// That of the values.
-    pub values: String,
+/// How many names of channels a message lists.
+const LISTED: usize = 50;
+
+/// The channels of a table that has a row for each value.
+pub(crate) struct Long {
+    /// The channels that are called by each name.
+    channels: HashMap<String, Vec<usize>>,
+    /// Whether a row was of each channel.
+    seen: Vec<bool>,
+    /// Names of other channels, for a message.
+    others: BTreeSet<String>,
+    /// The name in the current row.
+    current: String,
 }
 
-/// How such columns are usually called.
-const NAMES: [&str; 16] = [
-    "tag",
-    "tagname",
-    "name",
-    "variable",
-    "varname",
-    "signal",
-    "channel",
-    "sensor",
-    "parameter",
-    "point",
-    "item",
-    "metric",
-    "variable_name",
-    "tag_name",
-    "kanal",
-    "messstelle",
-];
-const VALUES: [&str; 9] = [
-    "value",
-    "val",
-    "values",
-    "data",
-    "reading",
-    "varvalue",
-    "wert",
-    "messwert",
-    "measurement",
-];
-
-/// A wider table is none.
-const WIDEST: usize = 8;
-
-impl LongFormat {
-    /// That of these columns and rows, which have wanted names in cells, or else columns that are called as in long format.
-    pub(crate) fn of(
-        columns: &[String],
-        rows: &[Vec<String>],
-        is_wanted: &dyn Fn(&str) -> bool,
-    ) -> Option<Self> {
-        let cells = |column: usize| {
-            let cells = rows.iter().filter_map(move |row| row.get(column));
-            cells.map(String::as_str).filter(|cell| !cell.is_empty())
-        };
-        let called =
-            |column: usize, known: &[&str]| known.contains(&&*columns[column].to_lowercase());
-        let all = 0..columns.len();
-        let is_text =
-            |&column: &usize| !cells(column).any(|cell| is_number(cell) || has_clock(cell));
-        let is_value = |&column: &usize| called(column, &VALUES) && cells(column).any(is_number);
-        let numbers = |&column: &usize| cells(column).any(is_number);
-        let names = all.clone().filter(is_text).find(|&column| {
-            let different: BTreeSet<&str> = cells(column).collect();
-            let is_called = called(column, &NAMES) && all.clone().any(|column| is_value(&column));
-            different.len() > 1 && (is_called || cells(column).any(is_wanted))
-        })?;
-        let values = all
-            .clone()
-            .find(is_value)
-            .or_else(|| all.clone().rev().find(numbers))?;
-        let time = all
-            .clone()
-            .find(|&column| column != names && column != values)?;
-        (columns.len() <= WIDEST).then(|| Self {
-            time: columns[time].clone(),
-            names: columns[names].clone(),
-            values: columns[values].clone(),
-        })
+impl Long {
+    pub fn of(layout: &Layout) -> Self {
+        let mut channels: HashMap<String, Vec<usize>> = HashMap::new();
+        for (at, channel) in layout.channels.iter().enumerate() {
+            let of_name = channels.entry(channel.column.clone()).or_default();
+            of_name.push(at);
+        }
+        Self {
+            channels,
+            seen: vec![false; layout.channels.len()],
+            others: BTreeSet::new(),
+            current: String::new(),
+        }
     }
 
-    /// The column of names, and the name, where columns are called as in long format and all rows have one name.
-    pub(crate) fn of_one_name(columns: &[String], rows: &[Vec<String>]) -> Option<(usize, String)> {
-        let called = |known: &[&str]| {
-            let mut names = columns.iter();
-            names.position(|name| known.contains(&&*name.to_lowercase()))
-        };
-        let (names, _) = (called(&NAMES)?, called(&VALUES)?);
-        let mut cells = rows.iter().filter_map(|row| row.get(names));
-        let first = cells.next().filter(|first| !is_number(first))?;
-        (columns.len() <= WIDEST && cells.all(|cell| cell == first)).then(|| (names, first.clone()))
-    }
-}
-
-impl fmt::Display for LongFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            time,
-            names,
-            values,
-        } = self;
-        write!(
-            f,
-            "the log is in long format: `{names}` says of each row what its `{values}` is, where a column for each signal is expected, and \
-             a row for each time; pivot it, in pandas by `.pivot(index=\"{time}\", columns=\"{names}\", values=\"{values}\")`, and \
-             give the result"
-        )
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn of(table: &str, wanted: &str) -> Option<LongFormat> {
-        let mut lines = table
-            .lines()
-            .map(|line| line.split(';').map(str::to_owned).collect::<Vec<_>>());
-        let columns = lines.next().unwrap();
-        LongFormat::of(&columns, &lines.collect::<Vec<_>>(), &|name| name == wanted)
+    /// Whether the row whose cell names this channel has a value that is wanted.
+    pub fn takes(&mut self, cell: &[u8]) -> bool {
+        self.current = name(cell);
+        match self.channels.get(&self.current) {
+            Some(channels) => {
+                channels.iter().for_each(|&at| self.seen[at] = true);
+                true
+            }
+            None => {
+                if self.others.len() < LISTED {
+                    self.others.insert(self.current.clone());
+                }
+                false
+            }
+        }
     }
 
-    #[test]
-    fn a_row_for_each_value_is_seen_by_its_names_and_told_with_a_way_out() {
-        let long = of("time;tag;value\n0;plate;21,5\n0;Z;3\n1;plate;21,6\n", "").unwrap();
-        assert_eq!(
-            long.to_string(),
-            "the log is in long format: `tag` says of each row what its `value` is, where a column for each signal is expected, and a row \
-             for each time; pivot it, in pandas by `.pivot(index=\"time\", columns=\"tag\", values=\"value\")`, and give the result"
-        );
-        let otherwise = "wann;was;wieviel\n2026-03-01 12:00;plate;21\n2026-03-01 12:00;Z;3\n";
-        assert_eq!(of(otherwise, "room"), None);
-        let long = of(otherwise, "plate").unwrap();
-        assert_eq!(
-            (&*long.time, &*long.names, &*long.values),
-            ("wann", "was", "wieviel")
-        );
+    /// The channels that the current row has a value of.
+    pub fn channels(&self) -> &[usize] {
+        self.channels.get(&self.current).map_or(&[], Vec::as_slice)
     }
 
-    #[test]
-    fn a_column_of_text_beside_others_makes_no_long_format() {
-        assert_eq!(of("time;state;Z_nm\n0;on;1\n1;off;2\n", "Z_nm"), None);
-        assert_eq!(of("time;name;value\n0;A;1\n1;A;2\n", ""), None);
+    /// Refuses a table without a row of a channel that must be there.
+    pub fn check(&self, layout: &Layout, place: Place) -> Result<(), FileError> {
+        let channels = layout.channels.iter().zip(&self.seen);
+        let never = channels.filter(|(channel, seen)| !channel.optional && !**seen);
+        let never: Vec<&str> = never.map(|(channel, _)| channel.column.as_str()).collect();
+        if never.is_empty() {
+            return Ok(());
+        }
+        let seen = self.channels.iter();
+        let seen = seen.filter(|(_, channels)| channels.iter().any(|&at| self.seen[at]));
+        let found: BTreeSet<&String> = seen.map(|(name, _)| name).chain(&self.others).collect();
+        let found: Vec<String> = found.into_iter().cloned().collect();
+        let note = " in the column that `[table]` declares for names";
+        Err(columns::missing(place, never, &found, note))
     }
 }

@@ -3,25 +3,25 @@
 use std::io::Read;
 use std::path::Path;
 
+use athermal_core::document::{Arrangement, DecimalMark, TableFormat};
 use athermal_core::time::{Civil, Instant};
 
 use crate::cell;
 use crate::cells::Cells;
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
-use crate::joined::{self, Held, Joined};
+use crate::joined::{self, Joined, Lookahead};
 use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
-use crate::{Again, FileError, Format, Layout, Place, Report, TimeColumn};
+use crate::long::Long;
+use crate::{Again, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Options {
     /// The format; by default what the name of the file says, else its first byte.
     pub format: Option<Format>,
-    /// What stands between the cells of CSV; by default the one of `,` `;` tab `|` that fits the header best.
-    pub delimiter: Option<u8>,
     /// Take a cell that cannot be read as absent and leave a broken row out, counted, instead of stopping with an error.
     pub lenient: bool,
     /// Put rows of one time together, where no two have different values of a channel. A row then waits for the time of the next
@@ -43,6 +43,8 @@ pub struct Row {
     pub time_text: String,
     /// One value per channel of the layout, in its unit; `NaN` where there is none.
     pub values: Vec<f64>,
+    /// Whether the column that `[table]` declares for segments has another value than in the row before.
+    pub begins_segment: bool,
 }
 
 /// Reads a recording row by row, each as soon as its line is there.
@@ -50,18 +52,59 @@ pub struct Row {
 /// A row is left out and counted when its time is not after the one before, save one of the same time that is put together with it
 /// ([`Options::joins`]). One that leaps, by more than five minutes and more than
 /// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
-/// its time is wrong and no row after it is to be lost; so is it when no row follows, unless it is the second. Where rows are put
-/// together the first one waits too, and is left out and counted when it is more than five minutes after the next. A last line without
+/// its time is wrong and no row after it is to be lost; so is it when no row follows, unless it is the second. A last line without
 /// an end that lacks cells (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never
 /// an error.
 pub struct Reader {
     rows: Rows,
+    reading: Reading,
+    /// The first row of a segment, after the break before it was given.
+    waiting: Option<Row>,
+}
+
+enum Rows {
+    Csv(Box<CsvRows>),
+    Json(Box<JsonRows>),
+}
+
+/// What becomes of rows, whatever their format.
+struct Reading {
     layout: Layout,
     ledger: Ledger,
+    commas: Commas,
+    /// Which cell says the segment of a row, after those of the channels.
+    segment_cell: Option<usize>,
+    /// The segment of the row that was read last.
+    segment: Vec<u8>,
+    /// Where a row has one value.
+    long: Option<Long>,
     /// What was read to find out whether the row before it is to be taken.
     ahead: Option<Stamped>,
     /// Where rows of one time are put together.
-    held: Option<Held>,
+    joins: bool,
+    lookahead: Lookahead,
+}
+
+/// Where `1,5` is a number.
+#[derive(Clone, Copy)]
+struct Commas {
+    /// In times.
+    times: bool,
+    /// In values.
+    values: bool,
+}
+
+impl Commas {
+    fn of(table: &TableFormat, separator: Option<u8>) -> Self {
+        let found = separator.is_some_and(|separator| separator != b',');
+        Self {
+            times: found || table.decimal == Some(DecimalMark::Comma),
+            values: match table.decimal {
+                Some(mark) => mark == DecimalMark::Comma,
+                None => found,
+            },
+        }
+    }
 }
 
 /// A row with the cell that its time is from.
@@ -81,16 +124,11 @@ impl Stamped {
     }
 }
 
-enum Rows {
-    Csv(Box<CsvRows>),
-    Json(Box<JsonRows>),
-}
-
 impl Reader {
     /// Opens a file, or standard input for `-`, and reads as far as the column names.
     ///
     /// # Errors
-    /// The file cannot be opened, is empty or not text, or (CSV) lacks a column or has one twice.
+    /// The file cannot be opened, is empty or not text, is otherwise than declared, or (CSV) lacks a column or has one twice.
     pub fn open(
         path: impl AsRef<Path>,
         layout: Layout,
@@ -99,7 +137,7 @@ impl Reader {
         Self::open_through(path, layout, options, |input| input)
     }
 
-    /// The same, with something between the file and what reads it, such as one that ends where the program is told to stop.
+    /// The same, with something between the file and what reads it, such as one that ends where the program is to stop.
     ///
     /// # Errors
     /// As for [`Reader::open`].
@@ -112,7 +150,9 @@ impl Reader {
         let path = path.as_ref();
         let format = options.format.or_else(|| Format::from_path(path));
         let options = Options { format, ..options };
-        Self::from_lines(Lines::open_through(path, through)?, layout, options)
+        let table = layout.table_of(path).clone();
+        let lines = Lines::open_through(path, table.encoding, through)?;
+        Self::from_lines(lines, layout, &table, options)
     }
 
     /// Reads from any stream of bytes; `name` stands for it in messages.
@@ -125,254 +165,362 @@ impl Reader {
         layout: Layout,
         options: Options,
     ) -> Result<Self, FileError> {
-        Self::from_lines(Lines::new(name.into(), input), layout, options)
+        let table = layout.table_of(Path::new(name)).clone();
+        let lines = Lines::new(name.into(), table.encoding, input);
+        Self::from_lines(lines, layout, &table, options)
     }
 
-    fn from_lines(mut lines: Lines, layout: Layout, options: Options) -> Result<Self, FileError> {
+    fn from_lines(
+        mut lines: Lines,
+        layout: Layout,
+        table: &TableFormat,
+        options: Options,
+    ) -> Result<Self, FileError> {
         lines.only_whole = options.goes_on;
-        let rows = match lines.format_or(options.format)? {
-            Format::Csv => Rows::Csv(Box::new(CsvRows::new(lines, &layout, options.delimiter)?)),
-            Format::JsonLines => Rows::Json(Box::new(JsonRows::new(lines, &layout)?)),
+        let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout));
+        let column = |name: &String| ChannelColumn {
+            column: name.clone(),
+            optional: false,
         };
-        let mut ledger = Ledger::new(options.lenient);
-        ledger.joins = options.joins;
+        let mut wanted = layout.clone();
+        if long.is_some() {
+            let cells = [&table.name, &table.value].into_iter().flatten();
+            wanted.channels = cells.map(column).collect();
+        }
+        let segment_cell = table.segment.as_ref().map(|_| wanted.channels.len());
+        wanted.channels.extend(table.segment.as_ref().map(column));
+        let (rows, separator) = match lines.format_or(options.format)? {
+            Format::Csv => {
+                let rows = CsvRows::new(lines, &wanted, table)?;
+                let separator = rows.separator();
+                (Rows::Csv(Box::new(rows)), Some(separator))
+            }
+            Format::JsonLines => (Rows::Json(Box::new(JsonRows::new(lines, &wanted)?)), None),
+        };
+        let joins = options.joins || long.is_some();
+        let mut ledger = Ledger::new(options.lenient || table.lenient, table.decimal);
+        ledger.joins = joins;
         ledger.goes_on = options.goes_on;
         Ok(Self {
             rows,
-            layout,
-            ledger,
-            ahead: None,
-            held: options.joins.then(Held::default),
+            reading: Reading {
+                layout,
+                ledger,
+                commas: Commas::of(table, separator),
+                segment_cell,
+                segment: Vec::new(),
+                long,
+                ahead: None,
+                joins,
+                lookahead: Lookahead::default(),
+            },
+            waiting: None,
         })
     }
 
     /// Reads the next row into `row`; false at the end of the recording.
     ///
     /// # Errors
-    /// A cell, row or line that cannot be read, with its place, unless [`Options::lenient`]; at the end of JSON lines also
-    /// a channel that no line had, unless that was told at once ([`Reader::tell_first`]).
+    /// A cell, row or line that cannot be read, with its place, unless [`Options::lenient`]; at the end of JSON lines and of a long
+    /// layout also a channel that no line had, unless that was reported at once ([`Reader::report_first`]).
     pub fn next_into(&mut self, row: &mut Row) -> Result<bool, FileError> {
-        let Self {
-            rows,
-            layout,
-            ledger,
-            ahead,
-            held,
-        } = self;
-        match rows {
-            Rows::Csv(rows) => next_joined(rows.as_mut(), layout, ledger, ahead, held, row),
-            Rows::Json(rows) => next_joined(rows.as_mut(), layout, ledger, ahead, held, row),
+        match &mut self.rows {
+            Rows::Csv(rows) => self.reading.next_joined(rows.as_mut(), row),
+            Rows::Json(rows) => self.reading.next_joined(rows.as_mut(), row),
         }
     }
 
-    /// Tells of what is met for the first time as soon as it is: who reads what never ends gets no report at its end.
-    pub fn tell_first(&mut self, tell: impl FnMut(&FileError) + Send + 'static) {
-        self.ledger.tell = Some(Box::new(tell));
+    /// What comes next, with `row` filled if it is a row.
+    pub(crate) fn next_event(&mut self, row: &mut Row) -> Result<Event, FileError> {
+        if let Some(waiting) = self.waiting.take() {
+            *row = waiting;
+        } else if !self.next_into(row)? {
+            return Ok(Event::End);
+        } else if row.begins_segment {
+            self.waiting = Some(std::mem::take(row));
+            return Ok(Event::Segment);
+        }
+        Ok(Event::Row)
     }
 
-    /// Goes on after an instant that is known before the first row, and is told so. Where that row is after it, it is followed like a
-    /// row before; where it is not, what was read is read again.
-    pub fn begin_after(&mut self, before: Instant, told: &str) {
-        self.ledger.begin_after(before, told);
+    /// Reports what is met for the first time as soon as it is: who reads what never ends gets no report at its end.
+    pub fn report_first(&mut self, report: impl FnMut(&FileError) + Send + 'static) {
+        self.reading.ledger.on_first = Some(Box::new(report));
+    }
+
+    /// Goes on after an instant that is known before the first row, with its text for messages. Where that row is after it, it is
+    /// followed like a row before; where it is not, what was read is read again.
+    pub fn begin_after(&mut self, before: Instant, text: &str) {
+        self.reading.ledger.begin_after(before, text);
     }
 
     /// The instant of the last row, and how long after the one before it that was, in ns.
     pub(crate) fn last(&self) -> Option<(Instant, i64)> {
-        self.ledger.last()
+        self.reading.ledger.last()
     }
 
     /// What was met so far.
     pub fn report(&self) -> &Report {
-        &self.ledger.report
+        &self.reading.ledger.report
     }
 
     /// What is read.
     pub fn layout(&self) -> &Layout {
-        &self.layout
+        &self.reading.layout
     }
 }
 
-/// Reads the next row with all those of its time that can be put together with it.
-fn next_joined<C: Cells>(
-    rows: &mut C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    ahead: &mut Option<Stamped>,
-    held: &mut Option<Held>,
-    row: &mut Row,
-) -> Result<bool, FileError> {
-    let Some(held) = held else {
-        return next(rows, layout, ledger, ahead, row);
-    };
-    if let Some(given) = held.give(row) {
-        if !matches!(given, Ok(true)) {
-            return given;
+impl Reading {
+    /// Reads the next row with all those of its time that can be put together with it.
+    fn next_joined<C: Cells>(&mut self, rows: &mut C, row: &mut Row) -> Result<bool, FileError> {
+        if !self.joins {
+            return self.next(rows, row);
         }
-    } else if !next(rows, layout, ledger, ahead, row)? {
-        return Ok(false);
+        let mut lookahead = std::mem::take(&mut self.lookahead);
+        let joined = self.join_next(rows, &mut lookahead, row);
+        self.lookahead = lookahead;
+        joined
     }
-    loop {
-        // Where the next row stands, if that was read before.
-        let stands = match ahead {
-            Some(read) if read.row.time_ns == row.time_ns => Some(read.place.clone()),
-            _ => None,
-        };
-        let read = next(rows, layout, ledger, ahead, &mut held.row);
-        if ledger.takes_place_of_first() {
-            if !matches!(read, Ok(true)) {
-                return read;
+
+    fn join_next<C: Cells>(
+        &mut self,
+        rows: &mut C,
+        lookahead: &mut Lookahead,
+        row: &mut Row,
+    ) -> Result<bool, FileError> {
+        if let Some(given) = lookahead.give(row) {
+            if !matches!(given, Ok(true)) {
+                return given;
             }
-            std::mem::swap(row, &mut held.row);
-            continue;
+        } else if !self.next(rows, row)? {
+            return Ok(false);
         }
-        if matches!(read, Ok(true)) && held.row.time_ns == row.time_ns {
-            let place = || stands.unwrap_or_else(|| rows.place());
-            match joined::join(&mut row.values, &held.row.values) {
-                Joined::More => ledger.report.joined += 1,
-                Joined::Nothing => {
-                    ledger.refuse_again(held.row.time_text.as_bytes(), place, Again::Nothing);
+        loop {
+            // Where the next row stands, if that was read before.
+            let stands = match &self.ahead {
+                Some(read) if read.row.time_ns == row.time_ns => Some(read.place.clone()),
+                _ => None,
+            };
+            let next = &mut lookahead.row;
+            let read = self.next(rows, next);
+            if !matches!(read, Ok(true)) || next.time_ns != row.time_ns || next.begins_segment {
+                lookahead.read = Some(read);
+                return Ok(true);
+            }
+            let why = match joined::join(&mut row.values, &next.values) {
+                Joined::More => {
+                    self.ledger.report.joined += 1;
+                    continue;
                 }
+                Joined::Nothing => Again::Nothing,
                 Joined::Contradicts(channel) => {
-                    let column = layout.channels[channel].column.clone();
-                    let other = Again::Other(column);
-                    ledger.refuse_again(held.row.time_text.as_bytes(), place, other);
+                    Again::Other(self.layout.channels[channel].column.clone())
                 }
+            };
+            let place = || stands.unwrap_or_else(|| rows.place());
+            let time = next.time_text.as_bytes();
+            self.ledger.refuse_again(time, place, why);
+        }
+    }
+
+    fn next<C: Cells>(&mut self, rows: &mut C, row: &mut Row) -> Result<bool, FileError> {
+        if let Some(ahead) = self.ahead.take() {
+            let follows = self.follows(&ahead.row);
+            if !self.ledger.refuses(follows) {
+                return self.next_doubted(rows, ahead, row);
             }
-            continue;
+            self.ledger.refuse(follows, &ahead.cell, || ahead.place);
         }
-        held.read = Some(read);
-        return Ok(true);
-    }
-}
-
-fn next<C: Cells>(
-    rows: &mut C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    ahead: &mut Option<Stamped>,
-    row: &mut Row,
-) -> Result<bool, FileError> {
-    if let Some(read_ahead) = ahead.take() {
-        let follows = ledger.follows(read_ahead.row.time_ns);
-        if !ledger.refuses(follows) {
-            return next_doubted(rows, layout, ledger, ahead, read_ahead, row);
-        }
-        ledger.refuse(follows, &read_ahead.cell, || read_ahead.place);
-    }
-    match read(rows, layout, ledger, row)? {
-        None => return Ok(false),
-        Some(Follows::Leaping) => {
-            let doubted = Stamped::new(row, rows);
-            return next_doubted(rows, layout, ledger, ahead, doubted, row);
-        }
-        Some(Follows::Again) => {}
-        Some(_) => {
-            ledger.take(row.time_ns, cell::trim(rows.time()));
-            ledger.doubt_first(|| rows.place());
-        }
-    }
-    Ok(true)
-}
-
-/// Gives a row of which the next tells whether it is taken, or else that one; false where none follows that tells it.
-#[cold]
-fn next_doubted<C: Cells>(
-    rows: &mut C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    ahead: &mut Option<Stamped>,
-    mut doubted: Stamped,
-    row: &mut Row,
-) -> Result<bool, FileError> {
-    while ledger.follows(doubted.row.time_ns) == Follows::Leaping {
-        let next = match read(rows, layout, ledger, row) {
-            Ok(Some(_)) => Stamped::new(row, rows),
-            Ok(None) if !ledger.knows_leaps() => break,
-            end => {
-                ledger.refuse_leap(&doubted.cell, doubted.place, None);
-                return end.map(|_| false);
+        match self.read(rows, row)? {
+            None => return Ok(false),
+            Some(Follows::Leaping) => {
+                let doubted = Stamped::new(row, rows);
+                return self.next_doubted(rows, doubted, row);
             }
-        };
-        if next.row.time_ns >= doubted.row.time_ns {
-            *ahead = Some(next);
-            break;
+            Some(Follows::Again) => {}
+            Some(_) => {
+                let cell = cell::trim(rows.time());
+                self.ledger.take(row.time_ns, cell, row.begins_segment);
+            }
         }
-        ledger.refuse_leap(&doubted.cell, doubted.place, Some(&next.cell));
-        doubted = next;
+        Ok(true)
     }
-    if ledger.follows(doubted.row.time_ns) != Follows::Again {
-        ledger.take(doubted.row.time_ns, &doubted.cell);
-    }
-    *row = doubted.row;
-    Ok(true)
-}
 
-/// Reads the next row that is after the last one taken, or where rows are put together at its time, and how it follows that; none at
-/// the end.
-fn read<C: Cells>(
-    rows: &mut C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    row: &mut Row,
-) -> Result<Option<Follows>, FileError> {
-    while rows.advance(ledger)? {
-        let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)? else {
-            continue;
-        };
-        let mut follows = ledger.follows(time_ns);
-        if ledger.refuses(follows) {
-            let cell = cell::trim(rows.time());
-            if !ledger.refuse_first(time_ns, cell) {
-                ledger.refuse(follows, cell, || rows.place());
+    /// How a row follows the last one that was taken; the first of a segment follows none.
+    fn follows(&self, row: &Row) -> Follows {
+        match row.begins_segment {
+            true => Follows::Next,
+            false => self.ledger.follows(row.time_ns),
+        }
+    }
+
+    /// Gives a row of which the next says whether it is taken, or else that one; false where none follows that says it.
+    #[cold]
+    fn next_doubted<C: Cells>(
+        &mut self,
+        rows: &mut C,
+        mut doubted: Stamped,
+        row: &mut Row,
+    ) -> Result<bool, FileError> {
+        while self.follows(&doubted.row) == Follows::Leaping {
+            let next = match self.read(rows, row) {
+                Ok(Some(_)) => Stamped::new(row, rows),
+                Ok(None) if !self.ledger.knows_leaps() => break,
+                end => {
+                    self.ledger.refuse_leap(&doubted.cell, doubted.place, None);
+                    return end.map(|_| false);
+                }
+            };
+            if next.row.time_ns >= doubted.row.time_ns || next.row.begins_segment {
+                self.ahead = Some(next);
+                break;
+            }
+            let cell = Some(&*next.cell);
+            self.ledger.refuse_leap(&doubted.cell, doubted.place, cell);
+            doubted = next;
+        }
+        if self.follows(&doubted.row) != Follows::Again {
+            let row = &doubted.row;
+            self.ledger
+                .take(row.time_ns, &doubted.cell, row.begins_segment);
+        }
+        *row = doubted.row;
+        Ok(true)
+    }
+
+    /// Reads the next row that is after the last one taken, or where rows are put together at its time, and how it follows that; none
+    /// at the end.
+    fn read<C: Cells>(
+        &mut self,
+        rows: &mut C,
+        row: &mut Row,
+    ) -> Result<Option<Follows>, FileError> {
+        while rows.advance(&mut self.ledger)? {
+            if let Some(long) = &mut self.long
+                && !long.takes(rows.channel(0))
+            {
                 continue;
             }
-            follows = Follows::Next;
+            let Some(time_ns) = self.read_time(rows, &mut row.time_text)? else {
+                continue;
+            };
+            row.time_ns = time_ns;
+            row.begins_segment = self.segment_cell.is_some_and(|at| {
+                let segment = cell::trim(rows.channel(at));
+                let changes = !segment.is_empty() && *segment != *self.segment;
+                let is_first = self.segment.is_empty();
+                if changes {
+                    self.segment = segment.to_vec();
+                }
+                changes && !is_first
+            });
+            let follows = self.follows(row);
+            if self.ledger.refuses(follows) {
+                let cell = cell::trim(rows.time());
+                if self.long.is_some() && follows == Follows::Behind {
+                    return Err(self.ledger.out_of_order(cell, rows.place()));
+                }
+                self.ledger.refuse(follows, cell, || rows.place());
+                continue;
+            }
+            self.read_values(rows, &mut row.values)?;
+            return Ok(Some(follows));
         }
-        row.time_ns = time_ns;
-        read_values(rows, layout, ledger, &mut row.values)?;
-        return Ok(Some(follows));
+        match &self.long {
+            Some(long) if self.ledger.on_first.is_none() => long.check(&self.layout, rows.place()),
+            _ => Ok(()),
+        }?;
+        Ok(None)
     }
-    Ok(None)
-}
 
-/// The instant of the current row, and its text; `None` when the row is left out for want of one.
-fn read_time<C: Cells>(
-    rows: &mut C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    text: &mut String,
-) -> Result<Option<i64>, FileError> {
-    let cell = cell::trim(rows.time());
-    text.clear();
-    let time = &layout.time;
-    let read = std::str::from_utf8(cell).ok().and_then(|cell| {
-        text.push_str(cell);
-        if rows.decimal_comma()
-            && let Some(comma) = cell::comma_of_time(cell.as_bytes())
+    /// The instant of the current row, and its text; `None` when the row is left out for want of one.
+    fn read_time<C: Cells>(
+        &mut self,
+        rows: &mut C,
+        text: &mut String,
+    ) -> Result<Option<i64>, FileError> {
+        let cell = cell::trim(rows.time());
+        text.clear();
+        let (time, ledger) = (&self.layout.time, &mut self.ledger);
+        let read = std::str::from_utf8(cell).ok().and_then(|cell| {
+            text.push_str(cell);
+            if self.commas.times
+                && let Some(comma) = cell::comma_of_time(cell.as_bytes())
+            {
+                text.replace_range(comma..=comma, ".");
+            }
+            time.read(text.as_bytes(), ledger.last())
+        });
+        let Some(Civil::At(at)) = read else {
+            if read.is_none() && rows.take_header(ledger)? {
+                return Ok(None);
+            }
+            ledger.refuse_row(|| no_instant(time, read, rows.place(), cell::trim(rows.time())))?;
+            return Ok(None);
+        };
+        if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
+            let report = &mut ledger.report;
+            if report.without_zone.is_none() && !zoned && time.zone.is_none() {
+                report.without_zone = Some(rows.place());
+            }
+        } else if self.commas.times
+            && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
         {
-            text.replace_range(comma..=comma, ".");
-        }
-        time.read(text.as_bytes(), ledger.last())
-    });
-    let Some(Civil::At(at)) = read else {
-        if read.is_none() && rows.take_header(ledger)? {
+            ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
             return Ok(None);
         }
-        ledger.refuse_row(|| no_instant(time, read, rows.place(), cell::trim(rows.time())))?;
-        return Ok(None);
-    };
-    if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
-        let report = &mut ledger.report;
-        if report.without_zone.is_none() && !zoned && time.zone.is_none() {
-            report.without_zone = Some(rows.place());
-        }
-    } else if rows.decimal_comma()
-        && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
-    {
-        ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
-        return Ok(None);
+        Ok(Some(at.as_ns()))
     }
-    Ok(Some(at.as_ns()))
+
+    fn read_values<C: Cells>(&mut self, rows: &C, values: &mut Vec<f64>) -> Result<(), FileError> {
+        values.clear();
+        let channels = self.layout.channels.len();
+        match self.long.take() {
+            None => {
+                for index in 0..channels {
+                    let value = self.read_value(rows, index, rows.channel(index))?;
+                    values.push(value);
+                }
+            }
+            Some(long) => {
+                values.resize(channels, f64::NAN);
+                let channels = long.channels().iter();
+                let read = channels.map(|&index| {
+                    values[index] = self.read_value(rows, index, rows.channel(1))?;
+                    Ok(())
+                });
+                let read = read.collect();
+                self.long = Some(long);
+                return read;
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn read_value<C: Cells>(
+        &mut self,
+        rows: &C,
+        index: usize,
+        cell: &[u8],
+    ) -> Result<f64, FileError> {
+        let (column, ledger) = (&self.layout.channels[index].column, &mut self.ledger);
+        match cell::value(cell, self.commas.values) {
+            Some(_)
+                if self.commas.values
+                    && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
+            {
+                ledger.bad_cell(index, || mixed(rows.place(), column, cell, mark))?;
+            }
+            Some(value) => return Ok(value),
+            None => ledger.bad_cell(index, || FileError::BadCell {
+                place: rows.place(),
+                column: column.clone(),
+                found: excerpt(cell::trim(cell)),
+            })?,
+        }
+        Ok(f64::NAN)
+    }
 }
 
 /// What is wrong with a time that is no instant, read as this.
@@ -400,40 +548,8 @@ fn no_instant(time: &TimeColumn, read: Option<Civil>, place: Place, cell: &[u8])
     }
 }
 
-fn read_values<C: Cells>(
-    rows: &C,
-    layout: &Layout,
-    ledger: &mut Ledger,
-    values: &mut Vec<f64>,
-) -> Result<(), FileError> {
-    values.clear();
-    for (index, channel) in layout.channels.iter().enumerate() {
-        let cell = rows.channel(index);
-        let value = match cell::value(cell, rows.decimal_comma()) {
-            Some(_)
-                if rows.decimal_comma()
-                    && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
-            {
-                ledger.bad_cell(index, || mixed(rows.place(), &channel.column, cell, mark))?;
-                f64::NAN
-            }
-            Some(value) => value,
-            None => {
-                ledger.bad_cell(index, || FileError::BadCell {
-                    place: rows.place(),
-                    column: channel.column.clone(),
-                    found: excerpt(cell::trim(cell)),
-                })?;
-                f64::NAN
-            }
-        };
-        values.push(value);
-    }
-    Ok(())
-}
-
 /// What is wrong with a number that has another decimal mark than those since that line.
-fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, u64)) -> FileError {
+fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, Option<u64>)) -> FileError {
     FileError::MixedMarks {
         place,
         column: column.to_owned(),

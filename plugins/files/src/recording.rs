@@ -31,7 +31,7 @@ pub struct Recording {
     options: Options,
     current: Option<(String, Reader)>,
     last_ns: Option<i64>,
-    /// The first row of a segment waits until the break has been told.
+    /// The first row of a segment, until the break before it was given.
     waiting: Option<Row>,
     reports: Vec<(String, Report)>,
     /// The first and last instants of the files that have been read, by their place among the reports.
@@ -97,7 +97,8 @@ impl Recording {
                 let first = reader.report().rows == 0;
                 if reader.next_into(row)? {
                     let apart = |last| self.options.segments || row.time_ns <= last;
-                    if first && self.last_ns.is_some_and(apart) {
+                    let of_file = first && self.last_ns.is_some_and(apart);
+                    if of_file || row.begins_segment {
                         self.waiting = Some(std::mem::take(row));
                         return Ok(Event::Segment);
                     }

@@ -6,25 +6,28 @@ use athermal_run::recording::{Event, Samples, Source, SourceError};
 
 use crate::{FileError, Reader, Row, Writer};
 
-/// Reads a row into the room that samples have.
-pub(crate) fn read_into<T>(
+/// What comes next, its row read into the room that samples have; none at the end.
+pub(crate) fn next_of(
     samples: &mut Samples,
-    read: impl FnOnce(&mut Row) -> Result<T, FileError>,
-) -> Result<(T, Instant), FileError> {
+    next: impl FnOnce(&mut Row) -> Result<crate::Event, FileError>,
+) -> Result<Option<Event>, FileError> {
     let mut row = Row {
-        time_ns: 0,
         time_text: std::mem::take(&mut samples.time_text),
         values: std::mem::take(&mut samples.values),
+        ..Row::default()
     };
-    let read = read(&mut row)?;
+    let event = next(&mut row)?;
     (samples.time_text, samples.values) = (row.time_text, row.values);
-    Ok((read, Instant::from_ns(row.time_ns)))
+    Ok(match event {
+        crate::Event::Row => Some(Event::Row(Instant::from_ns(row.time_ns))),
+        crate::Event::Segment => Some(Event::Segment),
+        crate::Event::End => None,
+    })
 }
 
 impl Source for Reader {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        let (more, time) = read_into(samples, |row| self.next_into(row))?;
-        Ok(more.then_some(Event::Row(time)))
+        Ok(next_of(samples, |row| self.next_event(row))?)
     }
 }
 

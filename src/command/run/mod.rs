@@ -25,8 +25,8 @@ use clap::Args;
 use serde_json::json;
 
 use crate::command::aside::check_apart;
-use crate::command::faults::{self, Looks, Purpose};
-use crate::command::model::{self, check_fitted, tell_unfitted};
+use crate::command::faults::{self, ChannelWatch, Purpose};
+use crate::command::model::{self, check_fitted, warn_unfitted};
 use crate::command::{beyond, data, refused, unread};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -86,7 +86,7 @@ impl Run {
         let (terminal, ends) = (*terminal, self.ends());
         let reports = Reports { terminal, ends };
         let (model, watched) = self.load(&terminal, state.as_ref())?;
-        tell_unfitted(&terminal, &model, &self.model);
+        warn_unfitted(&terminal, &model, &self.model);
         if let Some(words) = feedback::in_words(&model.plan) {
             terminal.warning(words);
         }
@@ -109,7 +109,7 @@ impl Run {
         let usual = model.sample_ranges().to_vec();
         let mut range = RangeMonitor::new(&read.sources, &usual);
         let mut sensors = SensorMonitor::new(&model.plan);
-        let mut looks = Looks::at(&model.plan);
+        let mut looks = ChannelWatch::at(&model.plan);
         let mut session = Session::begin(model, options, &reports)?;
         if ends {
             session.watch(&mut looks);
@@ -137,7 +137,7 @@ impl Run {
         let (plan, ranges) = (Arc::clone(engine.plan()), engine.sample_ranges());
         let (refused, rejected) = (engine.refused(), engine.rejected_channels());
         if ends {
-            faults::tell(&terminal, &looks.found(Purpose::Run));
+            faults::warn(&terminal, &looks.found(Purpose::Run));
         }
         if stop::is_stopped() {
             terminal.note("stopped: what had been read until then has been put out");
@@ -148,9 +148,9 @@ impl Run {
             self.input.display().to_string()
         };
         let files = [(input, reader.report().clone())];
-        data::tell(&terminal, &plan, &files, refused, &rejected);
+        data::warn(&terminal, &plan, &files, refused, &rejected);
         if ends {
-            beyond::tell(&terminal, &beyond::beyond(&usual, &ranges));
+            beyond::warn(&terminal, &beyond::beyond(&usual, &ranges));
         }
         // For people, only what is not in order.
         if terminal.events {
@@ -209,7 +209,7 @@ impl Run {
         let watched = WatchedGraph::of(&self.model);
         let given = model::load(&self.model, Wanted::default(), terminal);
         if let Ok(given) = &given {
-            unread::tell(terminal, &self.model, &given.graph);
+            unread::warn(terminal, &self.model, &given.graph);
         }
         let Some(last) = last else {
             let given = given?;
@@ -253,23 +253,22 @@ impl Run {
         let opened = Reader::open_through(&self.input, layout, options, stop::until_stopped);
         let mut reader = match opened {
             // Stopped before there was anything.
-            Err(FileError::Empty { .. }) if stop::is_stopped() => return Err(Failure::Told(0)),
+            Err(FileError::Empty { .. }) if stop::is_stopped() => return Err(Failure::Exit(0)),
             opened => opened?,
         };
         let terminal = *terminal;
-        reader.tell_first(move |first| {
+        reader.report_first(move |first| {
             let message = match first {
                 FileError::MissingColumns { .. } => {
                     let words = format_args!("{first} (missing until a line has it)");
                     refused::message(first, None, words)
                 }
-                FileError::TimeStaysBehind { .. }
-                | FileError::StaysUnreadable { .. }
-                | FileError::HeaderAgain { moved: true, .. } => {
+                FileError::StillRefused { .. } | FileError::HeaderAgain { moved: true, .. } => {
                     refused::message(first, None, first)
                 }
                 _ => {
-                    let words = format_args!("{}; others like it are counted", first.taken());
+                    let words =
+                        format_args!("{}; others like it are counted", first.without_advice());
                     refused::message(first, None, words)
                 }
             };

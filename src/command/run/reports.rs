@@ -9,7 +9,7 @@ use serde_json::json;
 use super::{sensor_words, swap_words};
 use crate::command::beyond;
 use crate::command::data::REJECTED;
-use crate::command::model::{few, tell_nodes_unfitted};
+use crate::command::model::{few, warn_nodes_unfitted};
 use crate::message::Message;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{count, counted, instant, length, number, seconds, time};
@@ -60,7 +60,7 @@ impl Reporter for Reports {
                 terminal.warning(Message::new(REJECTED, facts, words));
             }
             Report::OutsideFit { usual, time, value } => {
-                beyond::tell_first(terminal, usual, time, value);
+                beyond::warn_first(terminal, usual, time, value);
             }
             Report::Sensors { changes, at_s } => sensor_words::changes(terminal, changes, at_s),
             Report::Swap(notice) => swap_words::notice(terminal, notice),
@@ -71,7 +71,7 @@ impl Reporter for Reports {
                 few(nodes),
                 if nodes.len() == 1 { "keeps" } else { "keep" },
             )),
-            Report::Unfitted { path, nodes } => tell_nodes_unfitted(terminal, nodes, path),
+            Report::Unfitted { path, nodes } => warn_nodes_unfitted(terminal, nodes, path),
             Report::DoubtfulFits { path, nodes } => terminal.warning(format_args!(
                 "{}: {} {} as fitted before, though what they read is now made in another way: fit the graph anew to be sure",
                 path.display(),

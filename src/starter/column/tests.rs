@@ -3,7 +3,7 @@ use super::*;
 fn kinds(header: &'static str) -> Result<Vec<(String, Kind, String)>, String> {
     let described = Description::of_read("log", header.as_bytes(), None, 10).unwrap();
     let mut columns = columns(&described, &["time_s".to_owned()]);
-    assign(&mut columns, &Told::default())?;
+    assign(&mut columns, &Request::default())?;
     Ok(columns
         .into_iter()
         .map(|column| (column.name, column.kind, column.unit))
@@ -101,9 +101,9 @@ fn inches_and_units_behind_a_slash_are_read_where_nothing_else_can_be_meant() {
 #[test]
 fn units_in_a_row_below_the_names_are_those_of_the_columns() {
     let found = kinds("time_s;Plate;Z;Load;Gap_mm\n;°C;nm;%;µm\n0;1;2;3;4\n").unwrap();
-    let told = found.iter().map(|(_, kind, unit)| (*kind, &**unit));
+    let request = found.iter().map(|(_, kind, unit)| (*kind, &**unit));
     assert_eq!(
-        told.collect::<Vec<_>>(),
+        request.collect::<Vec<_>>(),
         [
             (Kind::Temperature, "Cel"),
             (Kind::Drifting, "nm"),
@@ -187,13 +187,13 @@ fn what_is_in_the_air_drifts_where_nothing_else_does() {
 
 #[test]
 fn columns_that_are_said_to_drift_together_must_be_one_quantity() {
-    let told = Told {
+    let request = Request {
         drifting: vec!["a_pct".to_owned(), "b".to_owned()],
-        ..Told::default()
+        ..Request::default()
     };
     let described = Description::of_read("log", &b"time_s,r_degC,a_pct,b\n"[..], None, 10);
     let mut columns = columns(&described.unwrap(), &["time_s".to_owned()]);
-    let refused = assign(&mut columns, &told).unwrap_err();
+    let refused = assign(&mut columns, &request).unwrap_err();
     assert_eq!(
         refused,
         "`a_pct` and `b` are different quantities (`a_pct` is in %; what unit `b` is in, its name does not say); write a graph \

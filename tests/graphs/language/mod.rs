@@ -10,7 +10,6 @@ mod encoders;
 mod fitting;
 mod kinds;
 mod lags;
-mod leaks;
 mod parameters;
 mod samples;
 mod segments;

@@ -17,6 +17,7 @@ pub mod residual;
 pub mod response;
 mod rest;
 pub mod sensor;
+pub mod watch;
 pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
@@ -54,7 +55,7 @@ pub struct Diagnosis {
     pub designs: Vec<regressor::Design>,
     /// What each sensor contributes.
     pub contributions: Vec<sensor::Contribution>,
-    /// What could not be told of sensors, and which node gave nothing.
+    /// What could not be found of sensors, and which node gave nothing.
     pub untold: Vec<Untold>,
     /// Combiners that went by fewer truths than they take, whichever predictions are asked for.
     pub lacks: Vec<Lack>,
@@ -113,7 +114,7 @@ impl Diagnosis {
     }
 }
 
-/// Diagnoses a model on a recording. `progress` is told how many fits of how many are done.
+/// Diagnoses a model on a recording. `progress` gets the number of fits done, and of all.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.

@@ -1,4 +1,4 @@
-//! Decides what is told of a measured channel: gaps, leaps, rejected samples, noise, samples where the fit saw none, and what a `health`
+//! The facts about a measured channel: gaps, leaps, rejected samples, noise, samples outside those of the fit, and what a `health`
 //! node found.
 
 use std::collections::BTreeMap;

@@ -36,8 +36,7 @@ impl Panics {
                 );
                 resume_unwind(panic);
             }
-            let said = said(&*panic).to_owned();
-            KindFault::Panics { said }
+            KindFault::panics(said(&*panic))
         })
     }
 }

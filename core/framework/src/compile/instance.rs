@@ -7,13 +7,13 @@ use std::sync::Arc;
 use super::guard::Panics;
 use super::keys::EstimatorKeys;
 use super::misplaced::{INPUTS, misplaced};
-use super::problem::CompileProblem;
+use super::problem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
     Data, Decoded, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value,
     decode_rest,
 };
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -111,7 +111,7 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
             .iter()
             .filter_map(|mistake| Some((mistake.code, mistake.place?)))
             .filter(|(code, place)| {
-                faulty.open.contains(place) || diagnostics.is_told(code, *place)
+                faulty.open.contains(place) || diagnostics.is_known(code, *place)
             })
             .collect();
         diagnostics.extend_where(own, |mistake| {
@@ -129,7 +129,7 @@ fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'sta
             let Some((of, name, packages)) = taken_twice(kind.package) else {
                 return Some(*kind);
             };
-            let problem = CompileProblem::WrittenTwice {
+            let problem = problem::WrittenTwice {
                 kind: kind.name.to_owned(),
                 of,
                 name,
@@ -140,10 +140,10 @@ fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'sta
         Some(several) => {
             let packages = several.iter().map(|kind| kind.package).collect();
             let kind = name.to_owned();
-            diagnostics.report(place, CompileProblem::KindTwice { kind, packages });
+            diagnostics.report(place, problem::KindTwice { kind, packages });
         }
         None => {
-            let problem = CompileProblem::UnknownKind {
+            let problem = problem::UnknownKind {
                 kind: name.to_owned(),
                 known: kinds().keys().copied().collect(),
             };
@@ -191,6 +191,17 @@ fn read_instance(
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
         let read = panics.caught(kind, &context, || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
+            if spec.as_whole().is_some() {
+                let wrong = out_of_range((kind.schema)(), &parameters);
+                let sound = wrong.is_empty();
+                for (place, message) in wrong {
+                    let help = None;
+                    diagnostics.report(place, problem::Parameter { message, help });
+                }
+                if !sound {
+                    return None;
+                }
+            }
             let spec = spec.map(Arc::<dyn NodeSpec>::from);
             let closes_loops = spec.as_whole().is_some_and(|spec| match spec.role() {
                 Role::Feature(feature) => feature.closes_loops(),
@@ -199,7 +210,7 @@ fn read_instance(
             Some((spec, closes_loops))
         });
         let read = read.unwrap_or_else(|fault| {
-            diagnostics.report(node.place, CompileProblem::of_kind(kind, fault));
+            diagnostics.report(node.place, problem::FaultyKind::new(kind, fault));
             None
         });
         let (spec, closes_loops) = read.filter(|_| is_whole).unzip();
@@ -314,8 +325,7 @@ impl Declared<'_> {
             Some(("inputs", port)) => (self.kind.inputs)().iter().any(|own| own.name == port),
             way => {
                 let first = way.map_or(at, |(first, _)| first);
-                let schema = serde_json::Value::from((self.kind.schema)());
-                !schema["properties"][first].is_null()
+                !(self.kind.schema)()["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
         }

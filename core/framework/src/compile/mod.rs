@@ -20,7 +20,7 @@ mod order;
 pub mod origins;
 mod plan;
 mod port_channels;
-mod problem;
+pub mod problem;
 mod provenance;
 mod reference;
 mod resolver;
@@ -41,7 +41,6 @@ pub use plan::{
 };
 pub use plan::{Rows, admits};
 pub use port_channels::PortChannels;
-pub use problem::CompileProblem;
 pub use provenance::persistence_lag;
 pub use reference::Reference;
 pub use scope::outermost;

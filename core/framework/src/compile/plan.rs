@@ -7,7 +7,7 @@ use super::persistence_lag;
 use super::provenance::smallest_lag;
 use super::slot_set::SlotSet;
 use crate::channel::Channel;
-use crate::document::TimeBase;
+use crate::document::{TableBase, TimeBase};
 use crate::node::{Inputs, Kind, LearningLimits, NodeSpec, Predictor, Read, Regressor, Role};
 use crate::quantity::Quantity;
 use crate::time::Duration;
@@ -19,6 +19,8 @@ pub struct Plan {
     pub name: Option<String>,
     /// How tabular sources give time.
     pub time: TimeBase,
+    /// How tabular sources lay out their text.
+    pub table: TableBase,
     /// The measured channels; the first slots, in this order.
     pub sources: Vec<SourceChannel>,
     /// Every slot, by number.

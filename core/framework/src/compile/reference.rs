@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::problem::CompileProblem;
+use super::problem;
+use crate::diagnostic::Problem;
 
 /// A reference, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,21 +51,21 @@ impl<'a> Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    /// What is told where the node has no such port; none are known of a signal.
-    pub fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
+    /// The mistake where the node has no such port; none are known of a signal.
+    pub fn no_port(&self, known: Vec<&'static str>) -> Box<dyn Problem> {
         let node = self.node.to_owned();
         match self.port {
-            Some("") => CompileProblem::EmptyPort {
+            Some("") => Box::new(problem::EmptyPort {
                 node,
                 channel: self.channel.map(str::to_owned),
                 known,
-            },
+            }),
             // A node of which something could not be read may have no port that could be meant.
-            port => CompileProblem::UnknownPort {
+            port => Box::new(problem::UnknownPort {
                 node,
                 port: port.unwrap_or_default().to_owned(),
                 known,
-            },
+            }),
         }
     }
 
@@ -95,20 +96,6 @@ pub(crate) fn is_pattern(text: &str) -> bool {
     text.contains(['*', '?', '{'])
 }
 
-/// A pattern of channel names: `*` is any text, `?` one character and `{a,b}` a choice.
-pub(crate) struct Pattern(Vec<String>);
-
-impl Pattern {
-    pub(crate) fn new(text: &str) -> Self {
-        Self(choices(text))
-    }
-
-    /// Whether a channel name matches it.
-    pub(crate) fn matches(&self, name: &str) -> bool {
-        self.0.iter().any(|choice| glob(choice, name))
-    }
-}
-
 /// For each alternative of a choice the pattern with that alternative in its place.
 pub(crate) fn alternatives(pattern: &str) -> impl Iterator<Item = String> + '_ {
     let starts = pattern.match_indices('{').map(|(start, _)| start);
@@ -119,57 +106,10 @@ pub(crate) fn alternatives(pattern: &str) -> impl Iterator<Item = String> + '_ {
     })
 }
 
-/// The patterns without choices that a pattern stands for. The number is bounded; beyond it the text is taken as it is.
-fn choices(pattern: &str) -> Vec<String> {
-    const MOST: usize = 4096;
-    let mut done = Vec::new();
-    let mut open = vec![pattern.to_owned()];
-    while let Some(text) = open.pop() {
-        let group = text
-            .find('{')
-            .and_then(|start| text[start..].find('}').map(|len| (start, start + len)));
-        match group {
-            Some((start, end)) if done.len() + open.len() < MOST => {
-                for choice in text[start + 1..end].split(',').rev() {
-                    open.push(format!("{}{}{}", &text[..start], choice, &text[end + 1..]));
-                }
-            }
-            _ => done.push(text),
-        }
-    }
-    done
-}
-
-/// Matching with backtracking to the last star only, which is enough and takes at most pattern × name steps.
-fn glob(pattern: &str, name: &str) -> bool {
-    let (mut pattern, mut name) = (pattern.chars(), name.chars());
-    // What follows the last star, and where in the name it was looked for last.
-    let mut star = None;
-    loop {
-        let (mut after, mut rest) = (pattern.clone(), name.clone());
-        let Some(letter) = rest.next() else {
-            return pattern.all(|wanted| wanted == '*');
-        };
-        match after.next() {
-            Some('*') => {
-                star = Some((after.clone(), name.clone()));
-                pattern = after;
-            }
-            Some(wanted) if wanted == '?' || wanted == letter => (pattern, name) = (after, rest),
-            _ => {
-                let Some((begin, from)) = &mut star else {
-                    return false;
-                };
-                from.next();
-                (pattern, name) = (begin.clone(), from.clone());
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::document::Pattern;
 
     fn matches(pattern: &str, name: &str) -> bool {
         Pattern::new(pattern).matches(name)

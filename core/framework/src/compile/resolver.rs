@@ -13,7 +13,7 @@ use super::order::Order;
 use super::plan::{
     Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, TruthLink,
 };
-use super::problem::CompileProblem;
+use super::problem;
 use super::provenance::Provenance;
 use super::scope::Scopes;
 use super::slot_set::SlotSet;
@@ -220,7 +220,7 @@ impl<'g> Resolver<'g> {
         let done = self.panics.caught(kind, context, || work(self));
         done.unwrap_or_else(|fault| {
             self.diagnostics
-                .report(place, CompileProblem::of_kind(kind, fault));
+                .report(place, problem::FaultyKind::new(kind, fault));
             None
         })
     }
@@ -233,7 +233,7 @@ impl<'g> Resolver<'g> {
     ) -> Option<()> {
         let mut sound = Some(());
         for fault in faults {
-            let problem = CompileProblem::of_kind(instance.kind, fault);
+            let problem = problem::FaultyKind::new(instance.kind, fault);
             self.diagnostics.report(instance.node.place, problem);
             sound = None;
         }
@@ -243,7 +243,7 @@ impl<'g> Resolver<'g> {
     pub(crate) fn mistakes(&mut self, instance: &Declared<'_>, mistakes: Vec<Mistake>) {
         for mistake in mistakes {
             let place = instance.place_of(&mistake);
-            let problem = CompileProblem::Parameter {
+            let problem = problem::Parameter {
                 message: mistake.message,
                 help: mistake.help,
             };
@@ -255,7 +255,7 @@ impl<'g> Resolver<'g> {
     pub(crate) fn doubts(&mut self, instance: &Instance<'_>, doubts: Vec<Mistake>) {
         for doubt in doubts {
             let place = instance.place_of(&doubt);
-            let problem = CompileProblem::Doubt {
+            let problem = problem::Doubt {
                 message: doubt.message,
                 help: doubt.help,
             };
@@ -326,7 +326,7 @@ impl<'g> Resolver<'g> {
                     .insert(outward.clone(), slot)
                     .is_some()
                 {
-                    let problem = CompileProblem::DuplicateName {
+                    let problem = problem::DuplicateName {
                         name: outward,
                         what: "output channels",
                     };
@@ -411,7 +411,7 @@ impl<'g> Resolver<'g> {
                         let per_second = unit.difference().per(&Unit::second());
                         let is_rate = rate.in_unit(&per_second).is_some_and(|rate| rate > 0.0);
                         if std::mem::replace(&mut blends, is_rate) && !is_rate {
-                            let problem = CompileProblem::Blend {
+                            let problem = problem::Blend {
                                 output: name.clone(),
                                 found: rate.clone(),
                                 expected: per_second,
@@ -428,7 +428,7 @@ impl<'g> Resolver<'g> {
                 if let [first, more @ ..] = &taken[..] {
                     let node = text.split(['.', ':']).next().unwrap_or_default();
                     let is_free = graph.outputs.iter().all(|other| other.name != node);
-                    let problem = CompileProblem::DuplicateColumns {
+                    let problem = problem::DuplicateColumns {
                         first: first.clone(),
                         more: more.len(),
                         alone: is_free.then(|| format!("{node} = \"{text}\"")),
@@ -444,6 +444,7 @@ impl<'g> Resolver<'g> {
         let mut plan = Plan {
             name: self.graph.name.clone(),
             time: self.graph.time.clone(),
+            table: self.graph.table.clone(),
             sources: self.sources,
             channels: self.channels,
             gathers: self.gathers.into_iter().collect(),

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use indexmap::{IndexMap, IndexSet};
 
 use super::port_channels::PortChannels;
-use super::problem::CompileProblem;
+use super::problem;
 use super::reference::Reference;
-use crate::diagnostic::Names;
+use crate::diagnostic::{Names, Problem};
 
 /// What the names of a graph stand for, as far as it is known.
 #[derive(Debug, Default)]
@@ -90,7 +90,7 @@ impl Scopes {
         self.known.get_or_init(|| outermost(self.shown()))
     }
 
-    pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
+    pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<dyn Problem>> {
         let reference = Reference::parse(text);
         if reference.is_member() {
             // Such a reference was made from one that named a node.
@@ -106,11 +106,11 @@ impl Scopes {
                 return Ok(Found::Broken);
             }
             if self.removed.iter().any(|removed| removed == outer) {
-                return Err(Box::new(CompileProblem::RemovedNode {
+                return Err(Box::new(problem::RemovedNode {
                     node: outer.to_owned(),
                 }));
             }
-            return Err(Box::new(CompileProblem::UnknownNode {
+            return Err(Box::new(problem::UnknownNode {
                 node: reference.node.to_owned(),
                 known: Arc::clone(self.known()),
             }));
@@ -127,7 +127,7 @@ impl Scopes {
         let Some(channels) = named else {
             let ports = scope.ports.keys().copied();
             let ports = ports.filter(|port| !port.is_empty());
-            return Err(Box::new(reference.no_port(ports.collect())));
+            return Err(reference.no_port(ports.collect()));
         };
         Ok(Found::Slots(channels.find(&reference)?))
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::Wanted;
 use super::column_unit;
 use super::plan::{Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHTS};
-use super::problem::CompileProblem;
+use super::problem;
 use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
@@ -139,7 +139,7 @@ pub(super) fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
 /// Tells of outputs that nothing flows into, and of nodes and signals that flow into no output.
 pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics) {
     if plan.outputs.is_empty() {
-        diagnostics.report(graph.tree.place, CompileProblem::NoOutputs);
+        diagnostics.report(graph.tree.place, problem::NoOutputs {});
         return;
     }
     let fed = fed(plan);
@@ -151,7 +151,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     }
     for output in &graph.outputs {
         if let Some(column) = dry.remove(&output.name) {
-            let problem = CompileProblem::Unreachable { output: column };
+            let problem = problem::Unreachable { output: column };
             diagnostics.report(output.place, problem);
         }
     }
@@ -170,7 +170,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         if !node.instances.is_empty() {
             diagnostics.report(
                 node.place,
-                CompileProblem::UnusedNode {
+                problem::UnusedNode {
                     node: node.name.clone(),
                     inherited: node.place.source != graph.tree.place.source,
                 },
@@ -183,7 +183,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         .collect();
     for signal in &graph.signals {
         if let Some(named) = column_unit::other_than(&signal.unit, &signal.column) {
-            let problem = CompileProblem::ColumnUnit {
+            let problem = problem::ColumnUnit {
                 signal: signal.name.clone(),
                 column: signal.column.clone(),
                 named,
@@ -194,7 +194,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         if !used_signals.contains(&signal.name) {
             diagnostics.report(
                 signal.place,
-                CompileProblem::UnusedSignal {
+                problem::UnusedSignal {
                     signal: signal.name.clone(),
                 },
             );

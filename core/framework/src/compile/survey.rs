@@ -4,7 +4,7 @@ use super::feature::outputs_of;
 use super::inputs::{COUNTS_ONCE, meant_input};
 use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
-use super::problem::CompileProblem;
+use super::problem;
 use super::resolver::Resolver;
 use crate::document::{InstanceDecl, LeftOut, NodeDecl};
 use crate::node::{InputPort, Kind, Mistake, Read, Role, RoleName};
@@ -175,7 +175,7 @@ impl Resolver<'_> {
         }
         if read.ahead.is_none() && is_sure("ahead") {
             let kind = declared.kind.name;
-            let problem = CompileProblem::NoHorizon { kind };
+            let problem = problem::NoHorizon { kind };
             self.diagnostics.report(declared.node.place, problem);
         }
     }
@@ -190,7 +190,7 @@ impl Resolver<'_> {
             .iter()
             .filter(|input| strange(&input.port))
         {
-            let problem = CompileProblem::UnknownInput {
+            let problem = problem::UnknownInput {
                 kind: declared.kind.name,
                 input: input.port.clone(),
                 meant: meant_input(declared, &input.port),

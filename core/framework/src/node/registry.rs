@@ -85,8 +85,8 @@ pub struct Kind {
     /// Reads its parameters, telling every mistake in them; after one, what could be read beside it. The keys are those of the node
     /// that are read elsewhere.
     pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
-    /// The JSON Schema of its parameters, with the documentation.
-    pub schema: fn() -> schemars::Schema,
+    /// The JSON Schema of its parameters, with the documentation and the ranges that the compiler checks.
+    pub schema: fn() -> &'static serde_json::Value,
 }
 
 impl Kind {
@@ -143,11 +143,8 @@ impl Kind {
     /// The documentation of the parameters' struct.
     #[must_use]
     pub fn documentation(&self) -> String {
-        (self.schema)()
-            .get("description")
-            .and_then(|text| text.as_str())
-            .unwrap_or_default()
-            .to_owned()
+        let text = (self.schema)()["description"].as_str();
+        text.unwrap_or_default().to_owned()
     }
 }
 
@@ -216,7 +213,8 @@ pub fn inline_toml(value: &serde_json::Value) -> String {
     as_toml(value).map_or_else(String::new, |value| value.to_string())
 }
 
-/// Data as TOML has it, where nothing is not written.
+/// Data as TOML has it, without its nulls.
+#[must_use]
 pub fn as_toml(json: &serde_json::Value) -> Option<toml::Value> {
     Some(match json {
         serde_json::Value::Null => return None,
@@ -301,7 +299,11 @@ macro_rules! register {
                 inputs: <$spec as $crate::node::$role>::inputs,
                 ports: $ports,
                 read: $crate::__private::read::<$spec>,
-                schema: || $crate::__private::schemars::schema_for!($spec),
+                schema: || {
+                    use $crate::__private::{schemars::schema_for, serde_json::Value};
+                    static SCHEMA: std::sync::OnceLock<Value> = std::sync::OnceLock::new();
+                    SCHEMA.get_or_init(|| schema_for!($spec).into())
+                },
             }
         }
     };

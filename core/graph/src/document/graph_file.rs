@@ -4,6 +4,7 @@ use std::fmt;
 
 use indexmap::IndexMap;
 
+use super::declare::TableBase;
 use super::tree::Value;
 use crate::diagnostic::Place;
 use crate::quantity::Quantity;
@@ -21,6 +22,8 @@ pub struct GraphFile {
     pub sets: IndexMap<String, Vec<String>>,
     /// How tabular sources give time.
     pub time: TimeBase,
+    /// How tabular sources lay out their text.
+    pub table: TableBase,
     /// What is measured, in the order of the file.
     pub signals: Vec<SignalDecl>,
     /// The nodes, in the order of the file.

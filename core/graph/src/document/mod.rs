@@ -10,7 +10,8 @@ mod graph_file;
 mod json;
 mod lacks;
 mod merge;
-mod problem;
+mod pattern;
+pub mod problem;
 mod read;
 mod salvage;
 mod slip;
@@ -20,6 +21,7 @@ mod tree;
 pub use declare::declare;
 #[cfg(feature = "testkit")]
 pub use declare::is_name;
+pub use declare::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use declare::{TIME_UNITS, is_misspelt, known_keys};
 pub use decode::{Decoded, decode};
 pub use decode::{LeftOut, Wanted, decode_part, decode_rest};
@@ -28,6 +30,7 @@ pub use graph_file::{
 };
 pub use json::JsonError;
 pub use lacks::Lacks;
+pub use pattern::Pattern;
 pub use problem::DocumentProblem;
 pub use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};

@@ -1,5 +1,7 @@
 //! Every mistake that reading a graph file can find, with the data of its text; where it stands is told by who reports it.
 
+mod codes;
+pub use codes::A043;
 mod told;
 
 use std::sync::Arc;

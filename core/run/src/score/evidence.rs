@@ -29,7 +29,7 @@ pub struct Lack {
 impl Lack {
     /// A sentence for each; for members of a node of which the same is to be told, one.
     #[must_use]
-    pub fn told(lacks: &[Self]) -> Vec<String> {
+    pub fn warnings(lacks: &[Self]) -> Vec<String> {
         let mut groups: Vec<(&Self, usize)> = Vec::new();
         for lack in lacks {
             match groups.iter_mut().find(|(told, _)| told.is_like(lack)) {

@@ -325,12 +325,12 @@ fn lengths_of_time_that_are_none_are_the_authors_mistake() {
     );
     told(
         &estimator("hurried"),
-        "guess` wants to be told of truths every 0s",
+        "guess` wants to learn of truths every 0s",
         "`every` above 0, or none",
     );
     told(
         &feature("negative_memory"),
-        "faulty` says that its inputs reach back -1s",
+        "faulty` declares that its inputs reach back -1s",
         "`memory` is 0 or more",
     );
     told(

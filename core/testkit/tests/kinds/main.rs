@@ -4,6 +4,5 @@
 
 mod faulty_kinds;
 mod misuse;
-mod names;
 mod panics;
 mod sabotage;

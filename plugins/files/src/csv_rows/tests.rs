@@ -1,5 +1,7 @@
-mod behind;
+mod declared;
 mod lines;
+
+use athermal_core::document::{Pattern, Separator, TableBase, TableFormat};
 
 use crate::{FileError, Layout, Options, Reader, Row, TimeForm};
 
@@ -22,6 +24,32 @@ fn read_with(text: &str, options: Options) -> (String, Reader) {
         told.push(format!("{} {:?}", row.time_text, row.values));
     }
     (told.join("; "), reader)
+}
+
+/// The rows of a text whose layout is declared, or the message of the error.
+fn declared_read(base: TableFormat, text: &str) -> String {
+    let layout = Layout {
+        table: TableBase {
+            base,
+            ..TableBase::default()
+        },
+        ..Layout::new("t", TimeForm::SECONDS, ["a", "b"])
+    };
+    let text = std::io::Cursor::new(text.as_bytes().to_vec());
+    let mut rows = Vec::new();
+    let mut row = Row::default();
+    let read = || {
+        let mut reader = Reader::from_read("f.csv", text, layout, Options::default())?;
+        while reader.next_into(&mut row)? {
+            let begins = if row.begins_segment { "| " } else { "" };
+            rows.push(format!("{begins}{} {:?}", row.time_text, row.values));
+        }
+        Ok(())
+    };
+    match read() {
+        Ok(()) => rows.join("; "),
+        Err::<(), FileError>(error) => error.to_string(),
+    }
 }
 
 fn read(text: &str) -> String {
@@ -62,12 +90,12 @@ fn every_delimiter_is_recognised() {
 }
 
 #[test]
-fn a_stated_delimiter_is_taken() {
-    let options = Options {
-        delimiter: Some(b'/'),
-        ..Options::default()
+fn a_declared_separator_is_taken() {
+    let declared = TableFormat {
+        separator: Some(Separator(b'/')),
+        ..TableFormat::default()
     };
-    assert_eq!(read_with("t/a/b\n0/1/2.5\n", options).0, "0 [1.0, 2.5]");
+    assert_eq!(declared_read(declared, "t/a/b\n0/1/2.5\n"), "0 [1.0, 2.5]");
 }
 
 #[test]
@@ -86,7 +114,7 @@ fn a_file_has_one_decimal_mark() {
     let mixed = "t;a;b\n0;1,5;2\n1;1;1.234\n2;7;2,5\n";
     assert_eq!(
         error(mixed),
-        "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark and none between thousands, or read leniently (`--lenient`) to leave out those with another"
+        "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
     );
     let (rows, reader) = read_with(mixed, lenient());
     assert_eq!(rows, "0 [1.5, 2.0]; 1 [1.0, NaN]; 2 [7.0, 2.5]");
@@ -278,7 +306,7 @@ fn a_header_that_says_the_same_again_is_left_out_and_told_once_and_each_that_doe
     let text = "t,a,b\nt,a,b\n0,1,2.5\nt,a,b\n1,3,\nt,b,a\n2,5,6\nt,b,a\nt,a,b\n3,7,8\n";
     let mut reader = reader(text, Options::default()).unwrap();
     let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
-    reader.tell_first({
+    reader.report_first({
         let told = told.clone();
         move |error| told.lock().unwrap().push(error.to_string())
     });
@@ -347,26 +375,23 @@ fn a_header_within_the_log_that_cannot_be_used_is_an_error_or_left_out_and_the_c
 
 #[test]
 fn a_header_that_was_cut_off_within_the_log_is_an_error_or_left_out_and_the_columns_stay() {
-    for (header, cells) in [("t", 1), ("t,a", 2), ("t,b", 2)] {
+    for header in ["t", "t,a", "t,b"] {
         let text = format!("t,a,b\n0,1,2.5\n{header}\n1,3,\n");
         assert!(error(&text).starts_with("f.csv:3: there "));
         let (rows, reader) = read_with(&text, lenient());
         assert_eq!(rows, TWO_ROWS, "{header}");
         let refused = &reader.report().refused_rows;
         assert_eq!((refused.count, headers(&reader).0), (1, 0));
-        let told = format!("f.csv:3: {cells} cells where the header has 3");
+        let told = "f.csv:3: there ";
         assert!(
             refused
                 .first
                 .as_ref()
                 .unwrap()
                 .to_string()
-                .starts_with(&told)
+                .starts_with(told)
         );
     }
-    let shorter = "t,a,b\n0,1,2.5\nt,a\n1,3\n";
-    let (rows, reader) = read_with(shorter, lenient());
-    assert_eq!((&*rows, headers(&reader).0), (TWO_ROWS, 1));
 }
 
 #[test]

@@ -18,15 +18,6 @@ fn messages_say_what_where_and_what_to_do() {
         bad.to_string(),
         "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
     );
-    let thousands = FileError::BadCell {
-        place: place(),
-        column: "room".into(),
-        found: "1.004,5".into(),
-    };
-    assert_eq!(
-        thousands.to_string(),
-        "run.csv:12: column `room`: expected a number, found `1.004,5`; write numbers without a point between thousands, or read leniently (`--lenient`) to take such as absent"
-    );
     let time = FileError::BadTime {
         place: place(),
         column: "time_s".into(),
@@ -108,7 +99,7 @@ fn all_missing_columns_stand_in_one_message() {
             place: place(),
             missing: missing.iter().map(column).collect(),
             found: vec!["time_s".into(), "room".into()],
-            windows_1252: false,
+            note: "",
         };
         error.to_string()
     };
@@ -171,7 +162,7 @@ fn a_log_without_its_header_is_told_to_have_lost_it() {
         found: ["2026-03-01T00:00:00Z", "21.5", "", "-0.3"]
             .map(str::to_owned)
             .to_vec(),
-        windows_1252: false,
+        note: "",
     };
     assert_eq!(
         missing.to_string(),

@@ -181,7 +181,7 @@ fn keys_that_the_first_object_lacks_are_told_at_once_where_that_is_asked_for() {
     let text = &b"{\"t\":0,\"a\":1,\"bb\":1}\n{\"t\":1}\n{\"t\":2,\"b\":1}\n"[..];
     let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
     let told = Arc::new(Mutex::new(Vec::new()));
-    reader.tell_first({
+    reader.report_first({
         let told = Arc::clone(&told);
         move |first| told.lock().unwrap().push(first.to_string())
     });

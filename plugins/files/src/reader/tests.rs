@@ -124,50 +124,6 @@ fn rows_of_one_time_are_one_behind_a_gap_and_behind_a_wrong_time_too() {
 }
 
 #[test]
-fn a_first_time_far_ahead_is_left_out_of_a_file_and_the_rows_after_it_are_not() {
-    let told = |report: &crate::Report| {
-        let refused = &report.refused_time;
-        (refused.count, refused.first.as_ref().unwrap().to_string())
-    };
-    let wrong = "f.csv:2: the time `99999` is far after the next one, `0`; the row was left out";
-    for (text, rows) in [
-        (
-            "t,a,b\n99999,1,\n0,2,\n10,,3\n20,4,5\n",
-            "0=2,NaN 10=NaN,3 20=4,5",
-        ),
-        ("t,a,b\n99999,1,\n0,2,\n0,,3\n20,4,5\n", "0=2,3 20=4,5"),
-        ("t,a,b\n99999,1,\n99999,,2\n0,2,\n", "0=2,NaN"),
-    ] {
-        let (given, report, _) = joined(text);
-        assert_eq!(given, rows);
-        assert_eq!(told(&report), (1, wrong.to_owned()));
-        assert_eq!(report.rows, rows.split(' ').count() as u64);
-    }
-    let (given, report, error) = joined("t,a,b\n99999,1,\n0,off,\n10,,3\n");
-    assert_eq!((&*given, report.refused_time.count), ("10=NaN,3", 1));
-    assert!(error.unwrap().starts_with("f.csv:3: column `a`"));
-    // The second is the one that is wrong.
-    let (given, report, _) = joined("t,a,b\n0,1,\n99999,2,\n10,,3\n");
-    assert_eq!(
-        (&*given, report.refused_time.count),
-        ("0=1,NaN 10=NaN,3", 1)
-    );
-    // Two that changed places, rows the newest first, and a second row that is wrong are told as before.
-    let (given, report, _) = joined("t,a,b\n20,1,\n10,2,\n30,,3\n");
-    assert_eq!(
-        (&*given, report.refused_time.count),
-        ("20=1,NaN 30=NaN,3", 1)
-    );
-    let (given, report, _) = joined("t,a,b\n3000,1,\n2000,2,\n1000,,3\n0,,3\n");
-    assert_eq!((&*given, report.refused_time.count), ("2000=2,NaN", 3));
-    let (given, report, _) = joined("t,a,b\n0,1,\n10,2,\n-1000,,3\n20,,3\n");
-    assert_eq!(
-        (&*given, report.refused_time.count),
-        ("0=1,NaN 10=2,NaN 20=NaN,3", 1)
-    );
-}
-
-#[test]
 fn the_row_before_an_error_is_given_first_where_rows_are_put_together() {
     let (given, _, error) = joined("t,a,b\n0,1,\n0,,off\n10,2,\n");
     assert_eq!(given, "0=1,NaN 10=2,NaN");
@@ -277,7 +233,7 @@ fn the_first_cell_of_each_channel_that_cannot_be_read_is_told_at_once() {
     let text = &b"t,a,b\n0,ERR,1\n1,ERR,1\n2,ERR,FAIL\n3,ERR,FAIL\n"[..];
     let mut reader = Reader::from_read("pipe", text, layout, lenient()).unwrap();
     let told = Arc::new(std::sync::Mutex::new(Vec::new()));
-    reader.tell_first({
+    reader.report_first({
         let told = Arc::clone(&told);
         move |error| told.lock().unwrap().push(error.to_string())
     });
@@ -342,7 +298,7 @@ fn a_row_is_given_as_soon_as_its_line_is_there() {
 fn given(text: &'static str) -> (String, Vec<String>, String) {
     let mut reader = open(text, Options::default());
     let told = Arc::new(std::sync::Mutex::new(Vec::new()));
-    reader.tell_first({
+    reader.report_first({
         let told = Arc::clone(&told);
         move |error| told.lock().unwrap().push(error.to_string())
     });

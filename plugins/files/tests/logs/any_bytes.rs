@@ -79,7 +79,6 @@ fn options() -> impl Strategy<Value = Options> {
     (formats, any::<[bool; 4]>()).prop_map(|(format, [lenient, joins, goes_on, segments])| {
         Options {
             format,
-            delimiter: None,
             lenient,
             joins,
             goes_on,

@@ -29,7 +29,11 @@ fn layout(time: TimeColumn) -> Layout {
         optional: false,
     });
     let channels = channels.into();
-    Layout { time, channels }
+    Layout {
+        time,
+        channels,
+        ..Layout::new("", TimeForm::SECONDS, [""; 0])
+    }
 }
 
 fn reader(time: TimeColumn, text: &str, lenient: bool) -> Result<Reader, FileError> {
@@ -55,6 +59,7 @@ fn row(after_eight_ns: i64, text: &str, values: [f64; 2]) -> Row {
         time_ns: EIGHT + after_eight_ns,
         time_text: text.to_owned(),
         values: values.to_vec(),
+        begins_segment: false,
     }
 }
 

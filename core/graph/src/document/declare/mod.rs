@@ -10,6 +10,7 @@ mod placeholder;
 mod reading;
 mod sets;
 mod signals;
+mod table;
 mod time_base;
 
 use super::graph_file::GraphFile;
@@ -21,15 +22,17 @@ use crate::diagnostic::Diagnostics;
 pub use names::is_name;
 use reading::text;
 pub use reading::{is_misspelt, known_keys};
+pub use table::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use time_base::UNITS as TIME_UNITS;
 
-const SECTIONS: [&str; 15] = [
+const SECTIONS: [&str; 16] = [
     "schema",
     "name",
     "description",
     "extends",
     "sets",
     "time",
+    "table",
     "signals",
     "modules",
     "nodes",
@@ -78,6 +81,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let shared = names::check(root, &mut broken, diagnostics);
     let sets = sets::declare(root.get("sets"), &elsewhere, diagnostics);
     let time = time_base::declare(root.get("time"), diagnostics);
+    let table = table::declare(root.get("table"), diagnostics);
     let sample = time.sample();
     let signals = root.get("signals");
     let mut signals = signals::declare(signals, &sets, sample, &mut broken, diagnostics);
@@ -123,6 +127,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         description,
         sets: sets.members,
         time,
+        table,
         signals,
         nodes,
         broken,

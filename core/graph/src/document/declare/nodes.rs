@@ -217,7 +217,7 @@ impl Named<'_> {
                         instead: None,
                     };
                     // Around a module it may have been told already.
-                    diagnostics.report_unless_told(value.place, problem);
+                    diagnostics.report_unless_known(value.place, problem);
                 }
             }
             Data::List(values) => values

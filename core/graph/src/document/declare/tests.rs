@@ -2,7 +2,10 @@ use std::path::Path;
 
 use super::declare;
 use crate::diagnostic::{Diagnostics, Sources};
-use crate::document::{GraphFile, Memory, TimeBase, TimeForm, load_text};
+use crate::document::{
+    Arrangement, DecimalMark, Encoding, GraphFile, Memory, TableFormat, TimeBase, TimeForm,
+    load_text,
+};
 use crate::time::Duration;
 
 const SECOND: i64 = 1_000_000_000;
@@ -186,4 +189,75 @@ fn an_output_may_be_blended() {
         Some("5 nm/s")
     );
     assert_eq!(graph.outputs[0].blend, None);
+}
+
+#[test]
+fn a_table_is_declared_whole_and_changed_for_some_files() {
+    let table = graph(
+        "[table]\nseparator = \"\\t\"\ndecimal = \",\"\nencoding = \"windows-1252\"\nskip = 3\nnames = 2\nunits = 4\n\
+         segment = \"day\"\nlenient = true\n\
+         [[table.files]]\nmatch = \"temp*.csv\"\nskip = 0\nlayout = \"long\"\nname = \"tag\"\nvalue = \"val\"",
+    )
+    .table;
+    let base = table.of("position.csv");
+    assert_eq!(base.separator.map(|of| of.0), Some(b'\t'));
+    assert_eq!(base.decimal, Some(DecimalMark::Comma));
+    assert_eq!(base.encoding, Some(Encoding::Windows1252));
+    assert_eq!(
+        (base.skip, base.names, base.units),
+        (Some(3), Some(2), Some(4))
+    );
+    assert_eq!((base.segment.as_deref(), base.lenient), (Some("day"), true));
+    let long = TableFormat {
+        skip: Some(0),
+        layout: Arrangement::Long,
+        name: Some("tag".to_owned()),
+        value: Some("val".to_owned()),
+        ..base.clone()
+    };
+    assert_eq!(*table.of("temp-2.csv"), long);
+    assert_eq!(*graph("").table.of("a.csv"), TableFormat::default());
+}
+
+/// The diagnostics of a graph, each as its line and its code.
+fn mistakes(text: &str) -> Vec<String> {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let text = format!("schema = 1\n{text}");
+    let document = load_text(
+        Path::new("a.toml"),
+        text,
+        &Memory::new(),
+        &mut sources,
+        &mut diagnostics,
+    );
+    declare(document.unwrap(), &mut diagnostics);
+    let text = diagnostics.render(&sources, false, 120);
+    let codes = text.lines().filter_map(|line| line.strip_prefix("error["));
+    let places = text.lines().filter_map(|line| line.split_once("a.toml:"));
+    let pairs = codes.zip(places);
+    let pairs = pairs.map(|(code, (_, at))| {
+        let line = at.split(':').next().unwrap();
+        format!("{line} {}", code.split(']').next().unwrap())
+    });
+    pairs.collect()
+}
+
+#[test]
+fn each_mistake_in_a_table_is_reported_at_its_place() {
+    for (text, expected) in [
+        ("skp = 1", &["3 A006"][..]),
+        ("separator = \"ab\"", &["3 A010"]),
+        ("decimal = \";\"", &["3 A009"]),
+        ("encoding = \"utf-9\"", &["3 A009"]),
+        ("name = \"tag\"", &["3 A010"]),
+        ("names = 0", &["3 A010"]),
+        ("files = 1", &["3 A008"]),
+        (
+            "[[table.files]]\nmatch = \"a\"\nunits = 1\n\
+             [[table.files]]\nlayout = \"long\"\nname = \"a\"",
+            &["5 A010", "6 A007", "6 A007"],
+        ),
+    ] {
+        assert_eq!(mistakes(&format!("[table]\n{text}")), expected, "{text}");
+    }
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::DocumentProblem;
-use crate::diagnostic::{Names, Place, Problem, listed, nearest};
+use super::{DocumentProblem, codes};
+use crate::diagnostic::{Code, Names, Place, Problem, listed, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::salvage::DUPLICATE_KEY;
 use crate::quantity::QuantityError;
@@ -54,42 +54,42 @@ fn for_key(key: Option<&String>) -> String {
 }
 
 impl Problem for DocumentProblem {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> &'static Code {
         match self {
-            Self::Syntax { .. } => "A001",
-            Self::Unreadable { .. } => "A002",
+            Self::Syntax { .. } => &codes::A001,
+            Self::Unreadable { .. } => &codes::A002,
             Self::TooLarge { .. }
             | Self::TooDeep { .. }
             | Self::LongList { .. }
-            | Self::LongChain { .. } => "A003",
-            Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
-            Self::ExtendsLoop { .. } => "A005",
-            Self::UnknownKey { .. } | Self::InputAsKey { .. } => "A006",
-            Self::MissingKey { .. } => "A007",
-            Self::WrongType { .. } => "A008",
-            Self::UnknownChoice { .. } => "A009",
+            | Self::LongChain { .. } => &codes::A003,
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => &codes::A004,
+            Self::ExtendsLoop { .. } => &codes::A005,
+            Self::UnknownKey { .. } | Self::InputAsKey { .. } => &codes::A006,
+            Self::MissingKey { .. } => &codes::A007,
+            Self::WrongType { .. } => &codes::A008,
+            Self::UnknownChoice { .. } => &codes::A009,
             Self::Refused { .. }
             | Self::NumberTooLarge { .. }
             | Self::NoLength { .. }
-            | Self::StepNotPositive => "A010",
-            Self::BadName { .. } => "A011",
-            Self::DuplicateName { .. } => "A012",
-            Self::UnknownSet { .. } => "A013",
-            Self::UnknownPlaceholder { .. } => "A014",
-            Self::EmptyList { .. } => "A015",
-            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => "A016",
-            Self::Unit(_) => "A017",
-            Self::Duration(_) | Self::Quantity(_) | Self::UnitTwice { .. } => "A018",
-            Self::NothingToRemove { .. } => "A019",
-            Self::SamplesWithoutClock { .. } => "A020",
-            Self::OneColumn { .. } => "A021",
-            Self::RangeUnit { .. } | Self::RangeOrder { .. } => "A022",
-            Self::UnknownChannel { .. } => "A023",
-            Self::TimeContradiction { .. } => "A024",
-            Self::UnknownModule { .. } => "A025",
-            Self::ModuleLoop { .. } => "A026",
-            Self::OutOfReach { .. } => "A027",
-            Self::UnknownOutput { .. } => "A028",
+            | Self::StepNotPositive => &codes::A010,
+            Self::BadName { .. } => &codes::A011,
+            Self::DuplicateName { .. } => &codes::A012,
+            Self::UnknownSet { .. } => &codes::A013,
+            Self::UnknownPlaceholder { .. } => &codes::A014,
+            Self::EmptyList { .. } => &codes::A015,
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => &codes::A016,
+            Self::Unit(_) => &codes::A017,
+            Self::Duration(_) | Self::Quantity(_) | Self::UnitTwice { .. } => &codes::A018,
+            Self::NothingToRemove { .. } => &codes::A019,
+            Self::SamplesWithoutClock { .. } => &codes::A020,
+            Self::OneColumn { .. } => &codes::A021,
+            Self::RangeUnit { .. } | Self::RangeOrder { .. } => &codes::A022,
+            Self::UnknownChannel { .. } => &codes::A023,
+            Self::TimeContradiction { .. } => &codes::A024,
+            Self::UnknownModule { .. } => &codes::A025,
+            Self::ModuleLoop { .. } => &codes::A026,
+            Self::OutOfReach { .. } => &codes::A027,
+            Self::UnknownOutput { .. } => &codes::A028,
         }
     }
 

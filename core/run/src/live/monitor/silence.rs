@@ -1,5 +1,4 @@
-//! Decides where a channel has no sample for much longer than ever else while rows come, as that of a sensor does which is
-//! disconnected; not what follows from it.
+//! Where a channel has no sample for much longer than ever else while rows come, as after a cable is pulled.
 
 use serde::Serialize;
 

@@ -1,8 +1,6 @@
-//! Decides where a series has the very same value for much longer than ever else, as that of a stuck sensor; not what follows from
-//! it.
+//! Where a series repeats one value for much longer than ever else, as a stuck sensor does.
 //!
-//! A fine sensor changes with almost every sample; a coarse one repeats its value, but for how long is seen in the rest of the
-//! series.
+//! A fine sensor changes with almost every sample. A coarse one repeats its value; the rest of the series shows for how long.
 
 use serde::Serialize;
 

@@ -2,28 +2,11 @@
 
 use std::cell::Cell;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Votes as Cast};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::*;
 
-use super::{breaks, breaks_only, finds};
-
-/// The mean of the votes, with their range about it.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Votes {
-    /// What is wrong with it; nothing by default.
-    #[serde(default)]
-    #[schemars(with = "String")]
-    fault: Fault,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Fault {
-    #[default]
-    None,
+faulty! {
+    /// The mean of the votes, with their range about it.
+    pub struct Poll;
     /// Remembers what it has answered.
     Remembers,
     /// Takes nothing for zero.
@@ -38,7 +21,7 @@ enum Fault {
     UpsideDown,
 }
 
-impl Combiner for Votes {
+impl Combiner for Poll {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
     }
@@ -69,7 +52,7 @@ struct Answering {
 }
 
 impl Combine for Answering {
-    fn combine(&self, votes: Cast<'_>) -> f64 {
+    fn combine(&self, votes: Votes<'_>) -> f64 {
         let count = match self.fault {
             Fault::ZeroForAbsent => votes.0.len(),
             _ => votes.present().count(),
@@ -85,7 +68,7 @@ impl Combine for Answering {
         }
     }
 
-    fn weights(&self, votes: Cast<'_>, weights: &mut [f64]) {
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
         if self.fault == Fault::WeighsAbsent {
             weights.fill(0.0);
         }
@@ -98,7 +81,7 @@ impl Combine for Answering {
         }
     }
 
-    fn interval(&self, votes: Cast<'_>) -> [f64; 2] {
+    fn interval(&self, votes: Votes<'_>) -> [f64; 2] {
         let votes = || votes.present().map(|(_, vote)| vote);
         let lowest = votes().fold(f64::NAN, f64::min);
         let highest = votes().fold(f64::NAN, f64::max);
@@ -110,20 +93,16 @@ impl Combine for Answering {
     }
 }
 
-athermal_core::register!(Votes, Combiner, "sabotaged_votes");
-
-fn with(fault: &str) -> Case {
-    Case::new(format!("fault = \"{fault}\""))
-}
+athermal_core::register!(Poll, Combiner, "sabotaged_votes");
 
 #[test]
 fn a_sound_combiner_breaks_no_rule() {
-    breaks_only::<Votes>(Case::new(""), &[]);
+    breaks_only::<Poll>(Case::new(""), &[]);
 }
 
 #[test]
 fn an_answer_that_changes_later_ones_leaves_a_trace() {
-    breaks::<Votes>(
+    breaks::<Poll>(
         with("remembers"),
         Rule::NoTrace,
         "answers that nobody wanted",
@@ -133,19 +112,19 @@ fn an_answer_that_changes_later_ones_leaves_a_trace() {
 #[test]
 fn a_vote_that_is_not_there_is_neither_zero_nor_weighed() {
     for fault in ["zero_for_absent", "weighs_absent", "other_weights"] {
-        breaks_only::<Votes>(with(fault), &[Rule::Votes]);
+        breaks_only::<Poll>(with(fault), &[Rule::Votes]);
     }
-    finds::<Votes>(
+    finds::<Poll>(
         with("zero_for_absent"),
         Rule::Votes,
         "before any truth, it takes vote 0 of 3 for zero where that is absent",
     );
-    finds::<Votes>(
+    finds::<Poll>(
         with("weighs_absent"),
         Rule::Votes,
         "before any truth, of [NaN, 41.0, -68.0] the absent vote weighs 0 and not NaN",
     );
-    finds::<Votes>(
+    finds::<Poll>(
         with("other_weights"),
         Rule::Votes,
         "before any truth, the answer to [NaN, 41.0, -68.0] is -13.5, and -8.999999999999998 by the weights [NaN, \
@@ -156,14 +135,14 @@ fn a_vote_that_is_not_there_is_neither_zero_nor_weighed() {
 #[test]
 fn an_interval_stands_about_the_answer_and_covers_a_share() {
     for fault in ["covers_more", "upside_down"] {
-        breaks_only::<Votes>(with(fault), &[Rule::Uncertainty]);
+        breaks_only::<Poll>(with(fault), &[Rule::Uncertainty]);
     }
-    finds::<Votes>(
+    finds::<Poll>(
         with("covers_more"),
         Rule::Uncertainty,
         "`coverage` says that intervals cover 1.5 of the truths, which is no share between 0 and 1",
     );
-    finds::<Votes>(
+    finds::<Poll>(
         with("upside_down"),
         Rule::Uncertainty,
         "before any truth, the interval about 44.666666666666664 is from 96 to -7",

@@ -1,31 +1,10 @@
 //! A feature that is fitted and sound, and the same with one fault at a time.
 
-use athermal_core::node::{
-    Encoder, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Predictor, Tick,
-    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
-};
-use athermal_core::unit::Unit;
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::*;
 
-use super::{breaks, breaks_only};
-
-/// The first feature, as a share of its largest value in the fit.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Share {
-    /// What is wrong with it; nothing by default.
-    #[serde(default)]
-    #[schemars(with = "String")]
-    fault: Fault,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Fault {
-    #[default]
-    None,
+faulty! {
+    /// The first feature, as a share of its largest value in the fit.
+    struct Share;
     /// Gives something before it is fitted.
     SpeaksUnfitted,
     /// Is not fitted, whatever its port says.

@@ -1,12 +1,6 @@
 //! A combiner that goes by how long ago something was, and forgets that a break is no time.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Votes};
-use athermal_core::time::{Duration, Instant};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::breaks;
+use super::*;
 
 /// The mean of the votes, the larger the longer it has been told of truths.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]

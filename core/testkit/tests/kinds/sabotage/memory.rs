@@ -2,24 +2,17 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{
-    Combine, Combiner, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach,
-    Restored, State, Tick, Votes,
-};
-use athermal_core::time::{Duration, Instant};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{breaks, breaks_only};
+use super::*;
 
 /// The mean of each channel over a window.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Window {
     /// How long the window is.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     window: Duration,
     /// How much of the window it tells that it looks back.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     told: Duration,
 }
 
@@ -29,12 +22,6 @@ impl Feature for Window {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let lengths = [("window", self.window), ("told", self.told)];
-        let mistakes = lengths.map(|(name, length)| Mistake::unless_lasting(name, length));
-        let mistakes: Vec<Mistake> = mistakes.into_iter().flatten().collect();
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
         let mut channels = inputs.port("signal").to_vec();
         for channel in &mut channels {
             channel.span += self.window;
@@ -219,7 +206,7 @@ athermal_core::register!(Unbiased, Combiner, "sabotaged_errors");
 #[test]
 fn a_combiner_that_never_forgets_says_so() {
     let says = |word: &str| Case::new(format!("says = \"{word}\""));
-    let broken = |word| athermal_testkit::broken::<Unbiased>(&[says(word)]);
+    let broken = |word| broken::<Unbiased>(&[says(word)]);
     let rules = |word| -> Vec<Rule> { broken(word).iter().map(|broken| broken.rule).collect() };
     assert!(!rules("endless").contains(&Rule::Memory));
     assert!(rules("nothing").contains(&Rule::Memory));

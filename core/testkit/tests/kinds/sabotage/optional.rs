@@ -1,29 +1,10 @@
 //! A feature with a port that a graph may leave out and is sound, and the same with one fault at a time.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
-};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use super::*;
 
-use super::{breaks_only, finds};
-
-/// Each channel less its own offset, where there are offsets.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Offset {
-    /// What is wrong with it; nothing by default.
-    #[serde(default)]
-    #[schemars(with = "String")]
-    fault: Fault,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Fault {
-    #[default]
-    None,
+faulty! {
+    /// Each channel less its own offset, where there are offsets.
+    struct Offset;
     /// Cannot do with offsets.
     Panics,
 }
@@ -85,10 +66,6 @@ impl Operator for Taking {
 
 athermal_core::register!(Offset, Feature, "sabotaged_optional");
 
-fn with(fault: &str) -> Case {
-    Case::new(format!("fault = \"{fault}\""))
-}
-
 #[test]
 fn a_sound_node_with_a_port_that_may_be_left_out_breaks_no_rule() {
     breaks_only::<Offset>(with("none"), &[]);
@@ -103,14 +80,13 @@ fn a_port_that_no_case_connects_is_connected() {
         Rule::Answers,
         "it panics: there are offsets",
     );
-    let broken = athermal_testkit::broken::<Offset>(&[with("panics")]);
+    let broken = broken::<Offset>(&[with("panics")]);
     let told = "# with what a graph may leave out: `offset` in nm\nfault = \"panics\"";
     assert_eq!(broken[0].case.as_deref(), Some(told));
 }
 
 #[test]
 fn a_case_that_connects_a_port_is_enough() {
-    let broken =
-        athermal_testkit::broken::<Offset>(&[with("none"), with("none").input("offset", 2, "nm")]);
+    let broken = broken::<Offset>(&[with("none"), with("none").input("offset", 2, "nm")]);
     assert_eq!(broken, []);
 }

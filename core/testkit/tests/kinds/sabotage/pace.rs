@@ -1,15 +1,6 @@
 //! A feature that is sound, and needs many ticks or quick ones to have anything to say.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
-};
-use athermal_core::time::{Duration, Instant};
-use athermal_testkit::{Case, Rule};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{breaks, breaks_only};
+use super::*;
 
 /// Passes its input on after so many ticks, where the last is not longer ago than that.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -19,6 +10,7 @@ struct Patient {
     #[serde(default)]
     after: u64,
     /// How long ago the last tick may be.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     within: Duration,
 }
 
@@ -28,9 +20,6 @@ impl Feature for Patient {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        if let Some(mistake) = Mistake::unless_lasting("within", self.within) {
-            return Err(vec![mistake]);
-        }
         let channels = inputs.port("signal").to_vec();
         let name = "signal";
         Ok(vec![OutputPort { name, channels }])

@@ -1,14 +1,6 @@
 //! A sound feature that takes temperatures on one scale, which no factor turns into another.
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
-};
-use athermal_core::unit::Unit;
-use athermal_testkit::Case;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::breaks_only;
+use super::*;
 
 /// The saturation vapour pressure over water by the formula of Magnus.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]

@@ -46,8 +46,6 @@ fn a_quote_that_is_not_closed_is_an_error_at_its_row_or_that_row_is_left_out() {
         "5,1,\"2\n",
         "\"5,1,2\r\n",
         "5,\"1,\n\nno row\n",
-        "5,\"1,2\n5.5,\"1,2\n",
-        "5,1,\"2\n\"5\",\"1\"\n",
     ] {
         let text = format!("t,a,b\n0,1,2.5\n{open}6,3,\n7,5,6\n8,7,8\n");
         assert_eq!(
@@ -73,25 +71,6 @@ fn a_quote_that_is_not_closed_is_an_error_at_its_row_or_that_row_is_left_out() {
         (&*rows, reader.report().refused_rows.count),
         ("1 [3.0, NaN]", 2)
     );
-}
-
-#[test]
-fn a_row_after_a_quote_that_is_not_closed_is_given_before_more_is_read() {
-    struct Ends(&'static [u8]);
-    impl std::io::Read for Ends {
-        fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
-            assert!(!self.0.is_empty(), "it would wait here");
-            self.0.read(into)
-        }
-    }
-    let text = Ends(b"t,a\n0,1\n1,\"2\n2,3\n");
-    let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
-    let mut reader = Reader::from_read("pipe", text, layout, lenient()).unwrap();
-    let mut row = Row::default();
-    for time in ["0", "2"] {
-        assert!(reader.next_into(&mut row).unwrap());
-        assert_eq!(row.time_text, time);
-    }
 }
 
 #[test]

@@ -1,38 +1,48 @@
-//! Decides what is told of the estimators of a model: what each coefficient is called, and which unit it has.
+//! The fitted estimators of a model: the name and unit of each coefficient.
 
-use athermal::Model;
-use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
-use athermal::core::node::{Coefficients, Factor, Mode, Noise, Of, Predictor, Regressor, Term};
-use athermal::core::unit::Unit;
 use athermal_numerics::Fading;
 use serde::Serialize;
 
-/// The longest difference equation of which the modes are told, in steps.
+use super::Model;
+use crate::compile::{Plan, PlannedNode, PlannedRole};
+use crate::node::{Coefficients, Factor, Mode, Noise, Of, Predictor, Regressor, Term};
+use crate::unit::Unit;
+
+/// The longest difference equation of which modes are shown, in steps.
 const LONGEST: i64 = 100;
 
 /// A fitted estimator.
 #[derive(Debug, Serialize)]
-pub(super) struct Told {
-    pub(super) node: String,
+pub struct FittedEstimator {
+    /// Its node or instance: `thermal.Z1`.
+    pub node: String,
+    /// The type of its node.
     #[serde(rename = "type")]
-    pub(super) kind: &'static str,
-    pub(super) truth: String,
-    pub(super) unit: String,
-    /// None of a kind that tells nothing of them.
+    pub kind: &'static str,
+    /// The channel that it predicts.
+    pub truth: String,
+    /// The unit of a difference of the truth.
+    pub unit: String,
+    /// None of a kind without coefficients.
     #[serde(flatten)]
-    pub(super) found: Option<Found>,
+    pub parts: Option<EstimatorParts>,
 }
 
 /// What it consists of.
 #[derive(Debug, Serialize)]
-pub(super) struct Found {
-    pub(super) coefficients: Vec<Coefficient>,
-    pub(super) noises: Vec<Noise>,
-    pub(super) modes: Vec<Mode>,
+pub struct EstimatorParts {
+    /// The coefficients, each with its name.
+    pub coefficients: Vec<Coefficient>,
+    /// The standard deviations of its noises.
+    pub noises: Vec<Noise>,
+    /// How it comes to rest.
+    pub modes: Vec<Mode>,
+    /// The step of its difference equation, in s.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) step_s: Option<f64>,
+    pub step_s: Option<f64>,
+    /// How often its noise is integrated.
     #[serde(skip_serializing_if = "is_zero")]
-    pub(super) differences: usize,
+    pub differences: usize,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
@@ -42,44 +52,80 @@ fn is_zero(value: &usize) -> bool {
 
 /// A coefficient.
 #[derive(Debug, Serialize)]
-pub(super) struct Coefficient {
+pub struct Coefficient {
     /// Of what: `constant`, or what it is multiplied by.
-    pub(super) name: String,
+    pub name: String,
+    /// The letter of its polynomial.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) polynomial: Option<char>,
+    pub polynomial: Option<char>,
+    /// Its power of the shift in the polynomial.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) steps: Option<usize>,
+    pub steps: Option<usize>,
+    /// The factors of the product that it multiplies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) factors: Vec<Multiplied>,
-    pub(super) value: f64,
-    pub(super) standard_error: Option<f64>,
+    pub factors: Vec<ProductFactor>,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error, where theory has one.
+    pub standard_error: Option<f64>,
     /// Its unit is that of the truth per this one; none where it has no unit, and of a constant.
-    pub(super) per: Option<String>,
+    pub per: Option<String>,
 }
 
 /// A regressor in a product, as the difference from a value.
 #[derive(Debug, Serialize)]
-pub(super) struct Multiplied {
-    pub(super) regressor: String,
-    pub(super) unit: String,
+pub struct ProductFactor {
+    /// The regressor.
+    pub regressor: String,
+    /// The unit of a difference of its values.
+    pub unit: String,
+    /// The value from which it counts; none for 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) about: Option<f64>,
+    pub about: Option<f64>,
     /// The least and the largest value that counts.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) held: Option<(f64, f64)>,
+    pub held: Option<(f64, f64)>,
 }
 
-/// Every fitted estimator of a model, in the order of the plan.
-pub(super) fn told(model: &Model) -> Vec<Told> {
-    let nodes = model.plan.nodes.iter();
-    let told = nodes.filter_map(|node| {
-        let predictor = model.fitted.get(&node.instance())?;
-        told_of(&model.plan, node, &**predictor)
-    });
-    told.collect()
+impl Model {
+    /// Every fitted estimator, in the order of the plan.
+    #[must_use]
+    pub fn estimators(&self) -> Vec<FittedEstimator> {
+        let nodes = self.plan.nodes.iter();
+        let estimators = nodes.filter_map(|node| {
+            let predictor = self.fitted.get(&node.instance())?;
+            estimator_of(&self.plan, node, &**predictor)
+        });
+        estimators.collect()
+    }
+
+    /// The instances of both that have other fitted parameters in another model; none where one of the two was not fitted.
+    #[must_use]
+    pub fn refitted(&self, other: &Self) -> Vec<String> {
+        if self.card.is_none() || other.card.is_none() {
+            return Vec::new();
+        }
+        let parameters = |model: &Self, instance: &str| {
+            let predictor = model.fitted.get(instance)?;
+            serde_json::to_value(&**predictor).ok()
+        };
+        let nodes = self.plan.nodes.iter();
+        let mut instances: Vec<String> = nodes.map(PlannedNode::instance).collect();
+        instances.retain(|instance| {
+            let mut there = other.plan.nodes.iter();
+            there.any(|node| node.instance() == *instance)
+                && parameters(self, instance) != parameters(other, instance)
+        });
+        instances.sort_unstable();
+        instances
+    }
 }
 
-fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option<Told> {
+fn estimator_of(
+    plan: &Plan,
+    node: &PlannedNode,
+    predictor: &dyn Predictor,
+) -> Option<FittedEstimator> {
     let PlannedRole::Estimator {
         regressors, truth, ..
     } = &node.role
@@ -91,20 +137,20 @@ fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option
     let used: Option<Vec<&Regressor>> = used
         .map(|name| regressors.iter().find(|of| of.name == *name))
         .collect();
-    let found = used.zip(predictor.coefficients()).map(|(used, mut found)| {
+    let parts = used.zip(predictor.coefficients()).map(|(used, mut found)| {
         recur(&mut found, &used, truth.ahead.as_ns());
-        Names(&used).found(found)
+        Names(&used).parts(found)
     });
-    Some(Told {
+    Some(FittedEstimator {
         node: node.instance(),
         kind: node.kind.name,
         truth: channel.name.clone(),
         unit: channel.channel.unit.difference().to_string(),
-        found,
+        parts,
     })
 }
 
-/// Tells how a sum comes to rest that has past truths among its regressors: fed with its own predictions, it is a difference
+/// Adds the modes of a sum that has past truths among its regressors: fed with its own predictions, it is a difference
 /// equation, whose step is the shortest time from such a truth to the one that is predicted.
 fn recur(found: &mut Coefficients, used: &[&Regressor], ahead_ns: i64) {
     let mut lagged: Vec<(i64, f64)> = Vec::new();
@@ -146,12 +192,12 @@ fn recur(found: &mut Coefficients, used: &[&Regressor], ahead_ns: i64) {
 struct Names<'a>(&'a [&'a Regressor]);
 
 impl Names<'_> {
-    fn found(&self, of: Coefficients) -> Found {
-        Found {
+    fn parts(&self, of: Coefficients) -> EstimatorParts {
+        EstimatorParts {
             coefficients: of.terms.iter().map(|term| self.coefficient(term)).collect(),
             noises: of.noises,
             modes: of.modes,
-            step_s: of.step.map(athermal::Duration::secs),
+            step_s: of.step.map(crate::time::Duration::secs),
             differences: of.differences,
         }
     }
@@ -203,10 +249,10 @@ impl Names<'_> {
         }
     }
 
-    fn factor(&self, factor: &Factor) -> Multiplied {
+    fn factor(&self, factor: &Factor) -> ProductFactor {
         let of = self.0[factor.regressor];
         let (least, largest) = factor.held;
-        Multiplied {
+        ProductFactor {
             regressor: of.name.clone(),
             unit: unit(of),
             about: Some(factor.about).filter(|about| *about != 0.0),

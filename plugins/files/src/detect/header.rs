@@ -1,11 +1,18 @@
 //! Where a table begins among the first lines of a text, and what stands between its cells: loggers and spreadsheets write lines
 //! of their own above it. Not which of its columns are where, nor what its rows hold.
 
+use std::collections::HashSet;
+
+use athermal_core::document::TableFormat;
+
+use super::units::are_units;
 use crate::cell::is_number;
-use crate::columns::{Columns, DELIMITERS, choose_delimiter, names_in};
-use crate::lines::{Lines, has_bare_returns, is_content};
-use crate::units::are_units;
+use crate::columns::{Columns, names_in};
+use crate::lines::{Lines, is_content};
 use crate::{FileError, Layout};
+
+/// What may stand between cells, the most usual first.
+const SEPARATORS: [u8; 4] = [b',', b';', b'\t', b'|'];
 
 /// How many lines are looked at for a header.
 const LOOKED_AT: usize = 50;
@@ -13,49 +20,68 @@ const LOOKED_AT: usize = 50;
 /// What is known of a table before its names are read.
 pub(crate) struct Head {
     /// What stands between cells.
-    pub delimiter: u8,
+    pub separator: u8,
+    /// How many lines stand above the names.
+    pub skip: u32,
     /// The first cells of the lines above, save values, as a logger writes them again when it begins anew.
     pub above: Vec<String>,
 }
 
-/// Goes to the header, so that it is the next line. The delimiter may be stated.
+/// Goes to the header, so that it is the next line: where it is declared, or where it is found.
 ///
 /// By a layout the header is the first line that names the time and all channels that must be there, and may be a comment; if none
 /// does, the line that names the most. Where none names any, and without a layout, it is the line that begins the longest table.
 pub(crate) fn seek(
     lines: &mut Lines,
-    stated: Option<u8>,
+    table: &TableFormat,
     layout: Option<&Layout>,
 ) -> Result<Head, FileError> {
-    let mut delimiter = stated;
+    let mut separator = table.separator.map(|declared| declared.0);
     let mut above = Vec::new();
     let mut seen: Vec<Line> = Vec::new();
     let mut found = None;
-    while found.is_none() && seen.len() < LOOKED_AT && lines.advance().map_err(unheaded)? {
-        if lines.place().line == 1 && has_bare_returns(lines.text()) {
-            return Err(FileError::CarriageReturns {
-                place: lines.place(),
-            });
-        }
-        let named = delimiter_named(lines.text()).filter(|_| seen.is_empty());
+    let declared = table.skip.is_some() || table.names.is_some();
+    let skip = u64::from(table.skip.unwrap_or(0));
+    let mut rows = table.names.unwrap_or(1);
+    while found.is_none() && (declared || seen.len() < LOOKED_AT) && lines.advance()? {
+        let named = separator_named(lines.text()).filter(|_| seen.is_empty());
         if let Some(named) = named {
-            delimiter = delimiter.or(Some(named));
-            above.push(DELIMITER_KEY.to_owned());
+            separator = separator.or(Some(named));
+            above.push(SEPARATOR_KEY.to_owned());
         } else if !lines.text().trim_ascii().is_empty() {
             let (number, text) = lines.take();
             let line = Line { number, text };
-            found = layout
-                .and_then(|layout| line.header_of(layout, delimiter))
-                .map(|delimiter| (seen.len(), delimiter));
+            found = match declared {
+                true if number <= skip => None,
+                true => {
+                    rows = rows.saturating_sub(1);
+                    (rows == 0).then(|| separator.unwrap_or_else(|| line.separator(layout)))
+                }
+                false => layout.and_then(|layout| line.header_of(layout, separator)),
+            }
+            .map(|separator| (seen.len(), separator));
             seen.push(line);
         }
     }
-    let found = found
-        .or_else(|| most_named(&seen, delimiter, layout?))
-        .or_else(|| longest_table(&seen, delimiter));
-    let Some((first, delimiter)) = found else {
-        return Err(FileError::Empty {
-            file: lines.file.clone(),
+    if !declared {
+        found = found
+            .or_else(|| most_named(&seen, separator, layout?))
+            .or_else(|| longest_table(&seen, separator));
+    }
+    let Some((first, separator)) = found else {
+        return Err(match seen.last() {
+            Some(last) if declared => FileError::NotAsDeclared {
+                place: lines.place_of(last.number),
+                key: if table.skip.is_some() {
+                    "skip"
+                } else {
+                    "names"
+                },
+                found: "the last line stands here".to_owned(),
+            },
+            _ => FileError::Empty {
+                file: lines.file.clone(),
+            },
         });
     };
     let no_text = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
@@ -66,9 +92,10 @@ pub(crate) fn seek(
         });
     }
     let skipped = seen.drain(..first).filter(|line| !line.is_comment());
-    let first_cells = skipped.filter_map(|line| names_in(&line.text, delimiter).into_iter().next());
+    let first_cells = skipped.filter_map(|line| names_in(&line.text, separator).into_iter().next());
     above.extend(first_cells.filter(|cell| !cell.is_empty() && !is_value(cell)));
     let header = &mut seen[0];
+    let skip = u32::try_from(header.number - 1).unwrap_or(u32::MAX);
     lines.comments_count = header.is_comment();
     header.text = header.names().to_vec();
     lines.hold(
@@ -76,34 +103,45 @@ pub(crate) fn seek(
             .map(|line| (line.number, line.text))
             .collect(),
     );
-    Ok(Head { delimiter, above })
+    Ok(Head {
+        separator,
+        skip,
+        above,
+    })
 }
 
-/// A row that is too long, where no header was found before it: none can be left out then.
-fn unheaded(error: FileError) -> FileError {
-    match error {
-        FileError::TooLong { place, limit } => FileError::HeaderTooLong { place, limit },
-        other => other,
-    }
-}
-
-/// With this a first line names the delimiter, for spreadsheets.
-const DELIMITER_KEY: &str = "sep=";
+/// With this a first line names the separator, for spreadsheets.
+const SEPARATOR_KEY: &str = "sep=";
 
 /// What a first line `sep=;` says, as a spreadsheet takes it.
-fn delimiter_named(line: &[u8]) -> Option<u8> {
+fn separator_named(line: &[u8]) -> Option<u8> {
     let line = line.trim_ascii_start();
     let line = line.strip_prefix(b"\"").unwrap_or(line);
     match line {
         [key @ .., _, b'\r', b'\n'] | [key @ .., _, b'\n' | b'"'] | [key @ .., _]
-            if key.eq_ignore_ascii_case(DELIMITER_KEY.as_bytes()) =>
+            if key.eq_ignore_ascii_case(SEPARATOR_KEY.as_bytes()) =>
         {
             // A line that ends there names none.
             let named = line.get(key.len()).copied();
-            named.filter(|delimiter| !matches!(delimiter, b'\r' | b'\n'))
+            named.filter(|separator| !matches!(separator, b'\r' | b'\n'))
         }
         _ => None,
     }
+}
+
+/// The separator under which a line shows the most of the wanted columns, then the most columns.
+fn choose_separator(line: &[u8], layout: Option<&Layout>) -> u8 {
+    let score = |separator: u8| {
+        let names = names_in(line, separator);
+        let known: HashSet<&str> = names.iter().map(String::as_str).collect();
+        let wanted = layout.into_iter().flat_map(Layout::names);
+        let wanted = wanted.filter(|name| known.contains(name)).count();
+        (wanted, names.len())
+    };
+    // `max_by_key` takes the last of equals; the most usual separator is to win.
+    let each = SEPARATORS.into_iter().rev();
+    each.max_by_key(|&separator| score(separator))
+        .unwrap_or(b',')
 }
 
 /// A line among the first.
@@ -127,48 +165,52 @@ impl Line {
         }
     }
 
+    fn separator(&self, layout: Option<&Layout>) -> u8 {
+        choose_separator(self.names(), layout)
+    }
+
     /// What stands between cells where this is the header that a layout asks for.
-    fn header_of(&self, layout: &Layout, stated: Option<u8>) -> Option<u8> {
-        let delimiter = stated.unwrap_or_else(|| choose_delimiter(self.names(), layout.names()));
-        let columns = Columns::of(layout, &names_in(self.names(), delimiter));
+    fn header_of(&self, layout: &Layout, declared: Option<u8>) -> Option<u8> {
+        let separator = declared.unwrap_or_else(|| self.separator(Some(layout)));
+        let columns = Columns::of(layout, &names_in(self.names(), separator));
         let any = layout.channels.is_empty() || columns.channels.iter().any(Option::is_some);
-        (any && columns.lacking(layout).is_empty()).then_some(delimiter)
+        (any && columns.lacking(layout).is_empty()).then_some(separator)
     }
 }
 
 /// The first of the lines that name the most wanted columns and hold no values; none where none names any.
-fn most_named(seen: &[Line], stated: Option<u8>, layout: &Layout) -> Option<(usize, u8)> {
+fn most_named(seen: &[Line], declared: Option<u8>, layout: &Layout) -> Option<(usize, u8)> {
     let content = seen
         .iter()
         .enumerate()
         .filter(|(_, line)| !line.is_comment());
     let each = content.map(|(at, line)| {
-        let delimiter = stated.unwrap_or_else(|| choose_delimiter(&line.text, layout.names()));
-        let names = names_in(&line.text, delimiter);
+        let separator = declared.unwrap_or_else(|| line.separator(Some(layout)));
+        let names = names_in(&line.text, separator);
         let named = match can_name(&names) {
             true => Columns::of(layout, &names).count(),
             false => 0,
         };
-        (named, at, delimiter)
+        (named, at, separator)
     });
     // `max_by_key` takes the last of equals.
     let most = each.rev().max_by_key(|(named, ..)| *named);
     most.filter(|(named, ..)| *named > 0)
-        .map(|(_, at, delimiter)| (at, delimiter))
+        .map(|(_, at, separator)| (at, separator))
 }
 
 /// The line that names the columns of the longest table: the fullest of its width that holds no values, or else the comment just
 /// above it. The first line of content where there is neither.
-fn longest_table(seen: &[Line], stated: Option<u8>) -> Option<(usize, u8)> {
+fn longest_table(seen: &[Line], declared: Option<u8>) -> Option<(usize, u8)> {
     let content: Vec<usize> = (0..seen.len())
         .filter(|&at| !seen[at].is_comment())
         .collect();
     let first = *content.first()?;
-    let delimiters = stated.map_or(DELIMITERS.to_vec(), |stated| vec![stated]);
+    let separators = declared.map_or(SEPARATORS.to_vec(), |declared| vec![declared]);
     let mut longest = (0, 0);
     let mut found = None;
-    for delimiter in delimiters {
-        let cut = |line: &Line| names_in(line.names(), delimiter);
+    for separator in separators {
+        let cut = |line: &Line| names_in(line.names(), separator);
         let rows: Vec<Vec<String>> = seen.iter().map(cut).collect();
         for (nth, &at) in content.iter().enumerate() {
             let width = rows[at].len();
@@ -189,17 +231,16 @@ fn longest_table(seen: &[Line], stated: Option<u8>) -> Option<(usize, u8)> {
                 fullest.filter(|&row| above.is_none() || row != at || !are_units(&rows[row]));
             if let Some(header) = fullest.or(above) {
                 longest = (length, width);
-                found = Some((header, delimiter));
+                found = Some((header, separator));
             }
         }
     }
-    let no_names = std::iter::empty();
-    let of_first = || stated.unwrap_or_else(|| choose_delimiter(&seen[first].text, no_names));
+    let of_first = || declared.unwrap_or_else(|| choose_separator(&seen[first].text, None));
     found.or_else(|| Some((first, of_first())))
 }
 
-/// Whether a row has so many cells, or one more that is empty: some loggers end rows, but not the names, with a delimiter.
-pub(crate) fn is_of_width(row: &[String], width: usize) -> bool {
+/// Whether a row has so many cells, or one more that is empty: some loggers end rows, but not the names, with a separator.
+fn is_of_width(row: &[String], width: usize) -> bool {
     row.len() == width || row.len() == width + 1 && row[width].is_empty()
 }
 
@@ -209,7 +250,34 @@ fn can_name(row: &[String]) -> bool {
 }
 
 /// Whether a cell holds a number, a date or a time.
-pub(crate) fn is_value(cell: &str) -> bool {
+fn is_value(cell: &str) -> bool {
     let begins = cell.starts_with(|first: char| first.is_ascii_digit());
     begins && !cell.contains(char::is_alphabetic) || is_number(cell)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TimeForm;
+
+    fn chosen(header: &str, wanted: &[&str]) -> char {
+        let layout = Layout::new("", TimeForm::SECONDS, wanted.iter().copied());
+        char::from(choose_separator(header.as_bytes(), Some(&layout)))
+    }
+
+    #[test]
+    fn the_separator_is_the_one_that_shows_the_wanted_columns() {
+        assert_eq!(chosen("t,a,b", &["a"]), ',');
+        assert_eq!(chosen("t;a;b", &["a"]), ';');
+        assert_eq!(chosen("t\ta\tb", &["a"]), '\t');
+        assert_eq!(chosen("t|a|b", &["a"]), '|');
+        assert_eq!(chosen("t;a, b, c, d;e", &["a, b, c, d"]), ';');
+        assert_eq!(chosen("t", &[]), ',');
+        assert_eq!(chosen("x;y;z", &["a"]), ';');
+    }
+
+    #[test]
+    fn a_separator_within_quotes_does_not_count() {
+        assert_eq!(chosen("\"p;q;r;s\",x", &[]), ',');
+    }
 }

@@ -1,23 +1,28 @@
-//! What a file looks like before anyone has said what is wanted from it: columns and first rows. Not what they mean.
+//! What a file looks like before anyone has said what is wanted from it: its layout, columns and first rows. Not what they mean.
 
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use athermal_core::document::{DecimalMark, Encoding, Separator, TableFormat};
 use serde_json::{Map, Value};
 
+use crate::cell::{decimal_mark, is_number};
 use crate::cells::Cells;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::{FileError, Format, LongFormat, units};
+
+use super::{Format, LongFormat, units};
+use crate::FileError;
 
 /// The columns of a file and the texts of its first rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Description {
     /// The format that the file was taken for.
     pub format: Format,
-    /// What stands between the cells of CSV.
-    pub delimiter: Option<u8>,
+    /// The layout of CSV, as far as it is not the usual one; its decimal mark is found with [`Description::decimal`].
+    pub table: TableFormat,
     /// The names of the columns in their order; of JSON lines, the keys of the rows looked at.
     pub columns: Vec<String>,
     /// The units in a row below the names, a text per column, empty where it says none; nothing at all where there is no such row.
@@ -33,7 +38,11 @@ impl Description {
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
         let path = path.as_ref();
-        of_lines(Lines::open(path)?, Format::from_path(path), rows)
+        let mut described = of_lines(Lines::open(path, None)?, Format::from_path(path), rows)?;
+        if let Some(encoding) = marked(path) {
+            described.table.encoding = Some(encoding);
+        }
+        Ok(described)
     }
 
     /// Goes through the texts of all rows of a CSV file. Broken rows are passed over.
@@ -44,8 +53,12 @@ impl Description {
         path: impl AsRef<Path>,
         mut take: impl FnMut(&[String]),
     ) -> Result<(), FileError> {
-        let mut csv = CsvRows::headed(Lines::open(path.as_ref())?, None, None)?;
-        let mut ledger = Ledger::new(true);
+        let mut csv = CsvRows::headed(
+            Lines::open(path.as_ref(), None)?,
+            &TableFormat::default(),
+            None,
+        )?;
+        let mut ledger = Ledger::new(true, None);
         while csv.advance(&mut ledger)? {
             take(&csv.texts());
         }
@@ -62,7 +75,19 @@ impl Description {
         format: Option<Format>,
         rows: usize,
     ) -> Result<Self, FileError> {
-        of_lines(Lines::new(name.into(), input), format, rows)
+        of_lines(Lines::new(name.into(), None, input), format, rows)
+    }
+
+    /// The decimal mark of all columns but those of the time, where it is a comma.
+    #[must_use]
+    pub fn decimal(&self, time: &[String]) -> Option<DecimalMark> {
+        self.table.separator?;
+        let is_value = |at: usize| self.columns.get(at).is_some_and(|of| !time.contains(of));
+        let cells = self.rows.iter().flat_map(|row| row.iter().enumerate());
+        let numbers = cells.filter(|(at, cell)| is_value(*at) && is_number(cell));
+        let mut marks = numbers.filter_map(|(_, cell)| decimal_mark(cell.as_bytes()));
+        let first = marks.next()?;
+        (first == b',' && marks.all(|mark| mark == first)).then_some(DecimalMark::Comma)
     }
 
     /// What the columns are where the file is in long format.
@@ -80,6 +105,17 @@ impl Description {
     }
 }
 
+/// The encoding that the first bytes of a file say, other than UTF-8.
+fn marked(path: &Path) -> Option<Encoding> {
+    let mut mark = [0; 2];
+    File::open(path).ok()?.read_exact(&mut mark).ok()?;
+    match mark {
+        [0xff, 0xfe] => Some(Encoding::Utf16Le),
+        [0xfe, 0xff] => Some(Encoding::Utf16Be),
+        _ => None,
+    }
+}
+
 fn of_lines(
     mut lines: Lines,
     format: Option<Format>,
@@ -92,8 +128,8 @@ fn of_lines(
 }
 
 fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
-    let mut csv = CsvRows::headed(lines, None, None)?;
-    let mut ledger = Ledger::new(true);
+    let mut csv = CsvRows::headed(lines, &TableFormat::default(), None)?;
+    let mut ledger = Ledger::new(true, None);
     let mut texts = Vec::new();
     while texts.len() < rows && csv.advance(&mut ledger)? {
         let row = csv.texts();
@@ -121,7 +157,15 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
     }
     Ok(Description {
         format: Format::Csv,
-        delimiter: Some(csv.delimiter()),
+        table: TableFormat {
+            separator: Some(csv.separator())
+                .filter(|of| *of != b',')
+                .map(Separator),
+            encoding: csv.is_windows_1252().then_some(Encoding::Windows1252),
+            skip: Some(csv.skip()).filter(|skip| *skip > 0),
+            units: (!csv.units().is_empty()).then_some(2),
+            ..TableFormat::default()
+        },
         columns: csv.names().to_vec(),
         units: csv.units().to_vec(),
         rows: texts,
@@ -154,7 +198,7 @@ fn of_json(mut lines: Lines, rows: usize) -> Result<Description, FileError> {
     }
     Ok(Description {
         format: Format::JsonLines,
-        delimiter: None,
+        table: TableFormat::default(),
         columns,
         units: Vec::new(),
         rows: texts,
@@ -170,7 +214,7 @@ mod tests {
         let text = &b"# x\nt;room;note\n0;21,5;\"a; b\"\nbroken\n1;;\n2;1;1\n"[..];
         let described = Description::of_read("f", text, None, 2).unwrap();
         assert_eq!(described.format, Format::Csv);
-        assert_eq!(described.delimiter, Some(b';'));
+        assert_eq!(described.table.separator, Some(Separator(b';')));
         assert_eq!(described.columns, ["t", "room", "note"]);
         assert_eq!(described.rows, [["0", "21,5", "a; b"], ["1", "", ""]]);
     }
@@ -214,7 +258,7 @@ mod tests {
                 let text = format!("{above}Time;Plate;Room;Z\n{below}{rows}");
                 let found = described(&text);
                 assert_eq!(found.columns, ["Time", "Plate", "Room", "Z"], "{text}");
-                assert_eq!(found.delimiter, Some(b';'));
+                assert_eq!(found.table.separator, Some(Separator(b';')));
                 assert_eq!(found.rows[0], ["0", "21,5", "20,25", "-0,5"]);
                 assert_eq!(found.rows.len(), 3);
                 let unit = if below.is_empty() { "" } else { "nm" };

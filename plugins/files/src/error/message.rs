@@ -1,4 +1,4 @@
-//! What each error says: what it is, where, and what to do.
+//! The message of each error: what it is, where, and what to do.
 
 use std::fmt::{self, Write};
 
@@ -17,16 +17,16 @@ fn is_date(text: &str) -> bool {
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.tell(&mut OneLine(f), true)
+        self.write(&mut OneLine(f), true)
     }
 }
 
-/// What was taken as missing, or left out, in a recording that is read leniently.
-struct Taken<'a>(&'a FileError);
+/// The message of an error that a lenient reader passes over.
+struct Lenient<'a>(&'a FileError);
 
-impl fmt::Display for Taken<'_> {
+impl fmt::Display for Lenient<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.tell(&mut OneLine(f), false)
+        self.0.write(&mut OneLine(f), false)
     }
 }
 
@@ -62,14 +62,14 @@ fn moves(character: char) -> bool {
 }
 
 impl FileError {
-    /// The same of what is read leniently, without the advice to do so.
+    /// The same message without the advice to read leniently.
     #[must_use]
-    pub fn taken(&self) -> impl fmt::Display + '_ {
-        Taken(self)
+    pub fn without_advice(&self) -> impl fmt::Display + '_ {
+        Lenient(self)
     }
 
-    /// Says what it is; `strict` is whether it may still be read leniently.
-    fn tell(&self, f: &mut dyn Write, strict: bool) -> fmt::Result {
+    /// Writes the message; `strict` is whether the file may still be read leniently.
+    fn write(&self, f: &mut dyn Write, strict: bool) -> fmt::Result {
         match self {
             Self::Open { file, source } => {
                 write!(
@@ -100,16 +100,6 @@ impl FileError {
                 )?;
                 or_leniently(f, strict, "leave it out")
             }
-            Self::HeaderTooLong { place, limit } => write!(
-                f,
-                "{place}: a row longer than {limit} bytes starts here, and no names of columns stand above it; look for missing line \
-                 ends, or give the columns shorter names"
-            ),
-            Self::CarriageReturns { place } => write!(
-                f,
-                "{place}: the lines end in carriage returns alone, as on old Macs, so that all of them are one; save the recording with \
-                 line feeds, as `tr '\\r' '\\n' < OLD > NEW` does"
-            ),
             Self::UnclosedQuote { place } => {
                 write!(
                     f,
@@ -136,8 +126,8 @@ impl FileError {
                 place,
                 missing,
                 found,
-                windows_1252,
-            } => lacking(f, place, missing, found, *windows_1252),
+                note,
+            } => lacking(f, place, missing, found, note),
             Self::BadCell {
                 place,
                 column,
@@ -147,16 +137,8 @@ impl FileError {
                     f,
                     "{place}: column `{column}`: expected a number, found `{found}`; "
                 )?;
-                match cell::thousands_mark(found) {
-                    Some(mark) => {
-                        write!(f, "write numbers without {mark} between thousands")?;
-                        or_leniently(f, strict, "take such as absent")
-                    }
-                    None => {
-                        f.write_str("leave the cell empty where there is no value")?;
-                        or_leniently(f, strict, "take it as absent")
-                    }
-                }
+                f.write_str("leave the cell empty where there is no value")?;
+                or_leniently(f, strict, "take it as absent")
             }
             Self::MixedMarks {
                 place,
@@ -165,15 +147,15 @@ impl FileError {
                 mark,
                 since,
             } => {
+                let as_where = match since {
+                    Some(line) => format!("as in line {line}"),
+                    None => "as `[table]` declares".to_owned(),
+                };
                 write!(
                     f,
-                    "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; "
+                    "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, {as_where}, found `{found}`; "
                 )?;
-                let thousands = match cell::thousands_mark(found) {
-                    Some(_) => " and none between thousands",
-                    None => "",
-                };
-                write!(f, "write all numbers of a file with one mark{thousands}")?;
+                f.write_str("write all numbers of a file with one mark")?;
                 or_leniently(f, strict, "leave out those with another")
             }
             Self::TimeBeyond {
@@ -277,22 +259,16 @@ impl FileError {
                 }
                 f.write_str("; the row was left out")
             }
-            Self::TimeStaysBehind {
-                place,
-                time,
-                rows,
-                previous,
-            } => write!(
-                f,
-                "{place}: the last {rows} rows were all left out, up to the time `{time}`, since `{previous}` came before them: has the \
-                 clock been set back, or was that time wrong? Rows are taken again once they are after it"
-            ),
-            Self::StaysUnreadable { newest, rows } => {
-                newest.tell(f, false)?;
+            Self::StillRefused { newest, rows } => {
+                newest.write(f, false)?;
                 write!(
                     f,
-                    "; {rows} rows could not be read and were left out since the last one that was taken"
-                )
+                    "; {rows} rows were left out since the last one that was taken"
+                )?;
+                match **newest {
+                    Self::TimeNotAfter { .. } => f.write_str(": was the clock set back?"),
+                    _ => Ok(()),
+                }
             }
             Self::HeaderAgain {
                 place,
@@ -312,18 +288,18 @@ impl FileError {
                     }
                 }
             }
-            Self::HeaderBehind { place, taken } => {
-                write!(
-                    f,
-                    "{place}: the names of the columns stand here behind the beginning of a row, which was left out"
-                )?;
-                match taken {
-                    true => Ok(()),
-                    false => f.write_str(
-                        "; since they are not those from before, no row is taken until a line of its own names the columns",
-                    ),
-                }
-            }
+            Self::NotAsDeclared { place, key, found } => write!(
+                f,
+                "{place}: {found}, other than `{key}` in `[table]` declares; correct `{key}`, or leave it out so that it is found"
+            ),
+            Self::LongOutOfOrder {
+                place,
+                time,
+                previous,
+            } => write!(
+                f,
+                "{place}: the time `{time}` is before `{previous}`; a long layout is read in order of time: sort the rows by their time"
+            ),
             Self::LongFormat { place, long } => write!(f, "{place}: {long}"),
             Self::CellCount {
                 place,
@@ -366,16 +342,11 @@ fn lacking(
     place: &Place,
     missing: &[MissingColumn],
     found: &[String],
-    windows_1252: bool,
+    note: &str,
 ) -> fmt::Result {
     let there = match found {
         [] => "no columns".to_owned(),
         found => quoted(found.iter().map(String::as_str)),
-    };
-    let read = if windows_1252 {
-        " (read as Windows-1252, since they are not in UTF-8)"
-    } else {
-        ""
     };
     let (is, correct) = match missing {
         [_] => (
@@ -389,7 +360,7 @@ fn lacking(
     };
     write!(
         f,
-        "{place}: there {is} {}; found {there}{read}; ",
+        "{place}: there {is} {}; found {there}{note}; ",
         quoted(missing.iter().map(|column| column.name.as_str()))
     )?;
     let mut named = found.iter().filter(|name| !name.is_empty());

@@ -1,4 +1,9 @@
-//! What is told where the name of a state or predictor is taken twice: no graph uses a node of either crate.
+//! What is reported where the name of a state or predictor is taken twice: no graph uses a node of either crate. It has a process of
+//! its own, since names taken twice stop every graph of a process.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::LazyLock;
 
 use athermal_core::node::{
     Feature, InputPort, Inputs, Kind, Mistake, Operator, OutputPort, Outputs, RoleName, Tick,
@@ -7,6 +12,7 @@ use athermal_core::node::{
 use athermal_testkit::{Case, broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// Gives nothing, and keeps what another crate keeps too.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -77,7 +83,10 @@ athermal_core::inventory::submit! {
         ports: || &[],
         inputs: Keeper::inputs,
         read: athermal_core::node::read::<Keeper>,
-        schema: || schemars::schema_for!(Keeper),
+        schema: || {
+            static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Keeper).into());
+            &SCHEMA
+        },
     }
 }
 
