@@ -266,7 +266,7 @@ impl Model {
         }
     }
 
-    /// Between which values the samples of each measured channel lay in the data of the fit, as far as the card tells.
+    /// Between which values the samples of each measured channel lay in the data of the fit, as far as the card knows.
     #[must_use]
     pub fn sample_ranges(&self) -> &[SampleRange] {
         self.card.as_ref().map_or(&[], |card| &card.ranges)
