@@ -93,7 +93,7 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
     ReadNode { kind, instances }
 }
 
-/// The kind of a name; `None` when an error about it has been told.
+/// The kind of a name; `None` when an error about it has been reported.
 fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'static Kind> {
     match kinds().get(name).map(Vec::as_slice) {
         Some([kind]) => {
