@@ -39,6 +39,18 @@ impl Course {
             .map(move |(now, slots)| (*now, slots[number]))
     }
 
+    /// The first value of a channel of which something is so, and when.
+    pub(super) fn find(&self, number: usize, is: impl Fn(f64) -> bool) -> Option<(Instant, f64)> {
+        let mut all = self.instants().zip(self.values(number));
+        all.find(|(_, value)| is(*value))
+    }
+
+    /// The size of the largest finite value of a channel.
+    pub(super) fn largest(&self, number: usize) -> f64 {
+        let finite = self.values(number).filter(|value| value.is_finite());
+        finite.fold(0.0, |largest, value| largest.max(value.abs()))
+    }
+
     /// The instants of the ticks.
     pub(super) fn instants(&self) -> impl Iterator<Item = Instant> + '_ {
         self.ticks.iter().map(|(now, _)| *now)
@@ -131,4 +143,18 @@ pub(super) fn course(
         }
     }
     course
+}
+
+/// Whether two values have the same bits, or are both absent.
+pub(super) fn same_bits(one: f64, two: f64) -> bool {
+    one.to_bits() == two.to_bits() || (one.is_nan() && two.is_nan())
+}
+
+/// Nothing, or all that was found.
+pub(super) fn none_of(found: Vec<String>) -> Result<(), String> {
+    if found.is_empty() {
+        Ok(())
+    } else {
+        Err(found.join("\n"))
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::compared::{none_of, same_bits};
 use super::tried::{PANICS, tried};
 use crate::document::is_name;
 use crate::unit::Unit;
@@ -135,62 +136,53 @@ pub fn assert_every_machine_conforms(package: &str) {
 
 fn described(machine: &dyn Machine) -> Result<(), String> {
     let mut found = Vec::new();
-    if machines()
-        .get(machine.name())
-        .is_some_and(|same| same.len() > 1)
-    {
-        found.push("the name of the machine is taken twice".to_owned());
-    }
-    if machine.summary().len() < WORDS {
-        found.push("the machine has no summary".to_owned());
-    }
-    let channels = machine.channels();
-    if channels.is_empty() {
-        found.push("the machine measures nothing".to_owned());
-    }
-    let set_points = machine.set_points();
-    let signals = channels.iter().map(|channel| channel.signal);
-    let names = channels.iter().map(|channel| channel.name);
-    let settings = set_points.iter().map(|set_point| set_point.name);
-    let all = std::iter::once(machine.name()).chain(signals).chain(names);
-    let strange = all.chain(settings).filter(|name| !is_name(name, false));
-    found.extend(
-        strange.map(|name| {
-            format!("`{name}` is not a letter followed by letters, digits, `_` and `-`")
-        }),
-    );
-    for (nth, channel) in channels.iter().enumerate() {
-        let before = &channels[..nth];
-        if before
-            .iter()
-            .any(|other| other.reference() == channel.reference())
-        {
-            found.push(format!(
-                "the channel `{}` is there twice",
-                channel.reference()
-            ));
+    let mut check = |wrong: bool, text: &dyn Fn() -> String| {
+        if wrong {
+            found.push(text());
         }
-        found.extend(wrong_unit(channel));
+    };
+    let same = machines().get(machine.name()).map_or(0, Vec::len);
+    check(same > 1, &|| {
+        "the name of the machine is taken twice".to_owned()
+    });
+    let summary = machine.summary();
+    check(summary.len() < WORDS, &|| {
+        "the machine has no summary".to_owned()
+    });
+    let (channels, set_points) = (machine.channels(), machine.set_points());
+    check(channels.is_empty(), &|| {
+        "the machine measures nothing".to_owned()
+    });
+    let names = channels
+        .iter()
+        .flat_map(|channel| [channel.signal, channel.name]);
+    let settings = set_points.iter().map(|set_point| set_point.name);
+    for name in std::iter::once(machine.name()).chain(names).chain(settings) {
+        check(!is_name(name, false), &|| {
+            format!("`{name}` is not a letter followed by letters, digits, `_` and `-`")
+        });
+    }
+    for (nth, channel) in channels.iter().enumerate() {
+        let name = channel.reference();
+        let twice = channels[..nth]
+            .iter()
+            .any(|other| other.reference() == name);
+        check(twice, &|| format!("the channel `{name}` is there twice"));
+        let unit = wrong_unit(channel);
+        check(unit.is_some(), &|| unit.clone().unwrap_or_default());
     }
     for (nth, set_point) in set_points.iter().enumerate() {
-        let name = set_point.name;
-        if set_points[..nth].iter().any(|other| other.name == name) {
-            found.push(format!("the set point `{name}` is there twice"));
-        }
-        let [low, high] = set_point.range;
+        let (name, default, [low, high]) = (set_point.name, set_point.default, set_point.range);
+        let twice = set_points[..nth].iter().any(|other| other.name == name);
+        check(twice, &|| format!("the set point `{name}` is there twice"));
         let is_range = low < high && (high - low).is_finite();
-        if !is_range || !(low..=high).contains(&set_point.default) {
-            let default = set_point.default;
-            found.push(format!(
+        check(!is_range || !(low..=high).contains(&default), &|| {
+            format!(
                 "the set point `{name}` is {default} by default, which is not in a range from {low} to {high}"
-            ));
-        }
+            )
+        });
     }
-    if found.is_empty() {
-        Ok(())
-    } else {
-        Err(found.join("\n"))
-    }
+    none_of(found)
 }
 
 fn wrong_unit(channel: &Channel) -> Option<String> {
@@ -213,11 +205,7 @@ fn wrong_unit(channel: &Channel) -> Option<String> {
 
 fn setups(machine: &dyn Machine) -> Result<(), String> {
     for days in [0.0, -1.0, f64::NAN, f64::INFINITY, 2.0 * LONGEST_DAYS] {
-        let setup = Setup {
-            days,
-            ..Setup::default()
-        };
-        match machine.start(&setup) {
+        match machine.start(&of_days(days)) {
             Err(SetupError::Days { .. }) => {}
             Err(other) => return Err(format!("a recording of {days} days is refused by: {other}")),
             Ok(_) => return Err(format!("a recording of {days} days is begun")),
@@ -236,18 +224,13 @@ fn setups(machine: &dyn Machine) -> Result<(), String> {
             "a schedule of `{foreign}`, which it does not have, is taken"
         ));
     }
-    let shortest = Setup {
-        days: 1e-9,
-        ..Setup::default()
-    };
-    if recorded(machine, &shortest)?.is_empty() {
+    if recorded(machine, &of_days(1e-9))?.is_empty() {
         return Err("the shortest recording has no row".to_owned());
     }
     for set_point in machine.set_points() {
         let setup = Setup {
-            days: DAYS,
             schedule: Some(Schedule::cycle(set_point.name, &set_point.range, 3600)),
-            ..Setup::default()
+            ..of_days(DAYS)
         };
         let rows = recorded(machine, &setup)?;
         infinite(machine, &rows).map_err(|found| {
@@ -262,20 +245,17 @@ fn setups(machine: &dyn Machine) -> Result<(), String> {
 }
 
 fn rows(machine: &dyn Machine) -> Result<(), String> {
-    let rows = recorded(machine, &usual())?;
+    let rows = recorded(machine, &of_days(DAYS))?;
     infinite(machine, &rows)?;
-    let mut last = None;
-    for row in &rows {
-        let first = last.is_none().then_some(-1);
-        let before = first.or(last).unwrap_or(-1);
-        if row.time_ns <= before {
-            let found = match last {
-                None => format!("the first row is {} ns before the start", -row.time_ns),
-                Some(last) => format!("a row at {} ns follows one at {last} ns", row.time_ns),
-            };
-            return Err(found);
+    let first = rows.first().map_or(0, |row| row.time_ns);
+    if first < 0 {
+        return Err(format!("the first row is {} ns before the start", -first));
+    }
+    for pair in rows.windows(2) {
+        let [last, next] = [pair[0].time_ns, pair[1].time_ns];
+        if next <= last {
+            return Err(format!("a row at {next} ns follows one at {last} ns"));
         }
-        last = Some(row.time_ns);
     }
     for (nth, channel) in machine.channels().iter().enumerate() {
         if rows.iter().all(|row| row.values[nth].is_nan()) {
@@ -316,10 +296,13 @@ fn infinite(machine: &dyn Machine, rows: &[Row]) -> Result<(), String> {
 }
 
 fn repeats(machine: &dyn Machine) -> Result<(), String> {
-    let first = recorded(machine, &usual())?;
-    let again = recorded(machine, &usual())?;
-    let other = Setup { seed: 2, ..usual() };
-    let (mut one, mut beside) = (started(machine, &usual())?, started(machine, &other)?);
+    let first = recorded(machine, &of_days(DAYS))?;
+    let again = recorded(machine, &of_days(DAYS))?;
+    let other = Setup {
+        seed: 2,
+        ..of_days(DAYS)
+    };
+    let (mut one, mut beside) = (started(machine, &of_days(DAYS))?, started(machine, &other)?);
     let (mut row, mut unread) = (
         Row::empty(machine.channels()),
         Row::empty(machine.channels()),
@@ -343,10 +326,7 @@ fn repeats(machine: &dyn Machine) -> Result<(), String> {
 }
 
 fn ends(machine: &dyn Machine) -> Result<(), String> {
-    let setup = Setup {
-        days: 1e-3,
-        ..Setup::default()
-    };
+    let setup = of_days(1e-3);
     let mut simulation = started(machine, &setup)?;
     let mut row = Row::empty(machine.channels());
     let (mut last, mut count) = (row.clone(), 0);
@@ -372,9 +352,9 @@ fn ends(machine: &dyn Machine) -> Result<(), String> {
 }
 
 fn corrections(machine: &dyn Machine) -> Result<(), String> {
-    let free = recorded(machine, &usual())?;
+    let free = recorded(machine, &of_days(DAYS))?;
     let axes = Row::empty(machine.channels()).true_drift.len();
-    let mut simulation = started(machine, &usual())?;
+    let mut simulation = started(machine, &of_days(DAYS))?;
     let mut row = Row::empty(machine.channels());
     let mut applied = vec![f64::NAN; axes];
     let mut asked = (0..).map(|nth| ASKED[nth % ASKED.len()]);
@@ -385,7 +365,7 @@ fn corrections(machine: &dyn Machine) -> Result<(), String> {
         }
         infinite(machine, std::slice::from_ref(&row))?;
         let drifts = row.true_drift.iter().zip(&free.true_drift);
-        if drifts.into_iter().any(|(one, two)| !alike(*one, *two)) {
+        if drifts.into_iter().any(|(one, two)| !same_bits(*one, *two)) {
             return Err(format!(
                 "corrected, its true drift at {} ns is another",
                 row.time_ns
@@ -410,9 +390,9 @@ fn corrections(machine: &dyn Machine) -> Result<(), String> {
 /// What the axes are asked for in turn, in nm.
 const ASKED: [f64; 7] = [f64::NAN, 100.0, f64::NAN, -1e300, f64::NAN, 1e12, 0.0];
 
-fn usual() -> Setup {
+fn of_days(days: f64) -> Setup {
     Setup {
-        days: DAYS,
+        days,
         ..Setup::default()
     }
 }
@@ -447,9 +427,5 @@ fn same(one: &Row, two: &Row) -> bool {
     let mut pairs = one_values.iter().zip(&two_values);
     one.time_ns == two.time_ns
         && one_values.len() == two_values.len()
-        && pairs.all(|(one, two)| alike(*one, *two))
-}
-
-fn alike(one: f64, two: f64) -> bool {
-    one.to_bits() == two.to_bits() || (one.is_nan() && two.is_nan())
+        && pairs.all(|(one, two)| same_bits(*one, *two))
 }

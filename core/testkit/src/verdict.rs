@@ -71,7 +71,7 @@ pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     for subject in &subjects {
         for (rule, check) in rules::ALL {
             if subject.case.asks_for(rule)
-                && let Err(found) = tried(|| check(subject, &subjects))
+                && let Err(found) = tried(|| check.run(subject, &subjects))
             {
                 broken.push(broken_in(rule, Some(subject.case), found));
             }

@@ -17,7 +17,7 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     }
     let silent = course(fixture, &mut subject.engine(), nothing.events());
     for number in 0..fixture.slots().len() {
-        if let Some(value) = silent.values(number).find(|value| !value.is_nan())
+        if let Some((_, value)) = silent.find(number, |value| !value.is_nan())
             && !subject.speaks(fixture.slots().start + number)
         {
             let name = subject.name(number);
@@ -81,12 +81,8 @@ pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
             finite(subject, &course)
                 .map_err(|found| format!("with samples of ±{size:e}, {found}"))?;
             for number in 0..fixture.slots().len() {
-                let answers = |course: &Course| {
-                    course
-                        .values(number)
-                        .skip(ticks / 6 * 5)
-                        .any(f64::is_finite)
-                };
+                let last = ticks / 6 * 5;
+                let answers = |of: &Course| of.values(number).skip(last).any(f64::is_finite);
                 if answers(&expected) && !answers(&course) {
                     let name = subject.name(number);
                     return Err(format!(
@@ -113,8 +109,7 @@ fn not_made_up(subject: &Subject<'_>, channel: usize, course: &Course) -> Result
     for number in 0..subject.fixture.slots().len() {
         let slot = subject.fixture.slots().start + number;
         let named = plan.channels[slot].channel.name.split('@').next();
-        let made_up = course.values(number).find(|value| !value.is_nan());
-        if let Some(value) = made_up
+        if let Some((_, value)) = course.find(number, |value| !value.is_nan())
             && named == Some(missing)
             && !subject.speaks(slot)
         {
@@ -129,11 +124,7 @@ fn not_made_up(subject: &Subject<'_>, channel: usize, course: &Course) -> Result
 
 fn finite(subject: &Subject<'_>, course: &Course) -> Result<(), String> {
     for number in 0..subject.fixture.slots().len() {
-        let infinite = course
-            .instants()
-            .zip(course.values(number))
-            .find(|(_, value)| value.is_infinite());
-        if let Some((now, value)) = infinite {
+        if let Some((now, value)) = course.find(number, f64::is_infinite) {
             let name = subject.name(number);
             return Err(format!("`{name}` is {value} at {now} s"));
         }

@@ -26,9 +26,10 @@ pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
     );
     for place in &places {
         for (edit, what) in EDITS {
-            let mut model = model.clone();
-            if model.pointer_mut(place).is_some_and(edit) {
-                tried(|| runs(subject, &model))
+            let mut edited = model.clone();
+            edited.pointer_mut(place).map(edit);
+            if edited != model {
+                tried(|| runs(subject, &edited))
                     .map_err(|found| format!("with {what} {place}, {found}"))?;
             }
         }
@@ -44,60 +45,42 @@ pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
     tried(|| runs(subject, &hollow)).map_err(|found| format!("with every list empty, {found}"))
 }
 
-/// What may have been done to a list or number; false where it cannot be done to this one.
-type Edit = fn(&mut Value) -> bool;
+/// What may have been done to a list or number, and to what it changes nothing of the rest.
+type Edit = fn(&mut Value);
 
 const EDITS: [(Edit, &str); 5] = [
     (
-        |value| {
-            value
-                .as_array_mut()
-                .is_some_and(|list| list.pop().is_some())
-        },
+        |value| in_list(value, |list| drop(list.pop())),
         "the last dropped of",
     ),
     (
-        |value| {
-            let list = value.as_array_mut().filter(|list| !list.is_empty());
-            list.is_some_and(|list| {
-                list.remove(0);
-                true
-            })
-        },
+        |value| in_list(value, |list| drop(list.drain(..list.len().min(1)))),
         "the first dropped of",
     ),
+    (|value| in_list(value, Vec::clear), "nothing left of"),
     (
         |value| {
-            let list = value.as_array_mut().filter(|list| !list.is_empty());
-            list.is_some_and(|list| {
-                list.clear();
-                true
-            })
-        },
-        "nothing left of",
-    ),
-    (
-        |value| {
-            let list = value.as_array_mut();
-            list.is_some_and(|list| {
-                let again = list.last().cloned().unwrap_or_else(|| json!(1.0));
-                list.push(again);
-                true
+            in_list(value, |list| {
+                list.push(list.last().cloned().unwrap_or_else(|| json!(1.0)))
             })
         },
         "one more in",
     ),
     (
         |value| {
-            let counts = value.is_u64();
-            if counts {
-                *value = json!(MANY);
+            if value.is_u64() {
+                *value = json!(MANY)
             }
-            counts
         },
         "a large number in place of",
     ),
 ];
+
+fn in_list(value: &mut Value, edit: fn(&mut Vec<Value>)) {
+    if let Some(list) = value.as_array_mut() {
+        edit(list);
+    }
+}
 
 /// The places of lists and of numbers that count, as JSON pointers.
 fn find(value: &Value, at: &str, places: &mut Vec<String>) {

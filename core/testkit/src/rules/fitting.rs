@@ -88,24 +88,17 @@ fn unusable(table: &Table) -> [(Table, &'static str); 5] {
         }
         table
     };
+    let few = |tick: usize| if tick < 12 { tick as f64 } else { ABSENT };
+    let nothing = changed(&|_, row| row.fill(ABSENT));
+    let dozen = changed(&|tick, row| row.fill(few(tick)));
+    let still = changed(&|_, row| row.fill(20.5));
+    let alike = changed(&|tick, row| row.fill((tick % 7) as f64));
     [
         (Table::default(), "no ticks"),
-        (
-            changed(&|_, row| row.fill(ABSENT)),
-            "ticks that measure nothing",
-        ),
-        (
-            changed(&|tick, row| row.fill(if tick < 12 { tick as f64 } else { ABSENT })),
-            "a dozen rows",
-        ),
-        (
-            changed(&|_, row| row.fill(20.5)),
-            "channels that never change",
-        ),
-        (
-            changed(&|tick, row| row.fill((tick % 7) as f64)),
-            "channels that are all the same",
-        ),
+        (nothing, "ticks that measure nothing"),
+        (dozen, "a dozen rows"),
+        (still, "channels that never change"),
+        (alike, "channels that are all the same"),
     ]
 }
 
@@ -116,12 +109,10 @@ fn survives(subject: &Subject<'_>, table: &Table, options: &FitOptions) -> Resul
     let fitted = through_a_model(subject, &fitted)?;
     let mut engine = subject.fixture.engine(&fitted);
     let course = course(&subject.fixture, &mut engine, subject.events());
-    let infinite = (0..subject.fixture.slots().len())
-        .any(|number| course.values(number).any(f64::is_infinite));
-    if infinite {
-        Err("it predicts infinity".to_owned())
-    } else {
-        Ok(())
+    let mut slots = 0..subject.fixture.slots().len();
+    match slots.any(|number| course.find(number, f64::is_infinite).is_some()) {
+        true => Err("it predicts infinity".to_owned()),
+        false => Ok(()),
     }
 }
 
@@ -225,9 +216,6 @@ fn written(fitted: &Fitted) -> Result<String, String> {
             .map(|text| format!("{node}: {text}"))
             .map_err(|error| format!("what was fitted cannot be written: {error}"))
     };
-    Ok(fitted
-        .iter()
-        .map(of)
-        .collect::<Result<Vec<_>, _>>()?
-        .join("\n"))
+    let all: Result<Vec<_>, _> = fitted.iter().map(of).collect();
+    Ok(all?.join("\n"))
 }

@@ -30,8 +30,7 @@ pub(super) fn memory(subject: &Subject<'_>) -> Result<(), String> {
         };
         let late = course(&subject.fixture, &mut subject.engine(), events);
         for number in 0..subject.fixture.slots().len() {
-            let finite = usual.values(number).filter(|value| value.is_finite());
-            let largest = finite.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            let largest = usual.largest(number);
             let pairs = usual.values(number).skip(start).zip(late.values(number));
             let known = |now: Instant| now > complete + plan.warm_up;
             let warmed = late.instants().zip(pairs).filter(|(now, _)| known(*now));
@@ -39,11 +38,6 @@ pub(super) fn memory(subject: &Subject<'_>) -> Result<(), String> {
                 // A value more does no harm.
                 let close = always.is_nan() || (always - late).abs() <= LEFT * largest;
                 if !close {
-                    let late = if late.is_nan() {
-                        "absent".to_owned()
-                    } else {
-                        late.to_string()
-                    };
                     return Err(format!(
                         "`{}` is {late} at {now} s where it started {} before, and {always} where it has always run, though it says to look \
                          back no more than {}",

@@ -23,6 +23,8 @@ pub(super) use names::shared;
 
 use std::sync::OnceLock;
 
+use Check::{Alone, Among};
+
 use super::case::Given;
 use super::compared::{Course, course};
 use super::fixture::Fixture;
@@ -47,41 +49,52 @@ pub(super) struct Subject<'a> {
     usual: OnceLock<Course>,
 }
 
-/// What finds a rule broken, and says so. The others are the same kind in its other cases.
-type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
+/// What finds a rule broken, and says so.
+#[derive(Clone, Copy)]
+pub(super) enum Check {
+    /// By one case.
+    Alone(fn(&Subject<'_>) -> Result<(), String>),
+    /// By one case, and all of the same kind.
+    Among(fn(&Subject<'_>, &[Subject<'_>]) -> Result<(), String>),
+}
 
 /// The rules that are tried in every case.
 pub(super) const ALL: [(Rule, Check); 25] = [
-    (Rule::Names, |subject, _| names::names(subject)),
-    (Rule::Answers, answers::answers),
-    (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
-    (Rule::Ranges, |subject, _| parameters::ranges(subject)),
-    (Rule::Deterministic, |subject, _| {
-        repeat::deterministic(subject)
-    }),
-    (Rule::LongRun, |subject, _| repeat::long_run(subject)),
-    (Rule::Restores, |subject, _| snapshots::restores(subject)),
-    (Rule::Versions, snapshots::versions),
-    (Rule::Absence, |subject, _| absence::absence(subject)),
-    (Rule::Infinity, |subject, _| absence::infinity(subject)),
-    (Rule::Past, |subject, _| past::past(subject)),
-    (Rule::Stamps, |subject, _| stamps::stamps(subject)),
-    (Rule::Memory, |subject, _| memory::memory(subject)),
-    (Rule::Segments, |subject, _| repeat::segments(subject)),
-    (Rule::Wanted, |subject, _| shapes::wanted(subject)),
-    (Rule::Widths, |subject, _| shapes::widths(subject)),
-    (Rule::Units, |subject, _| units::units(subject)),
-    (Rule::Allocation, |subject, _| {
-        allocation::allocation(subject)
-    }),
-    (Rule::Votes, |subject, _| votes::votes(subject)),
-    (Rule::Uncertainty, |subject, _| votes::uncertainty(subject)),
-    (Rule::NoTrace, |subject, _| traces::no_trace(subject)),
-    (Rule::Fits, |subject, _| fitting::fits(subject)),
-    (Rule::Models, |subject, _| fitting::models(subject)),
-    (Rule::Linear, |subject, _| fitting::linear(subject)),
-    (Rule::Edited, |subject, _| edited::edited(subject)),
+    (Rule::Names, Alone(names::names)),
+    (Rule::Answers, Among(answers::answers)),
+    (Rule::ReadsBack, Alone(parameters::read_back)),
+    (Rule::Ranges, Alone(parameters::ranges)),
+    (Rule::Deterministic, Alone(repeat::deterministic)),
+    (Rule::LongRun, Alone(repeat::long_run)),
+    (Rule::Restores, Alone(snapshots::restores)),
+    (Rule::Versions, Among(snapshots::versions)),
+    (Rule::Absence, Alone(absence::absence)),
+    (Rule::Infinity, Alone(absence::infinity)),
+    (Rule::Past, Alone(past::past)),
+    (Rule::Stamps, Alone(stamps::stamps)),
+    (Rule::Memory, Alone(memory::memory)),
+    (Rule::Segments, Alone(repeat::segments)),
+    (Rule::Wanted, Alone(shapes::wanted)),
+    (Rule::Widths, Alone(shapes::widths)),
+    (Rule::Units, Alone(units::units)),
+    (Rule::Allocation, Alone(allocation::allocation)),
+    (Rule::Votes, Alone(votes::votes)),
+    (Rule::Uncertainty, Alone(votes::uncertainty)),
+    (Rule::NoTrace, Alone(traces::no_trace)),
+    (Rule::Fits, Alone(fitting::fits)),
+    (Rule::Models, Alone(fitting::models)),
+    (Rule::Linear, Alone(fitting::linear)),
+    (Rule::Edited, Alone(edited::edited)),
 ];
+
+impl Check {
+    pub(super) fn run(self, subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), String> {
+        match self {
+            Alone(check) => check(subject),
+            Among(check) => check(subject, all),
+        }
+    }
+}
 
 impl<'a> Subject<'a> {
     /// Compiles a case and, of an estimator, fits it.
@@ -91,13 +104,14 @@ impl<'a> Subject<'a> {
         let given = case.given(kind);
         let fixture = Fixture::new(kind, &parameters, &given)?;
         let table = samples(kind, &given, case.ticks, case.every, Coming::WithGaps);
+        let fitted = Fitted::new();
         let subject = Self {
             kind,
             case,
             parameters,
             given,
             fixture,
-            fitted: Fitted::new(),
+            fitted,
             table,
             usual: OnceLock::new(),
         };
@@ -106,15 +120,15 @@ impl<'a> Subject<'a> {
 
     /// The same case with other channels or units, of which other samples come; not fitted yet.
     pub(super) fn fed(&self, given: Vec<Given>, fixture: Fixture, table: Table) -> Self {
+        let (parameters, fitted) = (self.parameters.clone(), Fitted::new());
         Self {
-            kind: self.kind,
-            case: self.case,
-            parameters: self.parameters.clone(),
+            parameters,
             given,
             fixture,
-            fitted: Fitted::new(),
+            fitted,
             table,
             usual: OnceLock::new(),
+            ..*self
         }
     }
 

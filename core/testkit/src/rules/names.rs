@@ -1,5 +1,6 @@
 //! Decides whether what a kind names differs from what others name, and be referred to.
 
+use super::super::compared::none_of;
 use super::Subject;
 use crate::compile::PlannedRole;
 use crate::document::is_name;
@@ -61,11 +62,7 @@ pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
             )
         }));
     }
-    if found.is_empty() {
-        Ok(())
-    } else {
-        Err(found.join("\n"))
-    }
+    none_of(found)
 }
 
 /// Names that break the rules, or stand twice.

@@ -2,17 +2,16 @@
 
 use std::borrow::Cow;
 
-use serde_json::Value as Json;
-use toml::Value;
+use serde_json::{Value as Json, json};
 
-use super::super::compared::course;
+use super::super::compared::{course, none_of};
 use super::super::fixture::Fixture;
 use super::super::tried::{PANICS, tried};
 use super::Subject;
 use crate::diagnostic::{Place, SourceId};
 use crate::document::Value as DocumentValue;
 use crate::fit::{FitOptions, fit};
-use crate::node::{ParameterPart, Range, as_toml, each_parameter};
+use crate::node::{ParameterPart, Range, as_toml, each_parameter, inline_toml};
 use crate::recording::{Event, Table};
 
 pub(super) fn read_back(subject: &Subject<'_>) -> Result<(), String> {
@@ -41,14 +40,14 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
     let parameters = written(&subject.fixture.plan.nodes[0].spec.parameters());
     let parameters = DocumentValue::from_json(&parameters, Place::new(SourceId(0), 0, 0))
         .map_err(|error| error.to_string())?;
+    let full = in_full(subject, &subject.fixture);
     let mut found = Vec::new();
     each_parameter((subject.kind.schema)(), &parameters, &mut |part| {
         for (value, allowed) in probes(&part) {
-            let mut table = in_full(subject, &subject.fixture);
-            if !set(&mut table, part.path, value.clone()) {
+            let Some(table) = with(&full, part.path, &value) else {
                 continue;
-            }
-            let (path, name) = (part.path.join("."), part.name());
+            };
+            let (path, name, value) = (part.path.join("."), part.name(), inline_toml(&value));
             let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
             match (read, allowed) {
                 (Ok(_), Allowed::No) => {
@@ -70,11 +69,7 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
             }
         }
     });
-    if found.is_empty() {
-        Ok(())
-    } else {
-        Err(found.join("\n"))
-    }
+    none_of(found)
 }
 
 /// JSON without its nulls, which a graph file cannot hold.
@@ -120,49 +115,50 @@ enum Allowed {
 }
 
 /// Values to try.
-fn probes(part: &ParameterPart<'_>) -> Vec<(Value, Allowed)> {
-    let text = |text: &str, allowed| (Value::String(text.to_owned()), allowed);
+fn probes(part: &ParameterPart<'_>) -> Vec<(Json, Allowed)> {
     if part.is_text("Duration") {
-        return vec![text("0s", Allowed::Maybe)];
+        return vec![(json!("0s"), Allowed::Maybe)];
     }
     if part.is_text("Quantity") {
         let unit = part
             .value
             .and_then(|value| value.as_text()?.split_once(' '));
         let zero = format!("0 {}", unit.map_or("nm", |(_, unit)| unit));
-        return vec![text("1 cd", Allowed::No), text(&zero, Allowed::Maybe)];
+        return vec![(json!("1 cd"), Allowed::No), (json!(zero), Allowed::Maybe)];
     }
     let integer = part.is("integer");
     if integer || part.is("number") {
-        return numbers(integer, &part.range);
+        let number = |end: f64| {
+            if integer {
+                json!(end as i64)
+            } else {
+                json!(end)
+            }
+        };
+        let ends = ends(integer, &part.range).into_iter();
+        return ends.map(|end| (number(end), Allowed::Yes)).collect();
     }
     // What a choice needs beside it is for a case to state.
     let present = part.value.map(DocumentValue::to_json);
     let choices = part.choices().into_iter();
     let choices = choices.filter(|choice| Some(choice) != present.as_ref());
-    let choices = choices.filter_map(|choice| Some((as_toml(&choice)?, Allowed::Maybe)));
-    choices.collect()
+    choices.map(|choice| (choice, Allowed::Maybe)).collect()
 }
 
 /// The ends of a range, and what is far away where there is none.
-fn numbers(integer: bool, range: &Range) -> Vec<(Value, Allowed)> {
-    let low = match (range.min, range.above) {
+fn ends(integer: bool, range: &Range) -> Vec<f64> {
+    let mut ends = match (range.min, range.above) {
         (_, Some(_)) => vec![],
         (Some(min), _) => vec![min],
         (None, None) => vec![-1e6, -1.0, 0.0],
     };
-    let high = match (range.max, range.below) {
-        (_, Some(_)) => None,
-        (Some(max), _) => Some(max),
+    match (range.max, range.below) {
+        (_, Some(_)) => {}
+        (Some(max), _) => ends.push(max),
         // A count may stand for room that nobody has.
-        (None, None) => (!integer).then_some(1e6),
-    };
-    let ends = low.into_iter().chain(high);
-    let value = |value: f64| match integer {
-        true => Value::Integer(value as i64),
-        false => Value::Float(value),
-    };
-    ends.map(|end| (value(end), Allowed::Yes)).collect()
+        (None, None) => ends.extend((!integer).then_some(1e6)),
+    }
+    ends
 }
 
 /// The parameters with defaults filled in, as the specification has them, and what the framework reads beside them.
@@ -171,42 +167,21 @@ fn in_full(subject: &Subject<'_>, fixture: &Fixture) -> toml::Table {
     let elsewhere = subject.kind.framework_keys();
     table.retain(|key, _| elsewhere.contains(&key));
     let own = fixture.plan.nodes[0].spec.parameters();
-    if let Some(Value::Table(own)) = as_toml(&own) {
+    if let Some(toml::Value::Table(own)) = as_toml(&own) {
         table.extend(own);
     }
     table
 }
 
-/// Puts a value in its place; whether there is one.
-fn set(table: &mut toml::Table, path: &[Cow<'_, str>], value: Value) -> bool {
-    let Some((last, way)) = path.split_last() else {
-        return false;
-    };
-    let Some((first, way)) = way.split_first() else {
-        table.insert(last.to_string(), value);
-        return true;
-    };
-    let mut place = table.get_mut(&**first);
-    for part in way {
-        place = place.and_then(|place| step(place, part));
+/// The table with another value in a place; nothing where there is no such place.
+fn with(table: &toml::Table, path: &[Cow<'_, str>], value: &Json) -> Option<toml::Table> {
+    let mut json = serde_json::to_value(table).ok()?;
+    let (last, way) = path.split_last()?;
+    let way: String = way.iter().map(|part| format!("/{part}")).collect();
+    match json.pointer_mut(&way)? {
+        Json::Object(table) => drop(table.insert(last.to_string(), value.clone())),
+        Json::Array(list) => *list.get_mut(last.parse::<usize>().ok()?)? = value.clone(),
+        _ => return None,
     }
-    match place {
-        Some(Value::Table(table)) => {
-            table.insert(last.to_string(), value);
-            true
-        }
-        Some(list @ Value::Array(_)) => step(list, last).is_some_and(|place| {
-            *place = value;
-            true
-        }),
-        _ => false,
-    }
-}
-
-fn step<'a>(value: &'a mut Value, part: &str) -> Option<&'a mut Value> {
-    match value {
-        Value::Table(table) => table.get_mut(part),
-        Value::Array(list) => list.get_mut(part.parse::<usize>().ok()?),
-        _ => None,
-    }
+    as_toml(&json)?.as_table().cloned()
 }

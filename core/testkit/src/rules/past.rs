@@ -152,8 +152,7 @@ impl<'a> Claims<'a> {
         must: impl Fn(usize, Instant, Option<Instant>) -> bool,
     ) -> Result<(), String> {
         for number in 0..self.made_of.len() {
-            let finite = self.usual.values(number).filter(|value| value.is_finite());
-            let largest = finite.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            let largest = self.usual.largest(number);
             let pairs = self.usual.given(number).zip(other.given(number));
             for ((now, one), (_, two)) in pairs {
                 let value = |given: Option<(f64, Instant)>| given.map_or(f64::NAN, |given| given.0);

@@ -1,6 +1,6 @@
 //! Decides whether the same samples give the same bits: again, elsewhere, beside others, after a break.
 
-use super::super::compared::{Course, course};
+use super::super::compared::{Course, course, same_bits};
 use super::Subject;
 use crate::engine::Engine;
 use crate::recording::{Event, Samples, Table, pass};
@@ -104,10 +104,7 @@ fn elsewhen(
     let other = course(&subject.fixture, &mut engine, later.events());
     for number in 0..subject.fixture.slots().len() {
         let mut pairs = found.values(number).zip(other.values(number));
-        let differs = |&(one, two): &(f64, f64)| {
-            one.to_bits() != two.to_bits() && !(one.is_nan() && two.is_nan())
-        };
-        if let Some((one, two)) = pairs.find(differs) {
+        if let Some((one, two)) = pairs.find(|&(one, two)| !same_bits(one, two)) {
             return Err(format!(
                 "in a segment whose time {when} `{}` is {one:?}, and {two:?} where that begins an hour later",
                 subject.name(number)

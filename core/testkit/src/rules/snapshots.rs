@@ -7,11 +7,8 @@ use super::super::compared::course;
 use super::super::fixture::NODE;
 use super::Subject;
 use crate::engine::{Carry, EngineState, StateTransfer};
-use crate::node::{State, Written, written_names};
+use crate::node::State;
 use crate::prng::Prng;
-
-/// From which version on nobody looks for older ones.
-const VERSIONS: u32 = 100;
 
 /// How often a run is cut.
 const CUTS: usize = 6;
@@ -101,9 +98,6 @@ pub(super) fn versions(subject: &Subject<'_>, others: &[Subject<'_>]) -> Result<
             }
         }
     }
-    for older in older_forms(&name) {
-        migrates(subject, &of_name(&own, &name, &older), &older, &name)?;
-    }
     for other in others {
         offer(subject, other)?;
     }
@@ -114,52 +108,6 @@ pub(super) fn versions(subject: &Subject<'_>, others: &[Subject<'_>]) -> Result<
         }
     }
     Ok(())
-}
-
-/// The older forms of a state that are known under its name with a smaller version.
-fn older_forms(name: &str) -> Vec<String> {
-    let known = |name: &str| {
-        let mut all = written_names().iter();
-        all.any(|known| known.of == Written::State && known.name == name)
-    };
-    let Some((kind, version)) = name.rsplit_once('/') else {
-        return Vec::new();
-    };
-    let below = 0..version.parse::<u32>().unwrap_or(0).min(VERSIONS);
-    let older = below.map(|version| format!("{kind}/{version}"));
-    // A name of another length cannot stand in its place.
-    let fits = |older: &String| older.len() == name.len() && known(older);
-    older.filter(fits).collect()
-}
-
-/// A state of an older form, as far as it has the same fields, is refused in words, or migrated to the present form.
-fn migrates(subject: &Subject<'_>, own: &[u8], older: &str, name: &str) -> Result<(), String> {
-    let mut engine = subject.engine();
-    let mut state = engine.state();
-    state.nodes.entry(NODE.to_owned()).or_default().own = Some(own.to_vec());
-    let carried = engine.adopt(&state, &StateTransfer::all(&subject.fixture.plan), false);
-    let first = carried.into_iter().next();
-    match first.map_or(Carry::Carried, |node| node.outcome) {
-        Carry::Cold { .. } => Ok(()),
-        Carry::Migrated { from } if from != older => Err(format!(
-            "a state `{older}` is said to be migrated from `{from}`"
-        )),
-        Carry::Migrated { .. } => {
-            let now = engine.state().nodes.remove(NODE).and_then(|node| node.own);
-            let now = now.and_then(|own| rmp_serde::from_slice::<Named>(&own).ok());
-            let now = now.map_or_else(String::new, |named| named.state);
-            if now == name {
-                Ok(())
-            } else {
-                Err(format!(
-                    "migrated from `{older}`, its next state is `{now}` and not `{name}`"
-                ))
-            }
-        }
-        Carry::Carried | Carry::Adopted { .. } | Carry::Warmed { .. } => Err(format!(
-            "a state `{older}` is taken without saying that it is migrated"
-        )),
-    }
 }
 
 /// The same case with a channel less or more at each port in turn.
@@ -206,22 +154,13 @@ fn offered(subject: &Subject<'_>, state: &EngineState) -> Carry {
     first.map_or(Carry::Carried, |node| node.outcome)
 }
 
-/// The same bytes under a name that ends in a version that there is not.
+/// The same bytes under a name of the same length that ends in a version that there is not.
 fn of_version_9(own: &[u8], name: &str) -> Vec<u8> {
-    let mut other = name.to_owned();
-    other.push(if name.ends_with('9') { '8' } else { '9' });
-    let last = other.len() - 2;
-    other.remove(last);
-    of_name(own, name, &other)
-}
-
-/// The same bytes under another name of the same length; as they are where it is of another.
-fn of_name(own: &[u8], name: &str, other: &str) -> Vec<u8> {
     let mut bytes = own.to_vec();
     let mut windows = own.windows(name.len());
-    let at = windows.position(|window| window == name.as_bytes());
-    if let Some(at) = at.filter(|_| other.len() == name.len()) {
-        bytes[at..at + name.len()].copy_from_slice(other.as_bytes());
+    if let Some(at) = windows.position(|window| window == name.as_bytes()) {
+        let last = &mut bytes[at + name.len() - 1];
+        *last = if *last == b'9' { b'8' } else { b'9' };
     }
     bytes
 }

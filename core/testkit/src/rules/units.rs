@@ -19,19 +19,14 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
             in_another_unit(given, stated)
         })
         .collect();
-    if given
-        .iter()
-        .zip(&subject.given)
-        .all(|(new, old)| new.unit == old.unit)
-    {
-        return Ok(());
-    }
-    let units: Vec<_> = given
-        .iter()
-        .zip(&subject.given)
-        .filter(|(new, old)| new.unit != old.unit)
+    let pairs = given.iter().zip(&subject.given);
+    let changed = pairs.filter(|(new, old)| new.unit != old.unit);
+    let units: Vec<_> = changed
         .map(|(new, old)| format!("{} in {} rather than {}", new.port, new.unit, old.unit))
         .collect();
+    if units.is_empty() {
+        return Ok(());
+    }
     let units = units.join(", ");
     let fixture = Fixture::new(subject.kind, &subject.parameters, &given)
         .map_err(|error| format!("with {units} the graph is refused: {error}"))?;
@@ -42,20 +37,13 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
     for (number, slot) in subject.fixture.slots().enumerate() {
         let unit = &subject.fixture.plan.channels[slot].channel.unit;
         let other_unit = &other.fixture.plan.channels[slot].channel.unit;
-        let largest = one
-            .values(number)
-            .filter(|value| value.is_finite())
-            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let largest = one.largest(number);
         let pairs = one
             .instants()
             .zip(one.values(number).zip(two.values(number)));
         for (now, (expected, found)) in pairs {
-            let found = if found.is_nan() {
-                Some(found)
-            } else {
-                other_unit.convert(found, unit)
-            };
-            let Some(found) = found else {
+            // What is absent stays so.
+            let Some(found) = other_unit.convert(found, unit) else {
                 return Err(format!(
                     "with {units}, `{}` is in {other_unit} rather than {unit}",
                     subject.name(number)

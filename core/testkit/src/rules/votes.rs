@@ -117,8 +117,7 @@ pub(super) fn uncertainty(subject: &Subject<'_>) -> Result<(), String> {
                     subject.name(number)
                 ));
             }
-            let below = |(_, value): &(_, f64)| *value < 0.0;
-            if let Some((now, value)) = course.instants().zip(course.values(number)).find(below) {
+            if let Some((now, value)) = course.find(number, |value| value < 0.0) {
                 return Err(format!("`{}` is {value} at {now} s", subject.name(number)));
             }
         }
