@@ -132,13 +132,14 @@ fn candidates(port: &InputPort, given: &[Given]) -> Vec<Given> {
     }
     widths.extend(given.iter().map(|given| given.channels));
     widths.push(1);
-    let pairs = units.iter().flat_map(|unit| {
-        let usual = &usual;
-        widths.iter().map(move |&channels| Given {
-            channels,
+    let mut all = Vec::new();
+    for unit in units {
+        let fed = |channels: &usize| Given {
+            channels: *channels,
             unit: unit.clone(),
             ..usual.clone()
-        })
-    });
-    pairs.collect()
+        };
+        all.extend(widths.iter().map(fed));
+    }
+    all
 }

@@ -60,37 +60,17 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// The name by which reports call it.
+    /// The name by which reports call it: `reads back`.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Explained => "explained",
-            Self::Names => "names",
-            Self::Answers => "answers",
-            Self::ReadsBack => "reads back",
-            Self::Ranges => "ranges",
-            Self::Deterministic => "deterministic",
-            Self::LongRun => "long run",
-            Self::Restores => "restores",
-            Self::Versions => "versions",
-            Self::Absence => "absence",
-            Self::Infinity => "infinity",
-            Self::Past => "past",
-            Self::Stamps => "stamps",
-            Self::Memory => "memory",
-            Self::Segments => "segments",
-            Self::Wanted => "wanted",
-            Self::Widths => "widths",
-            Self::Units => "units",
-            Self::Allocation => "allocation",
-            Self::Votes => "votes",
-            Self::Uncertainty => "uncertainty",
-            Self::NoTrace => "no trace",
-            Self::Fits => "fits",
-            Self::Models => "models",
-            Self::Linear => "linear",
-            Self::Edited => "edited",
+    pub fn name(self) -> String {
+        let mut name = String::new();
+        for letter in format!("{self:?}").chars() {
+            if letter.is_uppercase() && !name.is_empty() {
+                name.push(' ');
+            }
+            name.extend(letter.to_lowercase());
         }
+        name
     }
 
     /// What to do where it is broken.
@@ -204,6 +184,6 @@ impl Rule {
 
 impl fmt::Display for Rule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(&self.name())
     }
 }

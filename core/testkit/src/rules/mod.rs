@@ -146,10 +146,8 @@ impl<'a> Subject<'a> {
     /// # Errors
     /// What the fit says where it gives nothing.
     pub(super) fn fit(&self, table: &Table, threads: usize) -> Result<Fitted, String> {
-        let options = FitOptions {
-            threads,
-            ..FitOptions::default()
-        };
+        let mut options = FitOptions::default();
+        options.threads = threads;
         let (fitted, report) = fit(&self.fixture.plan, table, &options, &mut |_| ())
             .map_err(|error| error.to_string())?;
         for estimator in &report.estimators {
@@ -178,13 +176,8 @@ impl<'a> Subject<'a> {
 
     /// Samples of all channels at every tick, twice as often.
     pub(super) fn without_gaps(&self, ticks: usize) -> Table {
-        samples(
-            self.kind,
-            &self.given,
-            ticks,
-            self.case.every,
-            Coming::Always,
-        )
+        let every = self.case.every;
+        samples(self.kind, &self.given, ticks, every, Coming::Always)
     }
 
     /// What the node gives where it is fed all of it in one run.
@@ -211,13 +204,7 @@ impl<'a> Subject<'a> {
     /// Whether it is an estimator that goes on learning while it runs.
     pub(super) fn learns(&self) -> bool {
         let role = &self.fixture.plan.nodes[0].role;
-        matches!(
-            role,
-            PlannedRole::Estimator {
-                learning: Some(_),
-                ..
-            }
-        )
+        matches!(role, PlannedRole::Estimator { learning, .. } if learning.is_some())
     }
 
     /// Whether the port of a slot may have something to say of nothing.

@@ -45,32 +45,19 @@ pub(super) fn wanted(subject: &Subject<'_>) -> Result<(), String> {
 /// However many channels come, where the kind takes so many, it runs, and gives the same bits again.
 pub(super) fn widths(subject: &Subject<'_>) -> Result<(), String> {
     for width in WIDTHS {
-        let given: Vec<Given> = subject
-            .given
-            .iter()
-            .map(|given| {
-                let mut ports = (subject.kind.inputs)().iter();
-                let is_data = |read| matches!(read, Read::Fresh | Read::Held);
-                let is_wide = ports.any(|port| {
-                    port.name == given.port && is_data(port.read) && port.name != "state"
-                });
-                let channels = if is_wide { width } else { given.channels };
-                Given {
-                    channels,
-                    ..given.clone()
-                }
-            })
-            .collect();
+        let is_wide = |given: &Given| {
+            let mut ports = (subject.kind.inputs)().iter();
+            let port = ports.find(|port| port.name == given.port);
+            port.is_some_and(|port| port.read != Read::Truth && port.name != "state")
+        };
+        let mut given = subject.given.clone();
+        let wide = given.iter_mut().filter(|given| is_wide(given));
+        wide.for_each(|given| given.channels = width);
         let Ok(fixture) = Fixture::new(subject.kind, &subject.parameters, &given) else {
             continue;
         };
-        let table = samples(
-            subject.kind,
-            &given,
-            subject.ticks() / 2,
-            subject.case.every,
-            Coming::WithGaps,
-        );
+        let (ticks, every) = (subject.ticks() / 2, subject.case.every);
+        let table = samples(subject.kind, &given, ticks, every, Coming::WithGaps);
         // So many may be more than the rows can tell.
         let Ok(other) = subject.fed(given, fixture, table).fitted() else {
             continue;

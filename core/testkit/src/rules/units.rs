@@ -78,14 +78,14 @@ fn in_another_unit(given: &Given, stated: bool) -> Given {
             let differs = unit.convert(1.0, other).is_some_and(|one| one != 1.0);
             other.measures_same(&unit) && is_taken && differs
         });
+    let Some((other, text)) = other else {
+        return given.clone();
+    };
     let (low, high) = given.range();
-    match other {
-        Some((other, text)) => Given {
-            unit: text,
-            range: unit.convert(low, &other).zip(unit.convert(high, &other)),
-            ..given.clone()
-        },
-        None => given.clone(),
+    Given {
+        unit: text,
+        range: unit.convert(low, &other).zip(unit.convert(high, &other)),
+        ..given.clone()
     }
 }
 
