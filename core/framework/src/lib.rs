@@ -16,9 +16,9 @@
 //! come from plugin crates:
 //!
 //! ```
-//! # use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+//! # use athermal_core::node::prelude::*;
 //! # /// Doubled its input.
-//! # #[derive(Debug, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+//! # #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 //! # #[serde(deny_unknown_fields)]
 //! # pub struct Doubled {}
 //! # impl Feature for Doubled {

@@ -31,7 +31,7 @@ use crate::share::raise;
 ///
 /// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
 /// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
-/// Where all voters tell their standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
+/// Where all voters have a standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hedge {
@@ -230,19 +230,16 @@ impl Combine for Hedging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Losses>() {
-            Ok(losses) if losses.sums.len() != self.losses.sums.len() => {
-                Restored::cold("the number of voters differs")
+        state.accept(|losses: Losses| {
+            if losses.sums.len() != self.losses.sums.len() {
+                return Err("the number of voters differs");
             }
-            Ok(losses) if !losses.is_sound() => {
-                Restored::cold("its losses are not all numbers from 0 on")
+            if !losses.is_sound() {
+                return Err("its losses are not all numbers from 0 on");
             }
-            Ok(losses) => {
-                self.losses = losses;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+            self.losses = losses;
+            Ok(())
+        })
     }
 }
 

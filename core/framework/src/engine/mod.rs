@@ -28,7 +28,7 @@ pub use tick::{Cursor, History};
 pub use idle::Answer;
 
 pub(crate) use at_work::naming;
-pub(crate) use tick::{Gathered, Given};
+use tick::Gathered;
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};

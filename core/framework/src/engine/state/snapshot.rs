@@ -8,10 +8,10 @@ use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
 use crate::engine::tick::Estimate;
-use crate::engine::tick::Given;
 use crate::engine::tick::NodeRunner;
 use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
 use crate::node::Restored;
+use crate::node::SlotTime;
 
 impl Engine {
     /// All that the engine knows, as self-describing bytes.
@@ -202,7 +202,7 @@ impl Engine {
             }
             if let Some(was) = state.slots.get(&channel.name) {
                 self.slots.values[slot] = was.value;
-                self.slots.given[slot] = Given {
+                self.slots.given[slot] = SlotTime {
                     stamp: was.stamp,
                     tick: was.written,
                 };

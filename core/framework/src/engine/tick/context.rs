@@ -63,7 +63,7 @@ impl TickContext<'_> {
         {
             operator.capture(&Tick {
                 now: self.now,
-                gathered: self.gathered,
+                gathered: &&*self.gathered,
                 ports: gathers,
             });
         }
@@ -97,7 +97,7 @@ impl TickContext<'_> {
         };
         let tick = Tick {
             now,
-            gathered,
+            gathered: &&**gathered,
             ports: gathers,
         };
         operator.step(&tick, &mut outputs);

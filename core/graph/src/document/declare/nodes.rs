@@ -9,7 +9,7 @@ use super::reading::{
 use super::sets::Sets;
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
 
@@ -208,7 +208,7 @@ impl Named<'_> {
         let is_set = |name: &&str| self.each.iter().any(|(set, _)| set == name);
         value.any_text(&mut |text, place| {
             for name in placeholder::names(text).filter(|name| !is_set(name)) {
-                let problem = DocumentProblem::UnknownPlaceholder {
+                let problem = problem::UnknownPlaceholder {
                     name: name.to_owned(),
                     known: self.known(),
                     what: self.what.to_owned(),

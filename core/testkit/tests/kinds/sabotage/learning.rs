@@ -35,9 +35,9 @@ impl Estimator for Level {
 
     fn learns(&self) -> Learns {
         if self.fault == Fault::Learned {
-            Learns::UnlessTold
+            Learns::ByDefault
         } else {
-            Learns::WhenTold
+            Learns::OnRequest
         }
     }
 
@@ -156,13 +156,7 @@ impl Learner for Learning {
         if self.fault == Fault::Forgets {
             return Restored::Accepted;
         }
-        match state.known() {
-            Ok(known) => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.known)
     }
 }
 
