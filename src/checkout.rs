@@ -1,4 +1,4 @@
-//! Decides where the sources of athermal are that other crates build on; they are not on a registry yet.
+//! The sources of athermal that other crates build on; they are not on a registry yet.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ impl Checkout {
                 Some(folder) => PathBuf::from(folder),
                 None => {
                     return Err(Failure::Request(format!(
-                        "`--athermal {stated}` says nothing: give the folder of the sources as path:DIR"
+                        "`--athermal {stated}` names no folder: give the folder of the sources as path:DIR"
                     )));
                 }
             },
@@ -34,7 +34,7 @@ impl Checkout {
                 Some(_) => "athermal is not",
             };
             return Err(Failure::Outside(format!(
-                "{whose} in {}: athermal is not on crates.io yet, so say where its sources are with `--athermal path:DIR` \
+                "{whose} in {}: athermal is not on crates.io yet, so name the folder of its sources with `--athermal path:DIR` \
                  (a checkout of version {VERSION})",
                 folder.display()
             )));

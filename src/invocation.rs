@@ -1,4 +1,4 @@
-//! Decides how commands that the user may try next are spelt: with the program named as the user has named it.
+//! Commands that the user may try next, with the program named as the user named it.
 
 /// The program as it was called, quoted for a shell where it must be.
 #[must_use]
@@ -26,7 +26,7 @@ pub fn command(words: &[impl AsRef<str>]) -> String {
     led(" ", words)
 }
 
-/// What a user would type next, said in a line where it fits.
+/// What a user would type next, in a line where it fits.
 #[must_use]
 pub fn next(words: &[impl AsRef<str>]) -> String {
     led("next:", words)

@@ -1,10 +1,10 @@
-//! Decides what there is to what a command tells beside its result: words for people, and for programs its name and what it is about.
+//! What a command reports beside its result: words for people, an event with its facts for programs.
 
 use std::fmt;
 
 use serde_json::{Map, Value, json};
 
-/// Something that is told beside a result.
+/// A report beside a result.
 #[derive(Debug, Clone)]
 pub struct Message {
     name: &'static str,
@@ -30,12 +30,12 @@ impl Message {
     /// For programs: an object on one line, with how grave it is.
     #[must_use]
     pub fn line(&self, level: &str) -> String {
-        let mut told = Map::new();
-        told.insert("event".to_owned(), json!(self.name));
-        told.insert("level".to_owned(), json!(level));
-        told.extend(self.facts.clone());
-        told.insert("message".to_owned(), json!(self.words));
-        Value::Object(told).to_string()
+        let mut event = Map::new();
+        event.insert("event".to_owned(), json!(self.name));
+        event.insert("level".to_owned(), json!(level));
+        event.extend(self.facts.clone());
+        event.insert("message".to_owned(), json!(self.words));
+        Value::Object(event).to_string()
     }
 }
 
@@ -45,7 +45,7 @@ impl fmt::Display for Message {
     }
 }
 
-/// Words of which programs need to know no more than that they were said.
+/// Words without facts for programs.
 const REMARK: &str = "remark";
 
 impl From<fmt::Arguments<'_>> for Message {

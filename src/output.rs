@@ -1,5 +1,5 @@
-//! Decides what becomes of a result that cannot be printed: a reader that has gone away has seen enough, and anything else
-//! is told. It stands in the place of the standard macros, which panic.
+//! Printing that does not panic: a reader that has gone away ends the program quietly, any other failure is an error. These macros
+//! take the place of the standard ones.
 
 use std::fmt;
 use std::io::{ErrorKind, Write};
@@ -11,8 +11,7 @@ pub fn put(text: fmt::Arguments<'_>) {
     }
 }
 
-/// Prints and tells whether anybody still reads, where there is more to do than to print; ends the program with 3 where it cannot be
-/// written.
+/// Prints; false where nobody reads any more. Ends the program with 3 where it cannot be written.
 pub fn offer(text: fmt::Arguments<'_>) -> bool {
     if let Err(error) = std::io::stdout().lock().write_fmt(text) {
         if error.kind() == ErrorKind::BrokenPipe {

@@ -1,4 +1,4 @@
-//! Decides what the command line is made of; each command says what it does.
+//! The command line as a whole; each command stands in a file of its own.
 
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
@@ -36,15 +36,21 @@ outside failed, such as reading a file.";
 pub fn command_line() -> ExitCode {
     let arguments = Arguments::parse();
     let mut terminal = terminal::Terminal::new(&arguments.terminal);
-    terminal.events = terminal.format == Format::Json && arguments.command.tells_programs();
-    told_in_a_line();
-    match caught(|| arguments.command.run(&terminal, Arguments::command)) {
+    terminal.events = terminal.format == Format::Json && arguments.command.writes_events();
+    report_panics_in_a_line();
+    match caught(|| arguments.command.run(&terminal)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
             terminal.error(&failure);
             failure.exit_code()
         }
     }
+}
+
+/// The command line, as a shell completes it.
+#[must_use]
+pub fn whole() -> clap::Command {
+    Arguments::command()
 }
 
 /// What a command answers, or that code of the program or of a plugin panicked in it.
@@ -57,8 +63,8 @@ fn caught(command: impl FnOnce() -> Result<Answer, Failure>) -> Result<Answer, F
     })
 }
 
-/// Lets a panic be told in a line, unless the way to it is asked for.
-fn told_in_a_line() {
+/// Reports a panic in one line, unless `RUST_BACKTRACE` asks for the way to it.
+fn report_panics_in_a_line() {
     let in_full = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
         if std::env::var_os("RUST_BACKTRACE").is_some_and(|wanted| wanted != "0") {
@@ -70,10 +76,10 @@ fn told_in_a_line() {
 }
 
 fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
-    let said = said(panic.payload());
+    let message = said(panic.payload());
     match panic.location() {
-        Some(place) => format!("panic at {place}: {said}"),
-        None => format!("panic: {said}"),
+        Some(place) => format!("panic at {place}: {message}"),
+        None => format!("panic: {message}"),
     }
 }
 
@@ -84,8 +90,8 @@ mod tests {
     use super::Arguments;
     use crate::terminal::{Answer, Failure};
 
-    /// What is told of each argument of a command, and of those inside it, that is given a text instead of what it takes.
-    fn told(command: &Command, words: &[String]) -> Vec<String> {
+    /// The error of each argument of a command, and of those inside it, that is given a text instead of what it takes.
+    fn refusals(command: &Command, words: &[String]) -> Vec<String> {
         let mut all = Vec::new();
         for argument in command
             .get_arguments()
@@ -97,7 +103,7 @@ mod tests {
         }
         for inner in command.get_subcommands() {
             let words = [words, &[inner.get_name().to_owned()]].concat();
-            all.extend(told(inner, &words));
+            all.extend(refusals(inner, &words));
         }
         all
     }
@@ -105,28 +111,28 @@ mod tests {
     #[test]
     fn a_panic_in_a_command_ends_it_with_a_status_of_its_own() {
         let failed = super::caught(|| panic!("within a plugin"));
-        let Err(Failure::Outside(told)) = failed else {
+        let Err(Failure::Outside(message)) = failed else {
             panic!("{failed:?}")
         };
-        assert!(told.contains("RUST_BACKTRACE=1"), "{told}");
+        assert!(message.contains("RUST_BACKTRACE=1"), "{message}");
         let fine = super::caught(|| Ok(Answer::Fine));
         assert!(matches!(fine, Ok(Answer::Fine)));
     }
 
     #[test]
     fn what_is_no_number_is_told_in_words_of_the_program() {
-        let told = told(&Arguments::command(), &["athermal".to_owned()]);
-        let ours = told
+        let refusals = refusals(&Arguments::command(), &["athermal".to_owned()]);
+        let ours = refusals
             .iter()
-            .filter(|told| told.contains("expected ") && told.contains("number"));
-        assert!(ours.count() >= 6, "{told:#?}");
+            .filter(|message| message.contains("expected ") && message.contains("number"));
+        assert!(ours.count() >= 6, "{refusals:#?}");
         for words in [
             "invalid digit",
             "invalid float",
             "non-zero type",
             "from empty string",
         ] {
-            let foreign = told.iter().find(|told| told.contains(words));
+            let foreign = refusals.iter().find(|message| message.contains(words));
             assert_eq!(foreign, None);
         }
     }

@@ -1,4 +1,4 @@
-//! Decides how the program speaks to people and to other programs: colour, width, progress, one-line errors.
+//! Reporting to people and programs: notes, warnings, progress, errors and exit statuses.
 
 use std::fmt;
 use std::io::{IsTerminal, Write};
@@ -9,7 +9,7 @@ use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
 use athermal::files::FileError;
 use athermal::run::fit::FitError;
-use athermal::run::live::RunError;
+use athermal::run::live::{RunError, StateError};
 use athermal::trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -54,7 +54,7 @@ pub struct Terminal {
     pub format: Format,
     /// Whether to be brief.
     pub quiet: bool,
-    /// Whether what is told beside the result is told to programs: a JSON object a line.
+    /// Whether reports beside the result are for programs: a JSON object a line.
     pub events: bool,
     colour: bool,
 }
@@ -77,19 +77,19 @@ impl Terminal {
         }
     }
 
-    /// Says something that the user should know beside the result.
-    pub fn note(&self, told: impl Into<Message>) {
+    /// Notes something that the user should know beside the result.
+    pub fn note(&self, message: impl Into<Message>) {
         if !self.quiet {
-            self.tell("note", None, &told.into());
+            self.write("note", None, &message.into());
         }
     }
 
-    /// Says what is not as it should be, but did not stop the work.
-    pub fn warning(&self, told: impl Into<Message>) {
-        self.tell("warning", Some("\x1b[1;33m"), &told.into());
+    /// Warns of what is not as it should be, but did not stop the work.
+    pub fn warning(&self, message: impl Into<Message>) {
+        self.write("warning", Some("\x1b[1;33m"), &message.into());
     }
 
-    /// Says why the program gives up.
+    /// Reports why the program gives up.
     pub fn error(&self, failure: &Failure) {
         match failure {
             Failure::Graph {
@@ -100,7 +100,7 @@ impl Terminal {
         }
     }
 
-    /// Says why something is not done, while the result goes on.
+    /// Reports why something is not done, while the result goes on.
     pub fn setback(&self, failure: &Failure) {
         match failure {
             Failure::Graph {
@@ -111,10 +111,10 @@ impl Terminal {
                 diagnostics,
                 sources,
             } => self.diagnostics(diagnostics, sources),
-            Failure::Told(_) => {}
+            Failure::Exit(_) => {}
             Failure::Request(text) | Failure::Outside(text) => {
-                let told = Message::new("error", Value::Null, text);
-                self.tell("error", Some("\x1b[1;31m"), &told);
+                let message = Message::new("error", Value::Null, text);
+                self.write("error", Some("\x1b[1;31m"), &message);
             }
         }
     }
@@ -141,14 +141,14 @@ impl Terminal {
     /// Shows what is doubtful or wrong in a file, beside a result that there is nevertheless.
     pub fn doubts(&self, diagnostics: &Diagnostics, sources: &Sources) {
         if self.events {
-            let told = diagnostics.to_json(sources);
-            for of in told["diagnostics"].as_array().into_iter().flatten() {
+            let all = diagnostics.to_json(sources);
+            for of in all["diagnostics"].as_array().into_iter().flatten() {
                 let text = |key: &str| of[key].as_str().unwrap_or_default();
-                let told = Message::new("diagnostic", of.clone(), text("message"));
-                self.say(told.line(text("severity")));
+                let message = Message::new("diagnostic", of.clone(), text("message"));
+                self.print(message.line(text("severity")));
             }
         } else if !diagnostics.is_empty() {
-            self.say(diagnostics.render(sources, self.colour, 100).trim_end());
+            self.print(diagnostics.render(sources, self.colour, 100).trim_end());
         }
     }
 
@@ -177,20 +177,22 @@ impl Terminal {
         }
     }
 
-    /// Tells programs or people; these know what is graver than a note by a label of this colour.
-    fn tell(&self, level: &str, colour: Option<&str>, told: &Message) {
+    /// Writes an event for programs or a line for people, with a label of this colour where it is graver than a note.
+    fn write(&self, level: &str, colour: Option<&str>, message: &Message) {
         match colour {
-            _ if self.events => self.say(told.line(level)),
+            _ if self.events => self.print(message.line(level)),
             Some(colour) if self.colour => {
-                self.say(format_args!("{colour}{level}\x1b[0m\x1b[1m:\x1b[0m {told}"));
+                self.print(format_args!(
+                    "{colour}{level}\x1b[0m\x1b[1m:\x1b[0m {message}"
+                ));
             }
-            Some(_) => self.say(format_args!("{level}: {told}")),
-            None => self.say(told),
+            Some(_) => self.print(format_args!("{level}: {message}")),
+            None => self.print(message),
         }
     }
 
     /// A reader of standard error that has gone away is no reason to stop.
-    fn say(&self, text: impl fmt::Display) {
+    fn print(&self, text: impl fmt::Display) {
         let _ = writeln!(std::io::stderr(), "{text}");
     }
 }
@@ -204,7 +206,7 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
     out.write_all(bytes)
         .and_then(|()| out.flush())
         .map_err(|error| match error.kind() {
-            std::io::ErrorKind::BrokenPipe => Failure::Told(0),
+            std::io::ErrorKind::BrokenPipe => Failure::Exit(0),
             _ => Failure::Outside(format!("cannot write to standard output: {error}")),
         })
 }
@@ -219,7 +221,7 @@ pub struct Progress {
 
 impl Progress {
     /// Shows how many have been done so far.
-    pub fn tell(&mut self, done: u64) {
+    pub fn set(&mut self, done: u64) {
         self.bar.set_position(done);
         if self.waits && self.bar.elapsed() >= Duration::from_secs(1) {
             self.waits = false;
@@ -239,7 +241,7 @@ impl Drop for Progress {
     }
 }
 
-/// What a command that did its work says through its exit status.
+/// The answer of a command that did its work, as its exit status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// All is well.
@@ -271,8 +273,8 @@ pub enum Failure {
     },
     /// Something outside did not work.
     Outside(String),
-    /// It has been told already, and ends with this status.
-    Told(u8),
+    /// It was reported before; the program ends with this status.
+    Exit(u8),
 }
 
 impl Failure {
@@ -283,13 +285,12 @@ impl Failure {
             Self::Request(_) => 2,
             Self::Graph { diagnostics, .. } => status_of(diagnostics),
             Self::Outside(_) => 3,
-            Self::Told(code) => *code,
+            Self::Exit(code) => *code,
         })
     }
 }
 
-/// The exit status that tells of mistakes: 3 where all of them are that a file which the command was given cannot be read, as it is of
-/// models and data, and 2 where there is any in what was read.
+/// The exit status of mistakes: 3 where the only ones are files of the command line that cannot be read, else 2.
 #[must_use]
 pub fn status_of(mistakes: &Diagnostics) -> u8 {
     let is_unread = |of: &Diagnostic| of.code == UNREADABLE && of.place.is_none();
@@ -320,7 +321,7 @@ impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         if error.is_closed_pipe() {
             // Whoever read our output has seen enough.
-            return Self::Told(0);
+            return Self::Exit(0);
         }
         match error {
             FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {
@@ -334,15 +335,29 @@ impl From<FileError> for Failure {
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Source(error) | RunError::Sink(error) | RunError::Keep(error) => {
-                outside(error)
+            RunError::Source(error) | RunError::Sink(error) => outside(error),
+            RunError::State(error) => error.into(),
+            RunError::Engine(_) | RunError::Stage(_) | RunError::Copy(_) => {
+                Self::Request(error.to_string())
             }
-            RunError::Engine(error) => Self::Request(error.to_string()),
         }
     }
 }
 
-/// What went wrong with a source, a sink or a recording: of a file, what its error says.
+impl From<StateError> for Failure {
+    fn from(error: StateError) -> Self {
+        match error {
+            StateError::Foreign { .. } => Self::Request(error.to_string()),
+            StateError::Held { path } => Self::Outside(format!(
+                "{}: another run keeps its state there: end that one first, or name another file with `--state`",
+                path.display()
+            )),
+            other => Self::Outside(other.to_string()),
+        }
+    }
+}
+
+/// The failure of a source, a sink or a recording.
 pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
     match error.downcast::<FileError>() {
         Ok(error) => (*error).into(),

@@ -1,6 +1,7 @@
-//! Decides when data lie so far from those of a fit that predictions of them mean little; how well they do is told by their scores.
+//! When data lie so far from those of a fit that predictions of them mean little.
 
 use athermal::core::engine::SampleRange;
+use athermal::run::live::monitor::usual;
 use serde::Serialize;
 use serde_json::json;
 
@@ -11,7 +12,7 @@ use athermal_analysis::figures::number;
 /// So many widths beyond, another unit is more likely than another day.
 const ANOTHER_UNIT: f64 = 10.0;
 
-/// What programs are told by: samples outside of those of the fit.
+/// The event for samples outside of those of the fit.
 const OUTSIDE: &str = "outside_fit";
 
 /// A channel whose samples lie far outside of what a fit saw.
@@ -42,8 +43,9 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
     seen.iter().filter_map(of).collect()
 }
 
-/// Tells of them.
-pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
+/// Warns of them.
+/// Warns of them.
+pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
     for of in all {
         let words = format!(
             "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
@@ -58,13 +60,8 @@ pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
     }
 }
 
-/// Whether a sample is such.
-pub fn is_beyond(usual: &SampleRange, sample: f64) -> bool {
-    doubt(usual, sample, sample).is_some()
-}
-
-/// Tells of the first such sample of a channel.
-pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
+/// Warns of the first such sample of a channel.
+pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
     if let Some(doubt) = doubt(usual, sample, sample) {
         let words = format!(
             "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",
@@ -82,11 +79,6 @@ pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: 
         });
         terminal.warning(Message::new(OUTSIDE, facts, words));
     }
-}
-
-/// Where the samples of a channel lay in a fit.
-pub fn usual<'a>(fit: &'a [SampleRange], channel: &str) -> Option<&'a SampleRange> {
-    fit.iter().find(|usual| usual.channel == channel)
 }
 
 /// What to think of samples that lie far outside; none where they do not.

@@ -20,7 +20,7 @@ use athermal_analysis::figures::counted;
 
 /// Look for mistakes in a graph file
 ///
-/// All mistakes are told at once, each with its place and a way out. Nothing is fitted and no data are read.
+/// Reports all mistakes at once, each with its place and a way out. Nothing is fitted and no data are read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml"
@@ -57,7 +57,7 @@ impl Counts {
     }
 }
 
-/// A graph and its plan; `None` after any mistake in them, all of which are told with those of its tests.
+/// A graph and its plan; `None` after any mistake in them, all of which are reported with those of its tests.
 fn graph_and_plan(
     path: &Path,
     sources: &mut Sources,
@@ -72,7 +72,7 @@ fn graph_and_plan(
     Some((graph, plan))
 }
 
-/// The plan of a graph and its tests; `None` after any mistake in either, all of which are told.
+/// The plan of a graph and its tests; `None` after any mistake in either, all of which are reported.
 pub(super) fn plan_and_tests(
     path: &Path,
     sources: &mut Sources,
@@ -117,18 +117,18 @@ impl Check {
             let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
             if let Some(machine) = machine {
-                unread::tell(terminal, path, &machine.graph);
+                unread::warn(terminal, path, &machine.graph);
                 fine.push((path, machine.plan));
             }
         }
         if terminal.format == Format::Json {
-            let mut told = diagnostics.to_json(&sources);
-            told["graphs"] = fine
+            let mut facts = diagnostics.to_json(&sources);
+            facts["graphs"] = fine
                 .iter()
                 .map(|(path, plan)| Counts::of(path, plan))
                 .map(|of| json!(of))
                 .collect();
-            println!("{told:#}");
+            println!("{facts:#}");
         } else {
             terminal.diagnostics(&diagnostics, &sources);
             for (path, plan) in fine {
@@ -144,7 +144,7 @@ impl Check {
             }
         }
         if diagnostics.has_errors() {
-            Err(Failure::Told(status_of(&diagnostics)))
+            Err(Failure::Exit(status_of(&diagnostics)))
         } else if self.strict && !diagnostics.is_empty() {
             Ok(Answer::No)
         } else {

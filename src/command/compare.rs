@@ -3,7 +3,7 @@
 mod table;
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use athermal::Model;
@@ -11,6 +11,7 @@ use athermal::core::diagnostic::Sources;
 use athermal::core::engine::{Engine, SampleRange};
 use athermal::diagnosis::comparison::{Comparison, Contender, Row, compare};
 use athermal::run::fit::{FitOptions, FitReport, Outcome};
+use athermal::run::live::monitor::usual;
 use athermal::run::recording::Event;
 use athermal::run::score::{Lack, ScoreOptions, Trace, trace_as};
 use clap::Args;
@@ -18,8 +19,8 @@ use serde_json::{Map, Value, json};
 
 use self::table::{describe, is_one_of_several};
 use super::beyond;
-use super::data::{self, Data, FITS, recording, tell_overlap};
-use super::doubtful::Doubtful;
+use super::data::{self, Data, FITS, recording, warn_overlap};
+use super::doubts;
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
 use super::model;
@@ -30,15 +31,17 @@ use athermal_analysis::figures::{count, number, seconds};
 
 /// Fit several graphs on the same data and score them on others, in one table
 ///
-/// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are scored
-/// on the instants at which all of them are valid, beside no model and persistence; one that is valid at less than half of the
-/// instants is scored on its own, and compared with none.
+/// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are
+/// scored on the instants at which all of them are valid, beside no model and persistence. One that is valid at less than
+/// half of the instants is scored on its own, and compared with none.
 ///
-/// `--mode` tells how far each model reaches by itself, as in `evaluate`: one step from measured past truths, several, or a free run.
+/// `--mode` shows how far each model reaches by itself, as in `evaluate`: one step from measured past truths, several, or a
+/// free run.
 ///
-/// Beside each score stands the standard error of its difference to the best of the column: the instants are cut, in order of
-/// time, into ten blocks of as many each, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
-/// two standard errors, marked ~, may be chance: of two such graphs choose the simpler one, or score them on more days.
+/// Beside each score stands the standard error of its difference to the best of the column. The instants are cut, in order
+/// of time, into ten blocks of equal size; the spread of the differences over the blocks gives it (batch means; Law and
+/// Kelton). A difference of less than two standard errors, marked ~, may be chance: of two such graphs choose the simpler
+/// one, or score them on more days.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv \\
@@ -73,33 +76,33 @@ struct Fitted {
     doubtful_in_fit: Map<String, Value>,
 }
 
-/// What has been told of data: graphs that read the same have the same to tell.
+/// The warnings that were shown already: graphs that read the same data have the same ones.
 struct Once<'a> {
     terminal: &'a Terminal,
-    told: BTreeSet<String>,
+    shown: BTreeSet<String>,
     /// Where samples lay in the fits so far.
     in_fits: Vec<SampleRange>,
 }
 
 impl Once<'_> {
     fn warn(&mut self, all: impl IntoIterator<Item = Message>) {
-        for told in all {
-            if self.told.insert(told.to_string()) {
-                self.terminal.warning(told);
+        for message in all {
+            if self.shown.insert(message.to_string()) {
+                self.terminal.warning(message);
             }
         }
     }
 
-    fn note(&mut self, told: Option<String>) {
-        if let Some(words) = told.filter(|words| self.told.insert(words.clone())) {
+    fn note(&mut self, words: Option<String>) {
+        if let Some(words) = words.filter(|words| self.shown.insert(words.clone())) {
             self.terminal.note(words);
         }
     }
 
-    fn tell_beyond(&mut self, report: &FitReport, trace: &Trace) {
-        let new = |range: &&SampleRange| beyond::usual(&self.in_fits, &range.channel).is_none();
+    fn warn_beyond(&mut self, report: &FitReport, trace: &Trace) {
+        let new = |range: &&SampleRange| usual(&self.in_fits, &range.channel).is_none();
         let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
-        beyond::tell(self.terminal, &beyond::beyond(&new, &trace.ranges));
+        beyond::warn(self.terminal, &beyond::beyond(&new, &trace.ranges));
         self.in_fits.extend(new);
     }
 }
@@ -125,14 +128,14 @@ impl Compare {
             }
             for comparison in &comparisons {
                 let spans = is_one_of_several(comparison, &comparisons);
-                let told = describe(comparison, options.mode, fits.len() > 1, spans);
-                println!("{told}");
+                let table = describe(comparison, options.mode, fits.len() > 1, spans);
+                println!("{table}");
             }
             for fit in &fits {
                 println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
             }
         }
-        tell(terminal, &comparisons, &fits);
+        warn(terminal, &comparisons, &fits);
         Ok(if failed(terminal, &fits) {
             Answer::No
         } else {
@@ -159,8 +162,8 @@ impl Compare {
     /// What went wrong with the data, with the graph that was to read them where there are several.
     fn of_graph(&self, path: &str, failure: Failure) -> Failure {
         match failure {
-            Failure::Request(told) if self.graphs.len() > 1 => {
-                Failure::Request(format!("for the graph {path}: {told}"))
+            Failure::Request(reason) if self.graphs.len() > 1 => {
+                Failure::Request(format!("for the graph {path}: {reason}"))
             }
             other => other,
         }
@@ -179,7 +182,7 @@ impl Compare {
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         let mut once = Once {
             terminal,
-            told: BTreeSet::new(),
+            shown: BTreeSet::new(),
             in_fits: Vec::new(),
         };
         for (name, path, mut model) in self.models(terminal)? {
@@ -198,7 +201,7 @@ impl Compare {
             let mut look = |_: &Engine, _: Event| {
                 ticks += 1;
                 if ticks % 4096 == 0 {
-                    progress.tell(ticks);
+                    progress.set(ticks);
                 }
             };
             let trace = trace_as(&model.plan, &model.fitted, &watch, scored, &mut look)
@@ -208,31 +211,24 @@ impl Compare {
             let rejected = &trace.rejected;
             once.warn(data::doubts(&model.plan, &reports, trace.refused, rejected));
             once.note(data::without_zone(&reports));
-            once.tell_beyond(&report, &trace);
+            once.warn_beyond(&report, &trace);
             if fits.is_empty() && !report.estimators.is_empty() {
-                self.tell_fitted_on(terminal, &report, &trace);
+                self.warn_fitted_on(terminal, &report, &trace);
             }
             let faults = watch.found();
-            once.warn(faults::told(&fit.faults));
-            once.warn(faults::told(&faults));
-            let doubtful = Doubtful {
-                faults: &faults,
-                outside_fit: &beyond::beyond(&report.ranges, &trace.ranges),
-                reports: &reports,
-            };
-            let doubtful_in_fit = Doubtful {
-                faults: &fit.faults,
-                outside_fit: &[],
-                reports: &fit.dataset.reports(),
-            };
+            once.warn(faults::messages(&fit.faults));
+            once.warn(faults::messages(&faults));
+            let outside_fit = beyond::beyond(&report.ranges, &trace.ranges);
+            let doubtful = doubts::facts(&faults, &outside_fit, &dataset);
+            let doubtful_in_fit = doubts::facts(&fit.faults, &[], &fit.dataset);
             fits.push(Fitted {
                 graph: name.clone(),
                 path,
                 seconds,
                 report,
                 lacks: trace.lacks.clone(),
-                doubtful: doubtful.facts(),
-                doubtful_in_fit: doubtful_in_fit.facts(),
+                doubtful,
+                doubtful_in_fit,
             });
             contenders.push(Contender {
                 name,
@@ -245,32 +241,30 @@ impl Compare {
 
     fn facts(&self, comparisons: &[Comparison], fits: &[Fitted]) -> Value {
         let of = |fit: &Fitted| {
-            let mut told = json!({
+            let mut facts = json!({
                 "graph": fit.graph,
                 "file": fit.path,
                 "fit_s": fit.seconds,
                 "lacks": fit.lacks,
             });
             for (key, found) in &fit.doubtful {
-                told[key] = found.clone();
+                facts[key] = found.clone();
             }
             if !fit.doubtful_in_fit.is_empty() {
-                told["in_fit"] = json!(fit.doubtful_in_fit);
+                facts["in_fit"] = json!(fit.doubtful_in_fit);
             }
-            told
+            facts
         };
-        let name = |path: &Path| path.display().to_string();
-        let data: Vec<_> = self.data.paths().map(name).collect();
-        let on: Vec<_> = self.on.iter().map(|path| name(path)).collect();
-        let mut told = json!({ "data": data, "on": on });
-        self.scored.tell(&mut told);
-        told["graphs"] = fits.iter().map(of).collect();
-        told["comparisons"] = json!(comparisons);
-        told
+        let on = self.data.others(self.on.clone());
+        let mut facts = json!({ "data": self.data.names(), "on": on.names() });
+        self.scored.add_to(&mut facts);
+        facts["graphs"] = fits.iter().map(of).collect();
+        facts["comparisons"] = json!(comparisons);
+        facts
     }
 
-    /// Tells where graphs are scored on what they were fitted on.
-    fn tell_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
+    /// Warns where graphs are scored on the data of their fit.
+    fn warn_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
         let same = |on: &&PathBuf| {
             self.data
                 .paths()
@@ -292,7 +286,7 @@ impl Compare {
         let scored = times().min().zip(times().max());
         if let Some(((from, to), (first, last))) = report.period.zip(scored) {
             let fit = (seconds(from), seconds(to));
-            tell_overlap(terminal, fit, (seconds(first), seconds(last)));
+            warn_overlap(terminal, fit, (seconds(first), seconds(last)));
         }
     }
 }
@@ -317,13 +311,13 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
     names
 }
 
-/// Tells what makes scores say less than they seem to.
-fn tell(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
+/// Warns of what makes scores say less than they seem to.
+fn warn(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
     if comparisons.is_empty() {
         terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
     }
     for comparison in comparisons {
-        tell_left_out(terminal, comparison);
+        warn_left_out(terminal, comparison);
     }
     for column in comparisons.iter().flat_map(|of| &of.truths) {
         if !column.otherwise.is_empty() {
@@ -336,19 +330,19 @@ fn tell(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
         }
     }
     for fit in fits {
-        for told in Lack::told(&fit.lacks) {
-            terminal.warning(format_args!("{}: {told}", fit.graph));
+        for message in Lack::warnings(&fit.lacks) {
+            terminal.warning(format_args!("{}: {message}", fit.graph));
         }
     }
 }
 
-/// Tells where the scores hide what happens while a prediction has no value.
-fn tell_left_out(terminal: &Terminal, comparison: &Comparison) {
+/// Warns where the scores hide what happens while a prediction has no value.
+fn warn_left_out(terminal: &Terminal, comparison: &Comparison) {
     for column in &comparison.truths {
         if let Some((left_out, row)) = column.left_out {
             let Row { graph, node, .. } = &comparison.rows[row];
             terminal.warning(format_args!(
-                "{}: {} instants are left out at which others predict and {node} of {graph} does not; what each does there is not told: \
+                "{}: {} instants are left out at which others predict and {node} of {graph} does not; what each does there is not shown: \
                  score it alone by `athermal evaluate --each-on-its-own`",
                 column.truth,
                 count(left_out)
@@ -357,7 +351,7 @@ fn tell_left_out(terminal: &Terminal, comparison: &Comparison) {
     }
 }
 
-/// Whether a node could not be fitted; each is told.
+/// Warns of nodes that could not be fitted; whether there is one.
 fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
     let mut failed = false;
     for fit in fits {

@@ -1,9 +1,10 @@
 //! `athermal completions`: what a shell needs to complete the commands.
 
-use clap::{Args, Command};
+use clap::Args;
 use clap_complete::Shell;
 
-use crate::terminal::{Answer, Failure};
+use crate::program::whole;
+use crate::terminal::{Answer, Failure, Terminal, print};
 
 /// Print a completion script for a shell
 #[derive(Debug, Args)]
@@ -22,10 +23,10 @@ impl Completions {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn run(&self, mut whole: Command) -> Result<Answer, Failure> {
+    pub fn run(&self, _: &Terminal) -> Result<Answer, Failure> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut whole, "athermal", &mut script);
-        crate::terminal::print(&script)?;
+        clap_complete::generate(self.shell, &mut whole(), "athermal", &mut script);
+        print(&script)?;
         Ok(Answer::Fine)
     }
 }

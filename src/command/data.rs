@@ -1,14 +1,11 @@
-//! Decides how recorded data are named on the command line, and what is told of them after reading.
+//! Recorded data on the command line: how files are named, and the warnings after reading them.
 
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata};
-use std::hash::Hasher;
-use std::io::{self, BufRead, BufReader};
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
 use athermal::core::compile::Plan;
-use athermal::core::engine::Fnv1a;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use athermal::run::model::DataCard;
 use clap::Args;
@@ -42,10 +39,10 @@ pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
 }
 
 /// Reads the path of a recording; a graph is refused with these words.
-pub fn no_graph(told: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+pub fn no_graph(reason: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| {
         let is_graph = path.extension().is_some_and(|ending| ending == "toml");
-        if is_graph { Err(told) } else { Ok(path) }
+        if is_graph { Err(reason) } else { Ok(path) }
     })
 }
 
@@ -76,6 +73,12 @@ impl Data {
             ))),
             None => Ok(()),
         }
+    }
+
+    /// The names of the files, as they were given.
+    pub fn names(&self) -> Vec<String> {
+        let names = self.paths().map(|path| path.display().to_string());
+        names.collect()
     }
 
     /// The paths of the files.
@@ -135,22 +138,13 @@ impl Data {
         format!("OTHER.{kind}")
     }
 
-    /// Tells of files on which a model was fitted, and of data of the time of its fit, so that its scores on them say little. `period`
-    /// is from when to when the data are, in s.
-    pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
-        let cards = || model.card.iter().flat_map(|card| &card.data);
-        let seen = |path: &&Path| {
-            // Only a file of the same length is read for its checksum.
-            let length = std::fs::metadata(path)
-                .ok()
-                .filter(Metadata::is_file)?
-                .len();
-            cards().find(|card| card.bytes == length)?;
-            let (bytes, hash) = content_of(path).ok()?;
-            cards().find(|card| card.bytes == bytes && card.hash == hash)
-        };
+    /// Warns of files on which the model was fitted, and of data from the time of its fit: scores on them say little. `period` is that
+    /// of the data, in s.
+    pub fn warn_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
+        let cards = model.card.iter().flat_map(|card| &card.data);
+        let seen = |path: &&Path| cards.clone().any(|card| card.is_of(path));
         let mut again = false;
-        for path in self.paths().filter(|path| seen(path).is_some()) {
+        for path in self.paths().filter(seen) {
             again = true;
             terminal.warning(format_args!(
                 "{}: the model was fitted on this file, so {FITS}",
@@ -159,11 +153,11 @@ impl Data {
         }
         let of_fit = model.card.as_ref().and_then(|card| card.period);
         if !again && let Some((fit, data)) = of_fit.zip(period) {
-            tell_overlap(terminal, (fit.from_s, fit.to_s), data);
+            warn_overlap(terminal, (fit.from_s, fit.to_s), data);
         }
     }
 
-    /// What a model's card says of the files.
+    /// The files for a model's card.
     ///
     /// # Errors
     /// When a file cannot be read.
@@ -171,30 +165,23 @@ impl Data {
         let reports = dataset.reports();
         let mut cards = Vec::with_capacity(self.files.len());
         for path in &self.files {
-            let (bytes, hash) = content_of(path).map_err(|error| {
+            let name = path.display().to_string();
+            let report = reports.iter().find(|(file, _)| *file == name);
+            let rows = report.map_or(0, |(_, report)| report.rows);
+            let card = DataCard::of(path, rows).map_err(|error| {
                 Failure::Outside(format!("cannot read {}: {error}", path.display()))
             })?;
-            let name = path.display().to_string();
-            let rows = reports
-                .iter()
-                .find(|(file, _)| *file == name)
-                .map_or(0, |(_, report)| report.rows);
-            cards.push(DataCard {
-                path: name,
-                rows,
-                bytes,
-                hash,
-            });
+            cards.push(card);
         }
         Ok(cards)
     }
 }
 
-/// What scores on the data of a fit tell.
-pub const FITS: &str = "it is told how well it fits, not how well it predicts";
+/// What scores on the data of a fit show.
+pub const FITS: &str = "the scores show how well it fits, not how well it predicts";
 
-/// Tells of dated data that lie in the time of those of a fit, both in s.
-pub fn tell_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
+/// Warns of dated data from the time of a fit, both in s.
+pub fn warn_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
     let shared = (fit.0.max(data.0), fit.1.min(data.1));
     let length = |(from, to): (f64, f64)| to - from;
     // Other times begin anew with each recording.
@@ -214,31 +201,8 @@ pub fn is_same_content(one: &Path, other: &Path) -> bool {
         let of = std::fs::metadata(path).ok().filter(Metadata::is_file)?;
         Some(of.len())
     };
-    let of_one = length(one);
-    let content = |path: &Path| content_of(path).ok();
-    one == other
-        || of_one.is_some()
-            && of_one == length(other)
-            && content(one).is_some_and(|of_one| content(other) == Some(of_one))
-}
-
-/// The length of a file in bytes and the checksum of its content as text: [`Fnv1a`] in hexadecimal digits.
-///
-/// # Errors
-/// When it cannot be read.
-pub fn content_of(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
-    let (mut bytes, mut hash) = (0, Fnv1a::default());
-    loop {
-        let piece = file.fill_buf()?;
-        if piece.is_empty() {
-            return Ok((bytes, format!("{:016x}", hash.finish())));
-        }
-        hash.write(piece);
-        let read = piece.len();
-        bytes += read as u64;
-        file.consume(read);
-    }
+    let same_length = length(one).is_some_and(|of_one| length(other) == Some(of_one));
+    one == other || same_length && DataCard::of(one, 0).is_ok_and(|card| card.is_of(other))
 }
 
 /// Checks that the ending of a file that is to be written names a format; one without an ending is CSV.
@@ -260,23 +224,23 @@ pub fn check_ending(output: &Path) -> Result<(), Failure> {
 /// Files that are given more than once, whose rows count as often.
 fn repeated(files: impl Iterator<Item = impl AsRef<str>>) -> Vec<String> {
     let mut known: BTreeMap<PathBuf, u64> = BTreeMap::new();
-    let mut told = Vec::new();
+    let mut messages = Vec::new();
     for file in files {
         if let Ok(path) = std::fs::canonicalize(file.as_ref()) {
             let times = known.entry(path).or_default();
             *times += 1;
             if *times == 2 {
-                told.push(format!(
+                messages.push(format!(
                     "{}: this file is given more than once, and so often its rows count",
                     file.as_ref()
                 ));
             }
         }
     }
-    told
+    messages
 }
 
-/// That times do not say how far they are from UTC, once however many files there are.
+/// The note that times have no zone, once for all files.
 #[must_use]
 pub fn without_zone(reports: &[(String, Report)]) -> Option<String> {
     let mut places = reports
@@ -286,32 +250,32 @@ pub fn without_zone(reports: &[(String, Report)]) -> Option<String> {
     Some(format!("{place}: dates and times {WITHOUT_ZONE}"))
 }
 
-/// Tells of rows and cells that were not taken, of samples that were rejected, of units that the data have and the graph has not, of
-/// files that count more than once, and of dates without a zone.
-pub fn tell(
+/// Warns of rows and cells that were not taken, of rejected samples, of units that differ from those of the graph, of files that
+/// count more than once, and of dates without a zone.
+pub fn warn(
     terminal: &Terminal,
     plan: &Plan,
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    tell_doubts(terminal, doubts(plan, reports, refused, rejected), reports);
+    warn_of(terminal, doubts(plan, reports, refused, rejected), reports);
 }
 
-/// The same of doubts that are known already.
-pub fn tell_doubts(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
-    for told in doubts {
-        terminal.warning(told);
+/// The same with doubts that are known already.
+pub fn warn_of(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
+    for message in doubts {
+        terminal.warning(message);
     }
-    if let Some(told) = without_zone(reports) {
-        terminal.note(told);
+    if let Some(note) = without_zone(reports) {
+        terminal.note(note);
     }
 }
 
-/// What programs are told by: samples that do not count.
+/// The event for samples that do not count.
 pub const REJECTED: &str = "rejected_samples";
 
-/// What is told of data but for dates without a zone.
+/// The warnings about data, but for dates without a zone.
 #[must_use]
 pub fn doubts(
     plan: &Plan,
@@ -319,8 +283,8 @@ pub fn doubts(
     refused: u64,
     rejected: &[(String, u64)],
 ) -> Vec<Message> {
-    let mut told = of_files(reports);
-    told.extend(other_units(plan, reports).into_iter().map(Message::from));
+    let mut messages = of_files(reports);
+    messages.extend(other_units(plan, reports).into_iter().map(Message::from));
     if refused > 0 {
         let were = if refused == 1 { "was" } else { "were" };
         let words = format!(
@@ -328,10 +292,10 @@ pub fn doubts(
             counted(refused, "row")
         );
         let facts = json!({ "reason": "time_before", "count": refused });
-        told.push(Message::new(refused::ROWS, facts, words));
+        messages.push(Message::new(refused::ROWS, facts, words));
     }
     let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
-    told.extend(rejected.iter().map(|(channel, n)| {
+    messages.extend(rejected.iter().map(|(channel, n)| {
         let samples = counted(*n, "sample");
         let words = match *n {
             most if 2 * most > rows && most > 1 => format!(
@@ -344,12 +308,12 @@ pub fn doubts(
         let facts = json!({ "channel": channel, "samples": n });
         Message::new(REJECTED, facts, words)
     }));
-    told
+    messages
 }
 
 /// Columns under whose names another unit stands than that of their signal.
 fn other_units(plan: &Plan, reports: &[(String, Report)]) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut messages = Vec::new();
     for (file, report) in reports {
         for (column, unit) in &report.units {
             let sources = plan.sources.iter().zip(&plan.channels);
@@ -358,21 +322,21 @@ fn other_units(plan: &Plan, reports: &[(String, Report)]) -> Vec<String> {
                 .map(|(source, planned)| (&source.name, &planned.channel.unit))
                 .filter(|(_, own)| !unit.measures_same(own) || unit.is_another_than(own));
             if let Some((channel, own)) = others.next() {
-                told.push(format!(
+                messages.push(format!(
                     "{file}: `{unit}` stands below the name of the column `{column}`, and {channel} takes its numbers for {own}: \
                      correct `unit` of the signal"
                 ));
             }
         }
     }
-    told
+    messages
 }
 
-/// What is told of files after reading: rows and cells that were not taken, and files that count more than once.
+/// The warnings about files after reading: rows and cells that were not taken, and files that count more than once.
 #[must_use]
 pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
     let repeated = repeated(reports.iter().map(|(file, _)| file));
-    let mut told: Vec<Message> = repeated.into_iter().map(Message::from).collect();
+    let mut messages: Vec<Message> = repeated.into_iter().map(Message::from).collect();
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
@@ -384,7 +348,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
             let words = format!(
                 "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so windows begin afresh in it and what both have counts twice"
             );
-            told.push(Message::from(words));
+            messages.push(Message::from(words));
         }
         let unreadable = format!("unreadable cell{}", of_columns(report));
         let counted = [
@@ -407,7 +371,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
                     more @ 2.. => format!("; {} in all", count(more)),
                     _ => String::new(),
                 };
-                told.push(refused::message(
+                messages.push(refused::message(
                     first,
                     Some(headers.count),
                     format_args!("{first}{in_all}"),
@@ -418,7 +382,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
             if let Some(first) = &found.first {
                 let (n, taken) = (count(found.count), first.without_advice());
                 let words = format!("{file}: {n} × {what}, {then}; the first: {taken}");
-                told.push(refused::message(first, Some(found.count), words));
+                messages.push(refused::message(first, Some(found.count), words));
             }
         }
         if let Some(place) = &report.truncated {
@@ -426,10 +390,10 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
                 "{place}: the last line has no end and was left out, since it was cut off or is still being written"
             );
             let facts = json!({ "reason": "cut_off", "count": 1, "file": &*place.file, "line": place.line });
-            told.push(Message::new(refused::ROWS, facts, words));
+            messages.push(Message::new(refused::ROWS, facts, words));
         }
     }
-    told
+    messages
 }
 
 /// How many columns with cells that cannot be read are named.

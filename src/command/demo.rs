@@ -42,7 +42,7 @@ pub struct Demo {
 }
 
 impl Demo {
-    /// Simulates, fits, scores and tells.
+    /// Simulates, fits, scores and prints.
     ///
     /// # Errors
     /// When the folder is somebody's, or cannot be written.
@@ -54,27 +54,27 @@ impl Demo {
         if people {
             terminal.note("A simulated die tester: two fibre holders about a chip on a heated chuck,\nsix temperatures every 10 s, six positions about every 75 s.\n");
         }
-        let tell = |path: &Path, text: &str| {
+        let note = |path: &Path, text: &str| {
             if people {
                 terminal.note(format_args!("  {:<30}  {text}", path.display().to_string()));
             }
         };
         folder.write(files[0], |graph| write_aside(graph, GRAPH))?;
-        tell(&graph, "the graph: what is computed from what");
+        note(&graph, "the graph: what is computed from what");
         for (file, path, (days, seed), what) in [
             (files[1], &train, TRAIN, "to fit on"),
             (files[2], &test, TEST, "to test on"),
         ] {
             let rows = folder.write(file, |path| simulate(days, seed, path, terminal))?;
             let rows = count(rows);
-            tell(
+            note(
                 path,
                 &format!("{days} days {what}, seed {seed}, {rows} rows"),
             );
         }
         let fitted = folder.write(files[3], |model| fit_model(&graph, &train, model, terminal))?;
         let estimators = fitted.card.as_ref().map_or(0, |card| card.estimators.len());
-        tell(
+        note(
             &model,
             &format!("the graph and what {estimators} of its nodes have learned"),
         );
@@ -137,7 +137,7 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
         &model.fitted,
         &dataset,
         &options,
-        &mut |ticks| progress.tell(ticks),
+        &mut |ticks| progress.set(ticks),
     )?;
     Ok(scores)
 }
@@ -205,7 +205,7 @@ fn meaning(axes: &[Axis]) -> String {
     let by_gain = |a: &(&Axis, f64), b: &(&Axis, f64)| a.1.total_cmp(&b.1);
     let (Some((_, least)), Some((best, most))) = (gains().min_by(by_gain), gains().max_by(by_gain))
     else {
-        return "There are too few instants to say anything.\n".to_owned();
+        return "There are too few instants for a verdict.\n".to_owned();
     };
     let (with, without) = (
         best.vote.rmse.unwrap_or(f64::NAN),

@@ -1,9 +1,7 @@
 //! `athermal diff`: what differs in meaning between two graphs or models.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use athermal::Model;
 use athermal::core::compile::{Change, ParameterChange, PlanDiff, diff};
 use athermal::core::diagnostic::Sources;
 use clap::Args;
@@ -12,7 +10,7 @@ use serde_json::{Value, json};
 use super::model;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
-/// Say what differs in meaning between two graphs or models
+/// Show what differs in meaning between two graphs or models
 ///
 /// Comments, order, spelling, and how a duration or unit is written are no difference. Where both are fitted, fitted
 /// parameters are compared too. The exit status is 0 where both mean the same, and 1 where they do not.
@@ -38,7 +36,7 @@ impl Diff {
         let load = |path: &Path| model::load_to_fit(path, &mut Sources::new(), terminal);
         let (before, after) = (load(&self.before)?, load(&self.after)?);
         let plans = diff(&before.plan, &after.plan);
-        let fitted = fitted(&before, &after);
+        let fitted = before.refitted(&after);
         let same = plans.is_same() && fitted.is_empty();
         if terminal.format == Format::Json {
             let mut all = json!({ "same": same, "fitted": fitted });
@@ -54,27 +52,6 @@ impl Diff {
         }
         Ok(if same { Answer::Fine } else { Answer::No })
     }
-}
-
-/// The instances of both whose fitted parameters differ, or of which one alone has any, where both are models that were fitted.
-fn fitted(before: &Model, after: &Model) -> Vec<String> {
-    if before.card.is_none() || after.card.is_none() {
-        return Vec::new();
-    }
-    let instances = |model: &Model| -> BTreeSet<String> {
-        let nodes = model.plan.nodes.iter();
-        nodes.map(|node| node.instance()).collect()
-    };
-    let differs = |instance: &String| {
-        let parameters = |model: &Model| {
-            let predictor = model.fitted.get(instance.as_str())?;
-            serde_json::to_value(&**predictor).ok()
-        };
-        parameters(before) != parameters(after)
-    };
-    let (before_has, after_has) = (instances(before), instances(after));
-    let both = before_has.intersection(&after_has);
-    both.filter(|instance| differs(instance)).cloned().collect()
 }
 
 fn show(plans: &PlanDiff, fitted: &[String]) {

@@ -3,50 +3,48 @@
 use std::path::PathBuf;
 
 use athermal::core::compile::Wanted;
-use athermal::run::score::{Lack, Score, ScoreOptions, Scores, score};
+use athermal::report;
+use athermal::run::score::{Lack, Score, ScoreOptions, score};
 use clap::Args;
 use serde_json::json;
 
 use super::beyond;
-use super::data::{self, Data};
-use super::doubtful::Doubtful;
-use super::faults::{self, FaultWatch, Purpose};
+use super::data::Data;
+use super::doubts::Doubts;
+use super::faults::{FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::scored::Scored;
 use super::unscored;
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal_analysis::figures::{
-    count, counted, number, or_dash, paragraph, seconds, stated, table,
-};
+use athermal_analysis::figures::seconds;
 
 /// Score a model's predictions on recorded data
 ///
-/// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
-/// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the
-/// standard error of the truth itself. All predictions of a truth are scored on the instants at which all of them are valid.
+/// Each prediction is compared with the truth measured later. Beside it stand no model (predicting zero), persistence (the
+/// last truth that shares nothing with the predicted one), and the standard error of the truth itself. Persistence is K
+/// steps back for predictions K steps ahead; a free run has none. All predictions of a truth are scored on the instants at
+/// which all of them are valid.
 ///
 /// The standard error of a truth that is a slope is that of its line, from the residuals about it (root mean square over
-/// the instants). Scatter of the samples and curvature of the drift within the window both count there, so that it may be
-/// more than the noise of the measurement, and a prediction may come below it.
+/// the instants). Scatter of the samples and curvature of the drift within the window both count there. So it may be more
+/// than the noise of the measurement, and a prediction may come below it.
 ///
-/// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
-/// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is the share of the truth's spread that is told,
-/// 1 − √(SSE / Σ (y − ȳ)²), as identification has it.
+/// R² is against no model, 1 − SSE / Σ y²; it means little for a truth that is never near zero. R²mean is against the truth's
+/// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is 1 − √(SSE / Σ (y − ȳ)²), as in system identification.
 ///
-/// Ahead is how far ahead of the measured truths that it may go by a prediction was made; with `--mode k-step` that is K − 1 steps
-/// more, where past truths change it, and in a free run without bound. Bias is the mean error, prediction less truth: above zero,
-/// more is predicted than comes. Largest is the largest error in size, and valid the share of the instants at which the truth was
-/// measured that have a prediction.
+/// Ahead is how far ahead of the newest truth that it may use a prediction was made. With `--mode k-step` that is K − 1
+/// steps more, where past truths change it; in a free run it has no bound. Bias is the mean error, prediction less truth.
+/// Largest is the largest error in size. Valid is the share of the instants with a measured truth that have a prediction.
 ///
-/// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
-/// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
-/// their interval score: the width plus 2/(1 − share to cover) times the mean distance of truths outside, small being good.
+/// Predictions with intervals get a second table: bounds, as of `conformal`, or 1.645 standard deviations to either side,
+/// which should cover nine tenths. It shows the share of truths covered, the mean width, and the interval score: the width
+/// plus 2/(1 − share to cover) times the mean distance of truths outside. A small score is good.
 ///
-/// `--mode` tells how far the model reaches by itself: one step from measured past truths, several steps with its own
+/// `--mode` shows how far the model reaches by itself: one step from measured past truths, several steps with its own
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
 /// stay as they were measured, and so do the weights of votes. Standard deviations are those of as many steps as there are
-/// since the newest measured truth, as far as the noise is what the model takes it for.
+/// since the newest measured truth, under the model's own noise.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
@@ -82,51 +80,39 @@ impl Evaluate {
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let mut progress = terminal.progress("evaluating");
         let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
-            progress.tell(ticks)
+            progress.set(ticks)
         })?;
         drop(progress);
-        let faults = watch.found();
-        let outside_fit = beyond::beyond(model.sample_ranges(), &scores.ranges);
+        let doubts = Doubts {
+            plan: &model.plan,
+            dataset: &dataset,
+            refused: scores.refused,
+            rejected: &scores.rejected,
+            faults: watch.found(),
+            outside_fit: beyond::beyond(model.sample_ranges(), &scores.ranges),
+        };
         if terminal.format == Format::Json {
-            let files: Vec<_> = dataset
-                .paths()
-                .iter()
-                .map(|path| path.display().to_string())
-                .collect();
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
             });
-            let mut told = json!({ "data": files });
-            self.scored.tell(&mut told);
-            told["each_on_its_own"] = self.each_on_its_own.into();
-            told["period"] = json!(period);
-            told["scores"] = json!(scores.scores);
-            told["unscored"] = json!(scores.unscored);
-            told["lacks"] = json!(scores.lacks);
-            let doubtful = Doubtful {
-                faults: &faults,
-                outside_fit: &outside_fit,
-                reports: &dataset.reports(),
-            };
-            doubtful.tell(&mut told);
-            println!("{told:#}");
+            let mut facts = json!({ "data": self.data.names() });
+            self.scored.add_to(&mut facts);
+            facts["each_on_its_own"] = self.each_on_its_own.into();
+            facts["period"] = json!(period);
+            facts["scores"] = json!(scores.scores);
+            facts["unscored"] = json!(scores.unscored);
+            facts["lacks"] = json!(scores.lacks);
+            doubts.add_to(&mut facts);
+            println!("{facts:#}");
         } else {
-            print!("{}", describe(&scores, &self.in_words()));
+            print!("{}", report::scores(&scores, &self.in_words()));
         }
-        data::tell(
-            terminal,
-            &model.plan,
-            &dataset.reports(),
-            scores.refused,
-            &scores.rejected,
-        );
-        beyond::tell(terminal, &outside_fit);
-        faults::tell(terminal, &faults);
+        doubts.warn(terminal);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
-        self.data.tell_fitted_on(terminal, &model, period);
-        unscored::tell(terminal, &scores.unscored);
-        for told in Lack::told(&scores.lacks) {
-            terminal.warning(told);
+        self.data.warn_fitted_on(terminal, &model, period);
+        unscored::warn(terminal, &scores.unscored);
+        for message in Lack::warnings(&scores.lacks) {
+            terminal.warning(message);
         }
         let none = |of: &Score| of.valid.is_some() && of.n == 0;
         if let Some(steps) = self.scored.steps()
@@ -155,182 +141,4 @@ impl Evaluate {
         }
         words
     }
-}
-
-/// The tables of all truths, below what was asked for.
-fn describe(scores: &Scores, asked: &[String]) -> String {
-    use std::fmt::Write as _;
-    let mut text: String = asked.iter().map(|line| format!("{line}\n")).collect();
-    if !asked.is_empty() {
-        text.push('\n');
-    }
-    let mut truths: Vec<&str> = scores
-        .scores
-        .iter()
-        .map(|score| score.truth.as_str())
-        .collect();
-    truths.dedup();
-    for truth in truths {
-        let rows: Vec<&Score> = scores
-            .scores
-            .iter()
-            .filter(|score| score.truth == truth)
-            .collect();
-        let Some(first) = rows.iter().find(|row| !row.own_instants).or(rows.first()) else {
-            continue;
-        };
-        let _ = writeln!(
-            text,
-            "{truth} in {}, {}",
-            first.unit,
-            counted(first.n as u64, "instant")
-        );
-        let _ = writeln!(
-            text,
-            "  no model {}, persistence {}, standard error of the truth {}",
-            or_dash(first.baseline_zero),
-            persistence(&rows),
-            or_dash(first.truth_noise)
-        );
-        text.push_str(&left_out(&rows));
-        let header = [
-            "  prediction",
-            "ahead",
-            "RMSE",
-            "R²",
-            "R²mean",
-            "fit",
-            "bias",
-            "largest",
-            "valid",
-        ];
-        let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row)).collect();
-        text.push_str(&table(&header, &cells));
-        let cells: Vec<Vec<String>> = rows.iter().filter_map(|row| interval(row)).collect();
-        if !cells.is_empty() {
-            let header = ["  interval", "from", "to cover", "covers", "width", "score"];
-            text.push_str(&table(&header, &cells));
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// How far off the truth of before is, for each horizon where that differs.
-fn persistence(rows: &[&Score]) -> String {
-    let of = |row: &Score| match row.persistence_on_few() {
-        Some(few) => format!(
-            "{} on {} of them",
-            or_dash(row.baseline_persistence),
-            count(few)
-        ),
-        None => or_dash(row.baseline_persistence),
-    };
-    let mut all: Vec<(f64, String)> = Vec::new();
-    for row in rows.iter().filter(|row| !row.own_instants) {
-        if all.iter().all(|(ahead_s, _)| *ahead_s != row.ahead_s) {
-            all.push((row.ahead_s, of(row)));
-        }
-    }
-    let Some((_, first)) = all.first() else {
-        return rows.first().map_or_else(|| or_dash(None), |row| of(row));
-    };
-    if all.iter().all(|(_, error)| error == first) {
-        return first.clone();
-    }
-    let told = all
-        .iter()
-        .map(|(ahead_s, error)| format!("{error} at {}", stated(*ahead_s)));
-    told.collect::<Vec<_>>().join(" and ")
-}
-
-/// What is told where many instants are not scored, since some prediction has no value there.
-fn left_out(rows: &[&Score]) -> String {
-    let scored_together = || rows.iter().filter(|row| !row.own_instants);
-    let Some(most) = scored_together().max_by_key(|row| row.left_out) else {
-        return String::new();
-    };
-    let valid = |row: &Score| row.valid.unwrap_or(f64::NEG_INFINITY);
-    let lacking = scored_together().min_by(|a, b| valid(a).total_cmp(&valid(b)));
-    match lacking {
-        Some(lacking) if most.leaves_many_out() => {
-            let words = format!(
-                "{} of {} instants at which {} is there are left out, since others are not, such as {}; --each-on-its-own scores each \
-                 wherever it is",
-                count(most.left_out),
-                count(most.n + most.left_out),
-                most.output,
-                lacking.output
-            );
-            paragraph("  ", 2, &words)
-        }
-        _ => String::new(),
-    }
-}
-
-fn interval(score: &Score) -> Option<Vec<String>> {
-    let interval = score.interval.as_ref()?;
-    Some(vec![
-        format!("  {}", score.output),
-        interval.from.to_owned(),
-        percent(100.0 * interval.stated),
-        percent(100.0 * interval.covered),
-        number(interval.width),
-        number(interval.score),
-    ])
-}
-
-/// How much of a truth is told, 1 being all of it. What is far off is not written out.
-fn share(value: f64) -> String {
-    if value.abs() < 1e3 {
-        format!("{value:.3}")
-    } else {
-        number(value)
-    }
-}
-
-fn percent(value: f64) -> String {
-    if value.abs() < 1e5 {
-        format!("{value:.1}%")
-    } else {
-        format!("{}%", number(value))
-    }
-}
-
-fn line(score: &Score) -> Vec<String> {
-    let ratio = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), share);
-    // Nothing that is measured bounds how far a free run is ahead.
-    let ahead = score.horizon_s.map_or_else(|| "free".to_owned(), stated);
-    let mut cells = vec![
-        format!("  {}", score.output),
-        ahead,
-        or_dash(score.rmse),
-        ratio(score.r2_zero),
-        ratio(score.r2_mean),
-        score.fit.map_or_else(|| "-".to_owned(), percent),
-        or_dash(score.bias),
-        or_dash(score.max_abs),
-        score
-            .valid
-            .map_or_else(|| "-".to_owned(), |valid| percent(100.0 * valid)),
-    ];
-    let mut remarks = Vec::new();
-    if score.is_worse_than_nothing() {
-        remarks.push("worse than no model".to_owned());
-    }
-    if score.valid.is_none() {
-        remarks.push("no truth to compare with".to_owned());
-    } else if score.n == 0 {
-        remarks.push("no prediction of any truth".to_owned());
-    } else if score.own_instants {
-        remarks.push(format!(
-            "on its own {} (no model {})",
-            counted(score.n as u64, "instant"),
-            score.baseline_zero.map_or("-".into(), number)
-        ));
-    }
-    if !remarks.is_empty() {
-        cells.push(remarks.join(", "));
-    }
-    cells
 }

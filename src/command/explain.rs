@@ -1,6 +1,6 @@
 //! `athermal explain`: what the code of a diagnostic means.
 
-use athermal::core::diagnostic::{CODES, Code, explain, nearest};
+use athermal::core::diagnostic::{Code, codes, explain, nearest};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -23,11 +23,11 @@ impl Explain {
         let json = terminal.format == Format::Json;
         match &self.code {
             None if json => {
-                let all: Vec<_> = CODES.iter().map(describe).collect();
+                let all: Vec<_> = codes().iter().map(describe).collect();
                 println!("{:#}", json!({ "codes": all }));
             }
             None => {
-                for entry in CODES {
+                for entry in codes() {
                     println!("{}  {}", entry.code, entry.title);
                 }
             }
@@ -35,7 +35,7 @@ impl Explain {
                 Some(entry) if json => println!("{:#}", describe(entry)),
                 Some(entry) => print!("{}", page(entry)),
                 None => {
-                    let near = nearest(code, CODES.iter().map(|entry| entry.code));
+                    let near = nearest(code, codes().iter().map(|entry| entry.code));
                     let near =
                         near.map_or_else(String::new, |near| format!(", did you mean {near}?"));
                     let message = format!(

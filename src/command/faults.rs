@@ -1,322 +1,33 @@
-//! Decides of which faults of sensors in recorded data people are told, and in what words; what a fault is, is decided elsewhere.
+//! Warnings about faulty sensors.
 
-use std::cell::RefCell;
+pub use athermal::diagnosis::watch::{ChannelFaults, ChannelWatch, FaultWatch, Purpose, facts};
 
-use athermal::Instant;
-use athermal::core::compile::{Plan, SourceChannel};
-use athermal::diagnosis::leap::{self, Leaps};
-use athermal::diagnosis::silence::{self, Silence};
-use athermal::diagnosis::standstill::{self, Standstill};
-use athermal::diagnosis::{health_reasons, of_truths};
-use athermal::run::live::Feed;
-use athermal::run::recording::{Event, Recording, Samples, Source, SourceError};
-
-use serde::Serialize;
-use serde_json::{Value, json};
+use athermal::diagnosis::leap::Leaps;
+use athermal::run::live::monitor::silence::Silence;
+use serde_json::Value;
 
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::{count, counted, instant, number, seconds};
+use athermal_analysis::figures::{count, counted, instant, number};
 
-/// What a recording is read for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
-    /// Models learn from it.
-    Fit,
-    /// Models are set against it.
-    Scores,
-    /// Models predict from it.
-    Run,
-}
-
-/// What is wrong with a channel.
-#[derive(Debug)]
-pub struct Faulty {
-    purpose: Purpose,
-    /// Its name.
-    pub(super) channel: String,
-    /// Whether a truth is made of it, so that its faults look like drift.
-    pub(super) of_truth: bool,
-    /// Where it leaps.
-    pub(super) leaps: Option<Leaps>,
-    /// Where it stands still.
-    pub(super) stuck: Option<Standstill>,
-    /// Where it has no sample.
-    pub(super) silent: Option<Silence>,
-}
-
-impl Faulty {
-    fn is_sound(&self) -> bool {
-        self.leaps.is_none() && self.stuck.is_none() && self.silent.is_none()
-    }
-
-    /// What programs are told of one of its faults.
-    pub(super) fn facts(&self, fault: &impl Serialize) -> Value {
-        facts(&self.channel, self.of_truth, fault)
-    }
-
-    fn signal(&self) -> &str {
-        let name = self.channel.split_once('.');
-        name.map_or(&self.channel, |(signal, _)| signal)
+/// Warns of them.
+/// Warns of them.
+pub fn warn(terminal: &Terminal, all: &[ChannelFaults]) {
+    for message in messages(all) {
+        terminal.warning(message);
     }
 }
 
-/// What programs are told of a fault of a channel.
-pub fn facts(channel: &str, of_truth: bool, fault: &impl Serialize) -> Value {
-    let mut facts = json!({ "channel": channel, "of_truth": of_truth });
-    if let (Value::Object(all), Value::Object(found)) = (&mut facts, json!(fault)) {
-        all.extend(found);
-    }
-    facts
-}
-
-/// A recording whose channels are looked at when it is first read.
-pub struct FaultWatch<'a> {
-    recording: &'a dyn Recording,
-    purpose: Purpose,
-    state: RefCell<State>,
-}
-
-enum State {
-    Unread,
-    Read(Looks),
-}
-
-/// The channels of a plan, which are looked at row by row.
-pub struct Looks {
-    channels: Vec<Looked>,
-    /// Where in a row the value of each stands; nowhere once a graph has taken over that does not read it.
-    places: Vec<Option<usize>>,
-}
-
-/// A channel that is looked at, with what is looked for.
-struct Looked {
-    source: SourceChannel,
-    of_truth: bool,
-    leaps: Option<leap::Finder>,
-    stuck: Option<standstill::Finder>,
-    silent: Option<silence::Finder>,
-}
-
-impl<'a> FaultWatch<'a> {
-    /// Watches over this recording.
-    pub fn new(recording: &'a dyn Recording, purpose: Purpose) -> Self {
-        Self {
-            recording,
-            purpose,
-            state: RefCell::new(State::Unread),
-        }
-    }
-
-    /// The channels of which something is wrong, in the order of the plan.
-    pub fn found(self) -> Vec<Faulty> {
-        match self.state.into_inner() {
-            State::Unread => Vec::new(),
-            State::Read(looks) => looks.found(self.purpose),
-        }
-    }
-}
-
-/// Whether the only leap is that of a sensor which goes on after it was stuck at a usual value.
-fn ends(leaps: &Leaps, stuck: &Standstill) -> bool {
-    let (low, high) = leaps.usual;
-    let is_usual = (low..=high).contains(&stuck.value);
-    leaps.count == 1 && is_usual && leaps.first.from == stuck.value
-}
-
-impl Recording for FaultWatch<'_> {
-    fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
-        let rows = self.recording.open(plan)?;
-        let mut state = self.state.borrow_mut();
-        if let State::Read(_) = *state {
-            return Ok(rows);
-        }
-        *state = State::Read(Looks::at(plan));
-        Ok(Box::new(Looking {
-            rows,
-            state: &self.state,
-        }))
-    }
-}
-
-impl Looks {
-    /// Looks at the channels of this plan.
-    pub fn at(plan: &Plan) -> Self {
-        let watched = health_reasons(plan);
-        let channels = plan.sources.iter().zip(leap::finders(plan));
-        let channels = channels.zip(of_truths(plan)).enumerate();
-        let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
-            let rests = source.optional;
-            // Such a node takes out what is stuck.
-            let stuck = !rests && !watched.contains_key(&slot);
-            Looked {
-                source: source.clone(),
-                of_truth,
-                leaps,
-                stuck: stuck.then(Default::default),
-                silent: (!rests).then(Default::default),
-            }
-        });
-        let channels: Vec<Looked> = looked.collect();
-        Self {
-            places: (0..channels.len()).map(Some).collect(),
-            channels,
-        }
-    }
-
-    /// Goes on with the channels of a graph that has taken over, which reads them among those of a feed.
-    pub fn follow(&mut self, plan: &Plan, feed: &[Feed]) {
-        let mut before = std::mem::take(&mut self.places);
-        let mut added = Vec::new();
-        for (new, place) in Self::at(plan).channels.into_iter().zip(places(plan, feed)) {
-            let known = before.iter().position(|of| of.is_some() && *of == place);
-            match known {
-                Some(nth) if self.channels[nth].is_looked_at_as(&new) => {
-                    self.channels[nth].source = new.source;
-                }
-                // What was found of it until now is told as it was looked at then.
-                known => {
-                    known.into_iter().for_each(|nth| before[nth] = None);
-                    added.push((new, place));
-                }
-            }
-        }
-        let read: Vec<_> = places(plan, feed).collect();
-        before
-            .iter_mut()
-            .filter(|place| !read.contains(place))
-            .for_each(|place| *place = None);
-        self.places = before;
-        for (new, place) in added {
-            self.channels.push(new);
-            self.places.push(place);
-        }
-    }
-
-    /// Takes the next row, its values in the order of the plan's channels, or in that of the feed.
-    pub fn row(&mut self, now: Instant, values: &[f64]) {
-        let at_s = seconds(now);
-        for (of, place) in self.channels.iter_mut().zip(&self.places) {
-            if let Some(&value) = place.and_then(|place| values.get(place)) {
-                of.row(at_s, value);
-            }
-        }
-    }
-
-    /// What follows is not set against what was.
-    pub fn interrupt(&mut self) {
-        self.channels.iter_mut().for_each(Looked::interrupt);
-    }
-
-    /// The channels of which something is wrong, in the order of the plan.
-    pub fn found(self, purpose: Purpose) -> Vec<Faulty> {
-        let all = self.channels.into_iter().map(|of| {
-            let stuck = of.stuck.and_then(|finder| {
-                // What never changes is named by a fit, and as a truth by its scores.
-                let counts = finder.changes() > 0 || (purpose != Purpose::Fit && !of.of_truth);
-                finder.found().filter(|_| counts)
-            });
-            let leaps = of.leaps.and_then(|finder| finder.found());
-            Faulty {
-                purpose,
-                channel: of.source.name,
-                of_truth: of.of_truth,
-                leaps: leaps.filter(|leaps| !stuck.is_some_and(|stuck| ends(leaps, &stuck))),
-                stuck,
-                // A position that is only measured now and then, or in the fit alone, is none that fails.
-                silent: of.silent.and_then(|finder| {
-                    if of.of_truth {
-                        finder.lasting()
-                    } else {
-                        finder.found()
-                    }
-                }),
-            }
-        });
-        all.filter(|of| !of.is_sound()).collect()
-    }
-}
-
-/// Where each channel of a plan stands among those of a feed.
-pub fn places<'a>(plan: &'a Plan, feed: &'a [Feed]) -> impl Iterator<Item = Option<usize>> + 'a {
-    let place = |fed: Feed| feed.iter().position(|of| *of == fed);
-    Feed::of(plan).into_iter().map(place)
-}
-
-impl Looked {
-    /// Whether the same is looked for as in another.
-    fn is_looked_at_as(&self, other: &Self) -> bool {
-        let what = |of: &Self| {
-            let finders = (of.leaps.is_some(), of.stuck.is_some(), of.silent.is_some());
-            (of.of_truth, finders)
-        };
-        what(self) == what(other)
-    }
-
-    fn row(&mut self, at_s: f64, value: f64) {
-        let admitted = self.source.admits(value);
-        if let Some(silent) = &mut self.silent {
-            silent.push(at_s, admitted);
-        }
-        if admitted {
-            if let Some(leaps) = &mut self.leaps {
-                leaps.push(at_s, value);
-            }
-            if let Some(stuck) = &mut self.stuck {
-                stuck.push(at_s, value);
-            }
-        }
-    }
-
-    fn interrupt(&mut self) {
-        if let Some(leaps) = &mut self.leaps {
-            leaps.interrupt();
-        }
-        if let Some(stuck) = &mut self.stuck {
-            stuck.interrupt();
-        }
-        if let Some(silent) = &mut self.silent {
-            silent.interrupt();
-        }
-    }
-}
-
-struct Looking<'a> {
-    rows: Box<dyn Source + 'a>,
-    state: &'a RefCell<State>,
-}
-
-impl Source for Looking<'_> {
-    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        let event = self.rows.next(samples)?;
-        if let State::Read(looks) = &mut *self.state.borrow_mut() {
-            match event {
-                Some(Event::Row(now)) => looks.row(now, &samples.values),
-                Some(Event::Segment) => looks.interrupt(),
-                None => {}
-            }
-        }
-        Ok(event)
-    }
-}
-
-/// Tells of them.
-pub fn tell(terminal: &Terminal, all: &[Faulty]) {
-    for told in told(all) {
-        terminal.warning(told);
-    }
-}
-
-/// What is told of them, a sentence for each fault.
-pub fn told(all: &[Faulty]) -> Vec<Message> {
-    let mut told = Vec::new();
+/// The warnings, one for each fault.
+pub fn messages(all: &[ChannelFaults]) -> Vec<Message> {
+    let mut messages = Vec::new();
     for faulty in all {
         let channel = &faulty.channel;
-        let mut tell = |name, facts: Value, words| told.push(Message::new(name, facts, words));
+        let mut add = |name, facts: Value, words| messages.push(Message::new(name, facts, words));
         if let Some(leaps) = &faulty.leaps {
             let (at, then) = (instant(leaps.first.at_s), of_leaps(faulty, leaps));
             let words = format!("{channel} {leaps}, at {at}: {then}");
-            tell("leaps", faulty.facts(leaps), words);
+            add("leaps", faulty.facts(leaps), words);
         }
         if let Some(stuck) = &faulty.stuck {
             let words = format!(
@@ -327,17 +38,17 @@ pub fn told(all: &[Faulty]) -> Vec<Message> {
                 instant(stuck.to_s),
                 of_standstill(faulty.of_truth, faulty.purpose)
             );
-            tell("stuck", faulty.facts(stuck), words);
+            add("stuck", faulty.facts(stuck), words);
         }
         if let Some(silent) = &faulty.silent {
             let words = format!("{channel} has no sample in {}", of_silence(faulty, silent));
-            tell("silent", faulty.facts(silent), words);
+            add("silent", faulty.facts(silent), words);
         }
     }
-    told
+    messages
 }
 
-fn of_silence(faulty: &Faulty, silent: &Silence) -> String {
+fn of_silence(faulty: &ChannelFaults, silent: &Silence) -> String {
     let never = silent.rows == silent.of_rows;
     let rows = if never {
         format!("any of {}", counted(silent.rows, "row"))
@@ -367,7 +78,7 @@ fn of_silence(faulty: &Faulty, silent: &Silence) -> String {
     format!("{rows}: {asked} {then}")
 }
 
-fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
+fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
     if faulty.of_truth {
         let then = match faulty.purpose {
             Purpose::Fit => {
@@ -389,12 +100,12 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
     let usual = low..=high;
     if usual.contains(&leaps.first.from) && usual.contains(&leaps.first.to) {
         return format!(
-            "did the sensor fail? {then}: no `range` tells such samples from others, so leave these rows out"
+            "did the sensor fail? {then}: no `range` takes out such samples alone, so leave these rows out"
         );
     }
     format!(
         "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {} and {}",
-        faulty.signal(),
+        faulty.channel.split('.').next().unwrap_or_default(),
         number(low),
         number(high)
     )

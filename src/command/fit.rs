@@ -16,8 +16,8 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
-use super::doubtful::Doubtful;
-use super::faults::{self, FaultWatch, Faulty, Purpose};
+use super::doubts;
+use super::faults::{self, ChannelFaults, FaultWatch, Purpose};
 use super::model;
 use super::numbers;
 use super::threads::Threads;
@@ -28,18 +28,23 @@ use athermal_analysis::figures::{count, counted, number, paragraph, seconds, tab
 
 /// Fit a graph on recorded data
 ///
-/// Prints for each node that is fitted (estimators, and features that learn) the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
-/// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
-/// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells. A node that cannot be fitted is told, and gives
-/// nothing; where that is so of all, no model is written, one that is there stays, and the exit status is 1 in both cases.
+/// Fits every node that learns: estimators, and features such as encoders. For each it prints the rows used and left out,
+/// the regressors chosen with their cross-validation scores (the mean, and each fold), the condition number, and the error
+/// on the rows of the fit. Then it writes the model: one JSON file that holds all that is needed to run.
+/// `athermal show MODEL --format coefficients` prints what is in it.
 ///
-/// Where orders are compared, AIC, AICc and BIC count the variance of what is left as one parameter beside the coefficients, and FPE does not.
+/// A node that cannot be fitted gives nothing, and the exit status is 1. Where none can be fitted, no model is written,
+/// and an old one stays.
 ///
-/// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on: all below it is
-/// fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with three.
+/// Where orders are compared, AIC, AICc and BIC count the variance of what is left as one parameter beside the
+/// coefficients, and FPE does not.
 ///
-/// With `--format json` all of that, and what sentences say of weights, penalties, noises and the like, is data: `estimators` has
-/// an object for each node, and its `figures` are by name, unrounded.
+/// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on. All below
+/// it is fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with
+/// three.
+///
+/// With `--format json` all of that is data: `estimators` has an object for each node, and its `figures` are by name,
+/// unrounded.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
@@ -64,7 +69,7 @@ pub struct Fit {
         value_parser = numbers::read::<usize>("a whole number of megabytes, such as 64")
     )]
     memory: usize,
-    /// Tell what else was tried at each step of a selection, and with what score, and all orders that were compared
+    /// Show what else was tried at each step of a selection, with its score, and all orders that were compared
     #[arg(long)]
     candidates: bool,
 }
@@ -91,11 +96,11 @@ impl Fit {
             threads: self.threads.count(),
             ..FitOptions::default()
         };
-        let told = fit_on(&mut model, &self.data, &options, terminal)?;
-        let failed = told.report.failed().count();
-        if failed > 0 && failed == told.report.estimators.len() {
-            self.tell(terminal, &told);
-            self.tell_of_no_model(terminal);
+        let outcome = fit_on(&mut model, &self.data, &options, terminal)?;
+        let failed = outcome.report.failed().count();
+        if failed > 0 && failed == outcome.report.estimators.len() {
+            self.report(terminal, &outcome);
+            self.warn_of_no_model(terminal);
             return Ok(Answer::No);
         }
         let text = model.to_text().map_err(|error| {
@@ -106,7 +111,7 @@ impl Fit {
         if !to_stdout {
             write_aside(&self.output, &text)?;
         }
-        self.tell(terminal, &told);
+        self.report(terminal, &outcome);
         if to_stdout {
             print!("{text}");
         } else if terminal.format == Format::Table {
@@ -117,7 +122,7 @@ impl Fit {
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
-    fn tell_of_no_model(&self, terminal: &Terminal) {
+    fn warn_of_no_model(&self, terminal: &Terminal) {
         let output = self.output.display();
         if self.output.is_file() {
             terminal.warning(format_args!(
@@ -140,8 +145,8 @@ impl Fit {
         next(&unseen.words_with("evaluate", &self.output))
     }
 
-    /// Tells of mistakes in the tests of a graph file. They take nothing from the fit, and those of a file that is extended may
-    /// not be the user's to mend; but nobody should find them only when the model is in use.
+    /// Warns of mistakes in the tests of a graph file. The fit does without tests, but nobody should find such mistakes only when the
+    /// model is in use.
     fn doubt_tests(&self, model: &Model, mut sources: Sources, terminal: &Terminal) {
         if self.graph.extension().is_none_or(|kind| kind != "toml") {
             return;
@@ -159,13 +164,13 @@ impl Fit {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, told: &Told) {
-        let Told {
+    fn report(&self, terminal: &Terminal, outcome: &FitOutcome) {
+        let FitOutcome {
             dataset,
             report,
             faults,
             ..
-        } = told;
+        } = outcome;
         let to_stdout = self.output.as_os_str() == "-";
         if terminal.format == Format::Json && !to_stdout {
             let estimators: Vec<_> = report
@@ -179,14 +184,11 @@ impl Fit {
                     (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
-            let mut told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
-            let doubtful = Doubtful {
-                faults,
-                outside_fit: &[],
-                reports: &dataset.reports(),
-            };
-            doubtful.tell(&mut told);
-            println!("{told:#}");
+            let mut facts = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
+            for (key, found) in doubts::facts(faults, &[], dataset) {
+                facts[key] = found;
+            }
+            println!("{facts:#}");
             return;
         }
         for fit in &report.estimators {
@@ -203,19 +205,19 @@ impl Fit {
     }
 }
 
-/// What there is to tell of a fit.
-pub struct Told {
+/// What came of a fit.
+pub struct FitOutcome {
     /// What was read.
     pub dataset: Dataset,
     /// How it went.
     pub report: FitReport,
     /// What is wrong with channels.
-    pub faults: Vec<Faulty>,
+    pub faults: Vec<ChannelFaults>,
     /// What was left out of the data, and what may be wrong in them.
     pub doubts: Vec<Message>,
 }
 
-/// Fits a model on data, fills in its card, and tells what was left out of the data, or may be wrong in them.
+/// Fits a model on data, fills in its card, and warns of what was left out of the data or may be wrong in them.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -224,12 +226,12 @@ pub fn fit_on(
     data: &Data,
     options: &FitOptions,
     terminal: &Terminal,
-) -> Result<Told, Failure> {
-    let mut told = fit_without_card(model, data, options, terminal)?;
-    let doubts = std::mem::take(&mut told.doubts);
-    let (dataset, report) = (&told.dataset, &told.report);
-    data::tell_doubts(terminal, doubts, &dataset.reports());
-    faults::tell(terminal, &told.faults);
+) -> Result<FitOutcome, Failure> {
+    let mut outcome = fit_without_card(model, data, options, terminal)?;
+    let doubts = std::mem::take(&mut outcome.doubts);
+    let (dataset, report) = (&outcome.dataset, &outcome.report);
+    data::warn_of(terminal, doubts, &dataset.reports());
+    faults::warn(terminal, &outcome.faults);
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
@@ -242,10 +244,10 @@ pub fn fit_on(
         ranges: report.ranges.clone(),
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
-    Ok(told)
+    Ok(outcome)
 }
 
-/// The same for a model that is not kept: a card has the checksums of all data. What there is to tell is left to the caller.
+/// The same without a card, which has the checksums of all data, and without warnings.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -254,22 +256,27 @@ pub fn fit_without_card(
     data: &Data,
     options: &FitOptions,
     terminal: &Terminal,
-) -> Result<Told, Failure> {
+) -> Result<FitOutcome, Failure> {
     let dataset = data.dataset();
     let watch = FaultWatch::new(&dataset, Purpose::Fit);
     let mut progress = terminal.progress("fitting");
-    let (fitted, report) = fit(&model.plan, &watch, options, &mut |told| match told {
-        FitProgress::Ticks { stepped, fit, of } => {
-            progress.doing(match of {
-                1 => "fitting".to_owned(),
-                _ => format!("fitting {fit} of {of}"),
-            });
-            progress.tell(stepped);
-        }
-        FitProgress::Order { node, nth, of } => {
-            progress.doing(format!("fitting `{node}`, order {nth} of {of}"));
-        }
-    })?;
+    let (fitted, report) = fit(
+        &model.plan,
+        &watch,
+        options,
+        &mut |progress_of| match progress_of {
+            FitProgress::Ticks { stepped, fit, of } => {
+                progress.doing(match of {
+                    1 => "fitting".to_owned(),
+                    _ => format!("fitting {fit} of {of}"),
+                });
+                progress.set(stepped);
+            }
+            FitProgress::Order { node, nth, of } => {
+                progress.doing(format!("fitting `{node}`, order {nth} of {of}"));
+            }
+        },
+    )?;
     drop(progress);
     let faults = watch.found();
     model.fitted = fitted;
@@ -279,7 +286,7 @@ pub fn fit_without_card(
         report.refused,
         &report.rejected,
     );
-    Ok(Told {
+    Ok(FitOutcome {
         dataset,
         report,
         faults,
@@ -287,8 +294,8 @@ pub fn fit_without_card(
     })
 }
 
-/// What is told of a step of a selection.
-fn tell_step(
+/// The line of a step of a selection.
+fn write_step(
     text: &mut String,
     nth: &str,
     step: &SelectionStep,
@@ -309,11 +316,11 @@ fn tell_step(
     }
 }
 
-/// How many of the orders that were compared are told where not all are asked for.
+/// How many of the orders that were compared are shown where not all are asked for.
 const BEST_ORDERS: usize = 8;
 
-/// What is told of orders that were compared: the best first.
-fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
+/// The table of orders that were compared, the best first.
+fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
     let ranks = orders.ranked();
     let shown = if all {
@@ -347,7 +354,7 @@ fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
     text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
     if shown < ranks.len() {
         let more = ranks.len() - shown;
-        let _ = writeln!(text, "  and {more} more, which --candidates tells");
+        let _ = writeln!(text, "  and {more} more: see --candidates");
     }
 }
 
@@ -363,7 +370,7 @@ fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     taken.chain(tried).max().unwrap_or(0).min(most)
 }
 
-/// What is told of one fitted node.
+/// The text about one fitted node.
 fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let mut text = String::new();
     let _ = write!(
@@ -409,14 +416,14 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         } else {
             "not".to_owned()
         };
-        tell_step(&mut text, &nth, step, (width, candidates));
+        write_step(&mut text, &nth, step, (width, candidates));
     }
     if let Some(next) = report.refused.as_ref().filter(|_| !candidates) {
         let would = format!("{} would make it R² {:.4}", next.label(), next.score);
         text.push_str(&paragraph("  no more:", 6, &would));
     }
     if let Some(orders) = &report.orders {
-        tell_orders(&mut text, orders, candidates);
+        write_orders(&mut text, orders, candidates);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {

@@ -15,9 +15,9 @@ use athermal_analysis::figures::paragraph;
 
 /// Write a starter graph for a log of yours
 ///
-/// Looks at the names and values of a CSV or JSON lines file, guesses what is a temperature, what drifts and in which
-/// units, measures rates and gaps, and sets the drift against its standard error to choose the windows. Every guess is
-/// told, and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
+/// Looks at the names and values of a CSV or JSON lines file. It guesses what is a temperature, what drifts, and in which
+/// units. It measures rates and gaps, and chooses windows by the drift against its standard error. Every guess is printed,
+/// and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal init log.csv
@@ -28,7 +28,7 @@ use athermal_analysis::figures::paragraph;
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log
-    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and -o to say where its graph goes"))]
+    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
     data: PathBuf,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
@@ -69,9 +69,9 @@ impl Init {
         let starter = starter(&self.data, &request).map_err(|error| match error {
             NoStarter::File(error) => {
                 // There is no `--lenient` here that it could advise.
-                let told = error.without_advice().to_string();
+                let reason = error.without_advice().to_string();
                 match error.into() {
-                    Failure::Request(_) => Failure::Request(told),
+                    Failure::Request(_) => Failure::Request(reason),
                     other => other,
                 }
             }
@@ -91,13 +91,13 @@ impl Init {
         if people {
             terminal.note(self.next());
         } else {
-            let told = json!({
+            let facts = json!({
                 "graph": self.output,
                 "columns": starter.columns,
                 "windows": starter.windows,
                 "remarks": starter.remarks,
             });
-            println!("{told:#}");
+            println!("{facts:#}");
         }
         Ok(Answer::Fine)
     }

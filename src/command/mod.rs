@@ -1,4 +1,4 @@
-//! Decides which commands there are; each says in a file of its own what it does.
+//! The commands, each in a file of its own.
 
 mod aside;
 mod beyond;
@@ -10,7 +10,7 @@ mod data;
 mod demo;
 mod diagnose;
 mod diff;
-mod doubtful;
+mod doubts;
 mod evaluate;
 mod explain;
 mod faults;
@@ -36,66 +36,42 @@ use clap::Subcommand;
 
 use crate::terminal::{Answer, Failure, Terminal};
 
-/// What the program can do; what each command says of itself stands at its arguments.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    Demo(demo::Demo),
-    Init(init::Init),
-    Show(show::Show),
-    Check(check::Check),
-    Explain(explain::Explain),
-    Diff(diff::Diff),
-    Nodes(nodes::Nodes),
-    Fit(fit::Fit),
-    Evaluate(evaluate::Evaluate),
-    Compare(compare::Compare),
-    Diagnose(diagnose::Diagnose),
-    Report(report::Report),
-    Run(run::Run),
-    Simulate(simulate::Simulate),
-    Completions(completions::Completions),
-    Test(test::Test),
-    Schema(schema::Schema),
-    New(new::New),
-    Build(build::Build),
+/// The commands: a variant of each, and its call.
+macro_rules! commands {
+    ($($name:ident($arguments:ty)),* $(,)?) => {
+        /// The commands.
+        #[derive(Debug, Subcommand)]
+        pub enum Command {
+            $($name($arguments)),*
+        }
+
+        impl Command {
+            /// Does what was asked for.
+            ///
+            /// # Errors
+            /// When it cannot be done.
+            pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+                match self {
+                    $(Self::$name(command) => command.run(terminal)),*
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    Demo(demo::Demo), Init(init::Init), Show(show::Show), Check(check::Check),
+    Explain(explain::Explain), Diff(diff::Diff), Nodes(nodes::Nodes), Fit(fit::Fit),
+    Evaluate(evaluate::Evaluate), Compare(compare::Compare), Diagnose(diagnose::Diagnose),
+    Report(report::Report), Run(run::Run), Simulate(simulate::Simulate),
+    Completions(completions::Completions), Test(test::Test), Schema(schema::Schema),
+    New(new::New), Build(build::Build),
 }
 
 impl Command {
-    /// Whether programs are told as much as people beside the result, which is rows.
+    /// Whether reports beside the result are events for programs: the result is rows.
     #[must_use]
-    pub fn tells_programs(&self) -> bool {
+    pub fn writes_events(&self) -> bool {
         matches!(self, Self::Run(_))
-    }
-
-    /// Does what was asked for; `whole` is the command line that it is part of.
-    ///
-    /// # Errors
-    /// When it cannot be done.
-    pub fn run(
-        &self,
-        terminal: &Terminal,
-        whole: fn() -> clap::Command,
-    ) -> Result<Answer, Failure> {
-        match self {
-            Self::Demo(command) => command.run(terminal),
-            Self::Show(command) => command.run(terminal),
-            Self::Init(command) => command.run(terminal),
-            Self::Completions(command) => command.run(whole()),
-            Self::Check(command) => command.run(terminal),
-            Self::Explain(command) => command.run(terminal),
-            Self::Diff(command) => command.run(terminal),
-            Self::Nodes(command) => command.run(terminal),
-            Self::Fit(command) => command.run(terminal),
-            Self::Evaluate(command) => command.run(terminal),
-            Self::Compare(command) => command.run(terminal),
-            Self::Diagnose(command) => command.run(terminal),
-            Self::Report(command) => command.run(terminal),
-            Self::Run(command) => command.run(terminal),
-            Self::Simulate(command) => command.run(terminal),
-            Self::Test(command) => command.run(terminal),
-            Self::Schema(command) => command.run(terminal),
-            Self::New(command) => command.run(terminal),
-            Self::Build(command) => command.run(terminal),
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Decides how a command loads a model or a graph, and what is told of it before it is used.
+//! Loading a model or a graph for a command.
 
 use std::path::Path;
 
@@ -10,8 +10,7 @@ use athermal::run::model::ModelError;
 
 use crate::terminal::{Failure, Terminal};
 
-/// A model, or a graph, with the fits of the model that it names. What is doubtful in a graph file is told; of a model it was when it
-/// was fitted.
+/// A model, or a graph with the fits of the model that it names. Warns of what is doubtful in a graph file.
 ///
 /// # Errors
 /// When it cannot be loaded.
@@ -60,14 +59,18 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
     Err(ModelError::NotFitted { path, nodes }.into())
 }
 
-/// Tells which nodes of a model have no fit, since the fit of it failed there.
-pub fn tell_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
-    let nodes = model.unfitted();
+/// Warns of the nodes of a model whose fit failed.
+pub fn warn_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
+    warn_nodes_unfitted(terminal, &model.unfitted(), path);
+}
+
+/// The same, of nodes that are known.
+pub fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
     if !nodes.is_empty() {
         terminal.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",
             path.display(),
-            few(&nodes),
+            few(nodes),
             if nodes.len() == 1 { "gives" } else { "give" },
         ));
     }

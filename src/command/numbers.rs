@@ -1,8 +1,8 @@
-//! Decides how a number on the command line is read, and what is said of a text that is none; each argument says which it allows.
+//! Reading a number on the command line.
 
 use std::str::FromStr;
 
-/// Reads a number; of any other text it tells what it was and what an argument expects: "a whole number from 1 on".
+/// Reads a number. The error of any other text names it and what the argument expects: "a whole number from 1 on".
 pub fn read<N: FromStr>(
     expected: &'static str,
 ) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync + 'static {
@@ -23,8 +23,8 @@ mod tests {
         let steps = read::<NonZeroU32>("a whole number from 1 on");
         assert_eq!(steps("3").map(NonZeroU32::get), Ok(3));
         for text in ["0", "x", "-1", "1.5", "", "4294967296"] {
-            let told = format!("expected a whole number from 1 on, found {text:?}");
-            assert_eq!(steps(text), Err(told));
+            let words = format!("expected a whole number from 1 on, found {text:?}");
+            assert_eq!(steps(text), Err(words));
         }
     }
 }

@@ -15,16 +15,16 @@ use clap::Args;
 use super::aside::{check_apart, write_aside};
 use super::beyond::beyond;
 use super::data::{self, Data};
-use super::doubtful::Doubtful;
+use super::doubts;
 use super::faults::{FaultWatch, Purpose};
 use super::model::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
 /// Show what a model is worth on recorded data, as one page
 ///
-/// Tells a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
-/// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
-/// `--format json` the same facts go to standard output.
+/// Prints a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
+/// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and
+/// errors, chosen features, all sensors, and the model's card. With `--format json` the same facts go to standard output.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal report model.json --data test.csv\n  \
@@ -54,41 +54,36 @@ impl Report {
         self.data.check_lasting("--data")?;
         if let Some(output) = &self.output {
             if output.as_os_str() == "-" && terminal.format == Format::Json {
-                let told = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
-                return Err(Failure::Request(told.to_owned()));
+                let message = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
+                return Err(Failure::Request(message.to_owned()));
             }
             let read = self.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
         }
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
         let dataset = self.data.dataset();
-        let names = dataset
-            .paths()
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect();
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let facts = gather(&model, &watch, names).map_err(|error| {
+        let facts = gather(&model, &watch, self.data.names()).map_err(|error| {
             let of_a_pass = error.downcast::<FitError>();
             of_a_pass.map_or_else(outside, |error| Failure::from(*error))
         })?;
         let course = &facts.course;
-        data::tell(
+        data::warn(
             terminal,
             &model.plan,
             &dataset.reports(),
             course.refused,
             &course.rejected,
         );
-        self.data.tell_fitted_on(terminal, &model, course.period_s);
-        if let Some(told) = feedback::in_words(&model.plan) {
-            terminal.warning(told);
+        self.data.warn_fitted_on(terminal, &model, course.period_s);
+        if let Some(message) = feedback::in_words(&model.plan) {
+            terminal.warning(message);
         }
-        for told in Lack::told(&facts.lacks) {
-            terminal.warning(told);
+        for message in Lack::warnings(&facts.lacks) {
+            terminal.warning(message);
         }
         for of in &facts.unjudged {
-            terminal.warning(format_args!("nothing is told of `{}`: {}", of.of, of.why));
+            terminal.warning(format_args!("`{}` cannot be judged: {}", of.of, of.why));
         }
         if course.axes.is_empty() {
             terminal.warning(
@@ -96,17 +91,15 @@ impl Report {
             );
         }
         if terminal.format == Format::Json {
-            let mut told = serde_json::to_value(&facts)
+            let mut json = serde_json::to_value(&facts)
                 .map_err(|error| Failure::Outside(error.to_string()))?;
             let ranges = facts.course.sensors.iter().filter_map(sample_range);
             let ranges: Vec<SampleRange> = ranges.collect();
-            let doubtful = Doubtful {
-                faults: &watch.found(),
-                outside_fit: &beyond(model.sample_ranges(), &ranges),
-                reports: &dataset.reports(),
-            };
-            doubtful.tell(&mut told);
-            println!("{told:#}");
+            let outside_fit = beyond(model.sample_ranges(), &ranges);
+            for (key, found) in doubts::facts(&watch.found(), &outside_fit, &dataset) {
+                json[key] = found;
+            }
+            println!("{json:#}");
         } else if self
             .output
             .as_deref()

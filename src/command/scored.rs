@@ -1,4 +1,4 @@
-//! Decides how scoring is asked for on the command line, and how what was asked for is told beside the scores.
+//! The options that say how predictions are scored.
 
 use std::num::NonZeroU32;
 
@@ -44,8 +44,8 @@ enum Horizon {
     /// From those measured up to K steps before the predicted one; newer ones are replaced by predictions of them, and
     /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one
     KStep,
-    /// From its own predictions: a measured truth is read only where there is none yet, as at the beginning of a segment, and
-    /// nothing is learned from any; what follows a state is told as many as it takes to know where it is
+    /// From its own predictions. A measured truth is read only where there is none yet, as at the beginning of a segment.
+    /// Nothing is learned from any. What follows a state gets as many as it needs to find it
     FreeRun,
 }
 
@@ -88,7 +88,7 @@ impl Scored {
                 "--mode k-step needs the number of steps: `--steps 3`".to_owned(),
             )),
             (other, Some(_)) => Err(Failure::Request(format!(
-                "--steps says how far `--mode k-step` predicts, and the mode is {}",
+                "--steps is for `--mode k-step`, and the mode is {}",
                 other.name()
             ))),
         }
@@ -119,12 +119,12 @@ impl Scored {
     }
 
     /// For programs: adds all that could be asked for to an object.
-    pub fn tell(&self, told: &mut Value) {
+    pub fn add_to(&self, facts: &mut Value) {
         let limit = self.abs_truth_below.as_ref().map(Quantity::to_string);
-        told["mode"] = self.mode.name().into();
-        told["steps"] = json!(self.steps);
-        told["abs_truth_below"] = json!(limit);
-        told["frozen"] = self.frozen.into();
+        facts["mode"] = self.mode.name().into();
+        facts["steps"] = json!(self.steps);
+        facts["abs_truth_below"] = json!(limit);
+        facts["frozen"] = self.frozen.into();
     }
 }
 

@@ -104,14 +104,14 @@ impl Simulate {
             return Ok(Answer::Fine);
         }
         if terminal.format == Format::Json {
-            let told = json!({
+            let facts = json!({
                 "output": output,
                 "rows": rows,
                 "machine": name,
                 "days": self.days,
                 "seed": self.seed,
             });
-            println!("{told:#}");
+            println!("{facts:#}");
         } else {
             terminal.note(format_args!(
                 "wrote {}: {}, {} of `{name}`, seed {}",
@@ -174,8 +174,8 @@ impl Simulate {
         // What a shell has opened for this command, as `<(…)`, comes to an end.
         let is_open = path.starts_with("/dev/fd");
         if !(is_open || lasts(path)) {
-            let told = format!("--schedule {}: {NO_FILE}", path.display());
-            return Err(Failure::Request(told));
+            let message = format!("--schedule {}: {NO_FILE}", path.display());
+            return Err(Failure::Request(message));
         }
         let text = std::fs::read_to_string(path).map_err(|error| {
             Failure::Outside(format!("cannot read {}: {error}", path.display()))
@@ -215,7 +215,7 @@ pub fn write_recording(
     let failed = |error: io::Error| {
         if error.kind() == io::ErrorKind::BrokenPipe {
             // Whoever read our output has seen enough.
-            return Failure::Told(0);
+            return Failure::Exit(0);
         }
         Failure::Outside(not_written(output, &error))
     };
@@ -256,7 +256,7 @@ fn refused(error: MachineError) -> Failure {
     Failure::Request(error.to_string())
 }
 
-/// A simulation that tells how far it has come.
+/// A simulation that shows its progress.
 struct Watched {
     simulation: Box<dyn Simulation>,
     progress: Progress,
@@ -277,7 +277,7 @@ impl Watched {
 impl Simulation for Watched {
     fn next(&mut self, row: &mut Row) -> bool {
         let more = self.simulation.next(row);
-        self.progress.tell((row.time_ns as f64 / 86_400e6) as u64);
+        self.progress.set((row.time_ns as f64 / 86_400e6) as u64);
         more
     }
 

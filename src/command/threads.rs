@@ -1,4 +1,4 @@
-//! Decides how many threads a command works with.
+//! How many threads a command works with.
 
 use clap::Args;
 

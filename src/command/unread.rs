@@ -1,4 +1,4 @@
-//! Decides what is told of the sections of a machine file that no command reads yet.
+//! A warning about sections of a machine file that no command reads yet.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use athermal::core::document::GraphFile;
 
 use crate::terminal::Terminal;
 
-/// What a machine file may say and `run` does not read: its key, how it is written, and what to do instead.
+/// The sections that `run` does not read: key, spelling, and what to do instead.
 const UNREAD: [(&str, &str, &str); 3] = [
     ("source", "`[source]`", "give the input with `--input`"),
     ("sinks", "`[sinks]`", "give the output with `--output`"),
@@ -17,8 +17,8 @@ const UNREAD: [(&str, &str, &str); 3] = [
     ),
 ];
 
-/// Tells which sections of a machine file are not read, since whoever wrote them expects them to work.
-pub fn tell(terminal: &Terminal, path: &Path, graph: &GraphFile) {
+/// Warns of the sections of a machine file that are not read.
+pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
     let written = |(key, ..): &&(&str, &str, &str)| graph.deployment.contains_key(*key);
     let unread: Vec<_> = UNREAD.iter().filter(written).collect();
     if unread.is_empty() {

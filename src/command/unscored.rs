@@ -1,4 +1,4 @@
-//! Decides in what words people are told why nothing of a prediction is scored.
+//! Warnings about predictions of which nothing is scored.
 
 use athermal::run::score::Unscored;
 
@@ -6,17 +6,17 @@ use super::model::few;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, stated};
 
-/// Tells of them, of those together of which the same is to be told.
-pub fn tell(terminal: &Terminal, unscored: &[Unscored]) {
-    let mut told: Vec<(Vec<String>, String)> = Vec::new();
+/// Warns of them, of those with one reason together.
+pub fn warn(terminal: &Terminal, unscored: &[Unscored]) {
+    let mut groups: Vec<(Vec<String>, String)> = Vec::new();
     for of in unscored {
         let (output, why) = (of.output.clone(), why(of));
-        match told.iter_mut().find(|(_, told)| *told == why) {
+        match groups.iter_mut().find(|(_, groups)| *groups == why) {
             Some((outputs, _)) => outputs.push(output),
-            None => told.push((vec![output], why)),
+            None => groups.push((vec![output], why)),
         }
     }
-    for (outputs, why) in told {
+    for (outputs, why) in groups {
         let outputs = few(&outputs);
         terminal.warning(format_args!("{outputs}: nothing is scored: {why}"));
     }

@@ -1,4 +1,4 @@
-//! Decides how a diagram is written for Graphviz.
+//! How a diagram is written for Graphviz.
 
 use std::fmt::Write as _;
 

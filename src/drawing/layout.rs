@@ -1,4 +1,4 @@
-//! Decides where the boxes of a diagram stand and where its arrows pass; not how they look.
+//! Where the boxes of a diagram stand and where its arrows pass.
 //!
 //! Layers by longest path, long arrows broken by way points, orders within layers by the mean of the neighbours (Sugiyama,
 //! Tagawa and Toda, IEEE Trans. SMC 11(2), 1981).

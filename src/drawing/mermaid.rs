@@ -1,4 +1,4 @@
-//! Decides how a diagram is written for Mermaid, which web pages and Markdown files draw.
+//! How a diagram is written for Mermaid, which web pages and Markdown files draw.
 
 use std::fmt::Write as _;
 

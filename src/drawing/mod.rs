@@ -1,4 +1,4 @@
-//! Decides what a picture of a graph shows: boxes, what stands in them, and arrows; not how they are drawn.
+//! Pictures of a graph: boxes, what stands in them, and arrows.
 
 pub mod dot;
 mod layout;
@@ -32,7 +32,7 @@ pub struct Box {
     pub title: String,
     /// What it is.
     pub class: Class,
-    /// What is to be said of it, line by line.
+    /// The text in it, line by line.
     pub lines: Vec<String>,
 }
 
@@ -165,7 +165,7 @@ impl Drawn<'_> {
         } else {
             node.kind.name.to_owned()
         }];
-        lines.extend(self.said_of(node));
+        lines.extend(self.lines_of(node));
         let class = match node.kind.role {
             RoleName::Feature => Class::Feature,
             RoleName::Estimator => Class::Estimator,
@@ -174,7 +174,7 @@ impl Drawn<'_> {
         self.add(title, class, lines)
     }
 
-    fn said_of(&self, node: &PlannedNode) -> Vec<String> {
+    fn lines_of(&self, node: &PlannedNode) -> Vec<String> {
         let first_port = node.ports.first().map(|(_, slots)| slots.clone());
         let slots = first_port.unwrap_or_else(|| node.slots.clone());
         let channels = || slots.clone().map(|slot| &self.plan.channels[slot].channel);

@@ -1,4 +1,4 @@
-//! Decides how the compiled plan is told: what stands in which slots, and what is done at a tick.
+//! The compiled plan as text: what stands in which slots, and what is done at a tick.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use athermal::core::time::Duration;
 
 use athermal_analysis::figures::{count, length, table};
 
-/// The plan for people; instances of one node are told together unless `expand`.
+/// The plan for people; instances of one node share lines unless `expand`.
 #[must_use]
 pub fn text(plan: &Plan, expand: bool) -> String {
     let mut text = format!(
@@ -50,7 +50,7 @@ fn slots(plan: &Plan, expand: bool) -> String {
     table(&["channel", "slot", "unit", "span", "ahead", "kept"], &rows)
 }
 
-/// Slots that are told together: those of one signal or one node, of one unit and horizon.
+/// Slots that share a line: those of one signal or one node, of one unit and horizon.
 fn runs(plan: &Plan, expand: bool) -> Vec<Range<usize>> {
     let owner = |slot: usize| {
         let channel = &plan.channels[slot];
@@ -92,7 +92,7 @@ fn lengths(least: Option<Duration>, most: Option<Duration>) -> String {
 
 fn steps(plan: &Plan, expand: bool) -> String {
     let mut text = String::from("at each tick\n");
-    let mut told: Vec<(usize, usize, String)> = Vec::new();
+    let mut steps: Vec<(usize, usize, String)> = Vec::new();
     for (number, step) in plan.steps.iter().enumerate() {
         let line = match step {
             Step::Gather(gather) => {
@@ -123,19 +123,19 @@ fn steps(plan: &Plan, expand: bool) -> String {
                 name(&plan.nodes[*node], expand)
             ),
         };
-        told.push((number + 1, number + 1, line));
+        steps.push((number + 1, number + 1, line));
     }
     // Instances of a node, and what they read, follow each other in the same pattern.
     let mut at = 0;
-    while at < told.len() {
+    while at < steps.len() {
         let period = if expand {
             None
         } else {
-            (1..=2).find(|&period| repeats(&told, at, period) > 1)
+            (1..=2).find(|&period| repeats(&steps, at, period) > 1)
         };
-        let (period, times) = period.map_or((1, 1), |period| (period, repeats(&told, at, period)));
+        let (period, times) = period.map_or((1, 1), |period| (period, repeats(&steps, at, period)));
         let last = at + period * times;
-        let lines: Vec<&str> = told[at..at + period]
+        let lines: Vec<&str> = steps[at..at + period]
             .iter()
             .map(|(_, _, line)| line.as_str())
             .collect();
@@ -158,10 +158,10 @@ fn steps(plan: &Plan, expand: bool) -> String {
     text
 }
 
-fn repeats(told: &[(usize, usize, String)], at: usize, period: usize) -> usize {
-    let same = |a: usize, b: usize| (0..period).all(|i| told[a + i].2 == told[b + i].2);
+fn repeats(steps: &[(usize, usize, String)], at: usize, period: usize) -> usize {
+    let same = |a: usize, b: usize| (0..period).all(|i| steps[a + i].2 == steps[b + i].2);
     let mut times = 1;
-    while at + period * (times + 1) <= told.len() && same(at, at + period * times) {
+    while at + period * (times + 1) <= steps.len() && same(at, at + period * times) {
         times += 1;
     }
     times

@@ -1,4 +1,4 @@
-//! Decides how a diagram looks as a picture: letters, colours, curves; light and dark after the viewer's taste.
+//! How a diagram looks as a picture: letters, colours, curves; light and dark after the viewer's taste.
 
 use std::fmt::Write as _;
 

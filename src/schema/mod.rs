@@ -152,7 +152,7 @@ impl Definitions {
     /// Takes the definitions of a kind over, and gives its schema with references to them. A name that another kind has for
     /// something else gets the kind's name in front.
     fn adopt(&mut self, kind: &Kind) -> Value {
-        let mut schema = Value::from((kind.schema)());
+        let mut schema = (kind.schema)().clone();
         let own = schema
             .as_object_mut()
             .and_then(|schema| schema.remove("$defs"));

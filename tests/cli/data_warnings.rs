@@ -118,7 +118,7 @@ fn dated_data_of_the_time_of_the_fit_are_told_to_be_that() {
     let model = scratch.path("model.json");
     let data = scratch.file("log.csv", log(0, 360, true));
     athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
-    let told = "the data of the fit are of the time from 2026-03-01T04:00:00Z to 2026-03-01T05:59:00Z too: there it is told how well \
+    let told = "the data of the fit are of the time from 2026-03-01T04:00:00Z to 2026-03-01T05:59:00Z too: there the scores show how well \
                 it fits, not how well it predicts";
     let grown = scratch.file("grown.csv", log(240, 400, true));
     for command in ["evaluate", "report"] {

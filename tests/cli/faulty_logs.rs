@@ -174,7 +174,7 @@ fn a_leap_between_usual_values_is_nothing_that_a_range_takes_out() {
     let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
     fitted.tells(&[
         "temperature.plate leaps",
-        "no `range` tells such samples from others, so leave these rows out",
+        "no `range` takes out such samples alone, so leave these rows out",
     ]);
     assert!(!fitted.told.contains("nine in ten"), "{}", fitted.told);
 }

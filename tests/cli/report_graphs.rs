@@ -345,8 +345,8 @@ fn what_cannot_be_judged_of_a_correction_is_told_and_the_rest_is_there() {
     assert!(verdict["with_correction"].is_number(), "{verdict}");
     assert_eq!(verdict["node"], "thermal");
     reported.report(&[]).tells(&[
-        "nothing is told of `other.S1`: `speed.S1` is no slope of a position",
-        "nothing is told of `forecast`: it reads `speed.S1`, which is no drift of a measured position",
+        "`other.S1` cannot be judged: `speed.S1` is no slope of a position",
+        "`forecast` cannot be judged: it reads `speed.S1`, which is no drift of a measured position",
     ]);
     assert!(
         reported

@@ -33,8 +33,10 @@ fn every_kind_has_its_keys_behind_its_type() {
         assert_eq!(choice["if"]["properties"]["type"]["const"], *name);
         let keys = choice["then"]["properties"].as_object().unwrap();
         let kind = kinds()[name][0];
-        let own = Value::from((kind.schema)());
-        let own = own["properties"].as_object().into_iter().flatten();
+        let own = (kind.schema)()["properties"]
+            .as_object()
+            .into_iter()
+            .flatten();
         for key in own
             .map(|(key, _)| key.as_str())
             .chain(["type", "each", "inputs"])

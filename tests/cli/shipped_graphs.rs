@@ -87,7 +87,7 @@ fn the_program_knows_the_same_kinds_as_the_library() {
 fn every_kind_explains_itself_and_its_parameters() {
     for kind in kinds().values().flatten() {
         assert!(kind.summary().len() > 10, "{}", kind.name);
-        let schema = serde_json::Value::from((kind.schema)());
+        let schema = (kind.schema)();
         for (name, parameter) in schema["properties"].as_object().into_iter().flatten() {
             let text = parameter["description"].as_str().unwrap_or_default();
             assert!(

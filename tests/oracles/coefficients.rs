@@ -236,8 +236,7 @@ fn coefficients_of_some_nodes_are_told_alone_and_a_name_that_none_has_is_told() 
 fn a_polynomial_without_standard_errors_is_said_to_be_held_by_its_bound() {
     let scratch = Scratch::new("coefficients-bounded");
     let (model, _) = model(&scratch);
-    let why =
-        "polynomials without one are held by the bound of stability, or the rows hardly\ntell them";
+    let why = "polynomials without one are held by the bound of stability, or the rows hardly\ndetermine them";
     let told = show(&model, "coefficients").ended(0).out;
     assert!(!told.contains(why), "{told}");
     let mut written: Value =

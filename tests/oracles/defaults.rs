@@ -148,7 +148,7 @@ fn node(machine: &Machine, kind: &Kind) -> String {
     if has("prediction") {
         text += &format!("inputs.prediction = {:?}\n", node_of("linear", machine));
     }
-    let schema = serde_json::Value::from((kind.schema)());
+    let schema = (kind.schema)();
     for required in schema["required"].as_array().into_iter().flatten() {
         match required.as_str().unwrap() {
             "lags" => text += &format!("lags = {}\n", machine.lags),

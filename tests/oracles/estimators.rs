@@ -393,8 +393,8 @@ fn every_mistake_in_a_parameter_is_told_with_its_place() {
             ["`alpha` is NaN", "`l1_ratio` is 0"],
         ),
         (
-            "type = \"linear\"\nsolver = { type = \"ridge\", alpha = { by = \"cross_validation\", largest = 1e-9, per_decade = 0 } }",
-            ["`largest` is 0.000000001", "`per_decade` is 0"],
+            "type = \"linear\"\nsolver = { type = \"ridge\", alpha = { by = \"cross_validation\", largest = -1, per_decade = 0 } }",
+            ["`largest` is -1", "`per_decade` is 0"],
         ),
         (
             "type = \"linear\"\nselection = { method = \"floating\", folds = { type = \"blocked\", count = 1 }, most = 0 }",
@@ -402,7 +402,7 @@ fn every_mistake_in_a_parameter_is_told_with_its_place() {
         ),
         (
             "type = \"polynomial\"\nselection = { method = \"stepwise\", f_enter = 2.0, leave_share = 3.0 }",
-            ["`leave_share` is 3", "come and go for ever"],
+            ["`leave_share` is 3", "greater than 0 and at most 1"],
         ),
         (
             "type = \"linear\"\nselection = { method = \"sideways\" }",

@@ -1,4 +1,4 @@
-//! Decides how numbers and tables look in text for people.
+//! How numbers and tables look in text for people.
 
 use std::fmt::Write as _;
 
@@ -34,7 +34,7 @@ pub fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), number)
 }
 
-/// A unit in which times are told.
+/// A unit of times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeUnit {
     /// Its name, of several: `minutes`.
@@ -93,7 +93,7 @@ pub fn instant(at_s: f64) -> String {
         .map_or_else(|| format!("{at_s} s"), |date| date.to_string())
 }
 
-/// A time as a graph file states it; one that is too long for that as [`time`] tells it.
+/// A time as a graph file states it; one that is too long for that as [`time`] writes it.
 #[must_use]
 pub fn stated(seconds: f64) -> String {
     Duration::from_secs_f64(seconds).map_or_else(|| time(seconds), length)
@@ -261,10 +261,10 @@ mod tests {
     #[test]
     fn pages_keep_lists_and_tables() {
         let long = "word ".repeat(20);
-        let told = page(&format!(
+        let text = page(&format!(
             "{long}\n\n- one\n  more\n- {long}\n\n| a | {long} |"
         ));
-        let lines: Vec<_> = told.lines().collect();
+        let lines: Vec<_> = text.lines().collect();
         let words = |count| vec!["word"; count].join(" ");
         assert_eq!(lines[..4], [&*words(16), &words(4), "", "- one more"]);
         assert_eq!(
@@ -285,12 +285,12 @@ mod tests {
 
     #[test]
     fn paragraphs_fit_and_a_word_that_is_too_long_has_a_line_of_its_own() {
-        let told = paragraph(
+        let text = paragraph(
             "  note:",
             6,
             &format!("{} {}", "word ".repeat(20), "x".repeat(90)),
         );
-        let lines: Vec<_> = told.lines().collect();
+        let lines: Vec<_> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         assert_eq!(lines[0], format!("  note:{}", " word".repeat(14)));
         assert_eq!(lines[1], format!("     {}", " word".repeat(6)));
@@ -335,11 +335,11 @@ mod tests {
 
     #[test]
     fn lengths_are_told_to_the_millisecond() {
-        let told = |ns| length(Duration::from_ns(ns));
-        assert_eq!(told(1_343_222_575_030), "1343.223s");
-        assert_eq!(told(300_000_000_000), "5min");
-        assert_eq!(told(12_345), "12.345us");
-        assert_eq!(told(0), "0s");
+        let text = |ns| length(Duration::from_ns(ns));
+        assert_eq!(text(1_343_222_575_030), "1343.223s");
+        assert_eq!(text(300_000_000_000), "5min");
+        assert_eq!(text(12_345), "12.345us");
+        assert_eq!(text(0), "0s");
     }
 
     #[test]
@@ -350,17 +350,17 @@ mod tests {
             row("b", "x".repeat(70)),
             row("c", "worse".to_owned()),
         ];
-        let told = table(&["name", "value"], &rows);
+        let text = table(&["name", "value"], &rows);
         let below = format!("b         1\n    {}", "x".repeat(70));
         let expected = format!("name  value\na         1  worse\n{below}\nc         1  worse\n");
-        assert_eq!(told, expected);
+        assert_eq!(text, expected);
     }
 
     #[test]
     fn a_cell_may_be_longer_than_formatting_allows() {
         let long = "x".repeat(70_000);
-        let told = table(&["name", "value"], &[vec!["a".to_owned(), long.clone()]]);
-        assert_eq!(told.lines().nth(1), Some(&*format!("a     {long}")));
+        let text = table(&["name", "value"], &[vec!["a".to_owned(), long.clone()]]);
+        assert_eq!(text.lines().nth(1), Some(&*format!("a     {long}")));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Texts within pages, pictures and reports that are markup. Not what these look like.
+//! Escaping text in pages, pictures and reports that are markup.
 
 /// A text that cannot be taken for markup; characters that XML cannot have are replaced.
 #[must_use]

@@ -13,8 +13,7 @@ pub enum Rule {
     Answers,
     /// The parameters written out and read back are the same.
     ReadsBack,
-    /// A parameter out of the range that its schema states is refused by its name, as is one that is no number; all that the
-    /// schema allows is taken and runs, its defaults, words and switches among it.
+    /// All that the schema allows is accepted and runs, words and switches among it.
     Ranges,
     /// The same samples give the same bits, again and on another thread.
     Deterministic,
@@ -114,9 +113,9 @@ impl Rule {
                 "let `Serialize` and `Deserialize` of the parameters be each other's inverse, defaults included"
             }
             Self::Ranges => {
-                "say the range in the schema (`#[schemars(range(min = 0.0, max = 1.0))]`, or `#[schemars(extend(\"exclusiveMinimum\" \
-                 = 0.0))]`), refuse everything outside with a `Mistake::at(\"name\", …)`, written so that NaN fails: \
-                 `!(0.0..=1.0).contains(&x)`, and run with everything inside, the default and each of the words of an `enum` included"
+                "declare the range in the schema, which the compiler checks (`#[schemars(range(min = 0.0, max = 1.0))]`, or \
+                 `#[schemars(extend(\"exclusiveMinimum\" = 0.0))]`), refuse a quantity of another unit, and run with everything \
+                 else, each of the words of an `enum` included"
             }
             Self::Deterministic => {
                 "take no time, no random number without a seed, no order of a hash map and no address into account"

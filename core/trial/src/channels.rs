@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 
-use crate::compile::{CompileProblem, Plan, PortChannels, Reference, outermost};
-use crate::diagnostic::Names;
+use crate::compile::problem::UnknownNode;
+use crate::compile::{Plan, PortChannels, Reference, outermost};
+use crate::diagnostic::{Names, Problem};
 use crate::document::OutputDecl;
 
 /// The channels of a plan by what a reference calls them, listed once: a file may have thousands of tests.
@@ -64,22 +65,21 @@ impl<'a> Channels<'a> {
 
     /// The slots of a reference, in their order. An output (`predicted.Z1`) comes before a node or signal of its name, since
     /// what it says is what the column of that name holds; behind a node's port stands no column.
-    pub(super) fn look_up(&self, text: &str) -> Result<Vec<usize>, CompileProblem> {
+    pub(super) fn look_up(&self, text: &str) -> Result<Vec<usize>, Box<dyn Problem>> {
         let reference = Reference::parse(text);
         let output = self.outputs.get(reference.node);
         match output.filter(|_| reference.port.is_none()) {
-            Some(channels) => channels.find(&reference),
+            Some(channels) => Ok(channels.find(&reference)?),
             None => self.look_up_inside(&reference),
         }
     }
 
     /// The same of nodes and signals alone.
-    fn look_up_inside(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
+    fn look_up_inside(&self, reference: &Reference<'_>) -> Result<Vec<usize>, Box<dyn Problem>> {
         let Some(node) = self.nodes.get(reference.node) else {
-            return Err(CompileProblem::UnknownNode {
-                node: reference.node.to_owned(),
-                known: Arc::clone(self.known()),
-            });
+            let known = Arc::clone(self.known());
+            let node = reference.node.to_owned();
+            return Err(UnknownNode { node, known }.into());
         };
         let default = node.named.first().copied().unwrap_or_default();
         let channels = match reference.port {
@@ -88,7 +88,7 @@ impl<'a> Channels<'a> {
             port => node.ports.get(&port.filter(|&port| port != default)),
         };
         match channels {
-            Some(channels) => channels.find(reference),
+            Some(channels) => Ok(channels.find(reference)?),
             None => Err(reference.no_port(node.named.clone())),
         }
     }
@@ -98,7 +98,7 @@ impl<'a> Channels<'a> {
     pub(super) fn look_up_measured(
         &self,
         text: &str,
-    ) -> Result<Result<Vec<usize>, String>, CompileProblem> {
+    ) -> Result<Result<Vec<usize>, String>, Box<dyn Problem>> {
         let reference = Reference::parse(text);
         let slots = match self.nodes.contains_key(reference.node) {
             true => self.look_up_inside(&reference)?,
@@ -119,6 +119,19 @@ impl<'a> Channels<'a> {
         let is_there = is_output && self.look_up_inside(&reference).is_ok();
         let channel = reference.channel.filter(|_| is_there)?;
         Some(format!("{}:{port}.{channel}", reference.node))
+    }
+
+    /// The mistake of a reference that begins neither with a name that there is nor with one of `others`.
+    pub(super) fn unknown(&self, text: &str, others: &[&str]) -> Option<UnknownNode> {
+        let Reference { node, port, .. } = Reference::parse(text);
+        let is_output = port.is_none() && self.outputs.contains_key(node);
+        if is_output || self.nodes.contains_key(node) {
+            return None;
+        }
+        let names = others.iter().copied().chain(self.known().iter());
+        let known = Arc::new(names.map(str::to_owned).collect());
+        let node = node.to_owned();
+        Some(UnknownNode { node, known })
     }
 
     fn known(&self) -> &Arc<Names> {

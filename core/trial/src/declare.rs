@@ -7,14 +7,14 @@ use std::sync::Arc;
 use super::channels::Channels;
 use super::data::{DataSet, Simulation};
 use super::expectation::Expectation;
-use super::problem::{NotFound, TrialProblem};
+use super::problem::{self, NotFound};
 use super::series::{Series, Synthetic};
 use super::shape;
 use super::table::SimulationTable;
-use crate::compile::{CompileProblem, Part, Plan, Reference, SourceChannel};
-use crate::diagnostic::{Diagnostics, Place, Sources};
+use crate::compile::{Part, Plan, Reference, SourceChannel};
+use crate::diagnostic::{Diagnostics, Place, Problem, Sources};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode_part, is_misspelt,
+    Data, DocumentProblem, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt,
     known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
@@ -99,7 +99,7 @@ fn read(
         if let (Some(name), Some(text)) = (name, text) {
             match names.iter().find(|(taken, _)| *taken == text) {
                 Some(&(_, first)) => {
-                    let name_twice = TrialProblem::DuplicateName {
+                    let name_twice = problem::DuplicateName {
                         name: text.to_owned(),
                         first,
                     };
@@ -172,7 +172,7 @@ impl Declaring<'_> {
                 let problem = DocumentProblem::MissingKey {
                     key: "name".to_owned(),
                     what: "a test".to_owned(),
-                    advice: Some("say in a sentence what it shows: name = \"…\"".to_owned()),
+                    advice: Some("describe in a sentence what it shows: name = \"…\"".to_owned()),
                 };
                 self.diagnostics.report(test.place, problem);
                 None
@@ -183,13 +183,13 @@ impl Declaring<'_> {
             (Some(on), None) => self.data("on", &on.value).map(On::Data),
             (None, Some(inputs)) => self.inputs(&inputs.value).map(On::Synthetic),
             (Some(on), Some(inputs)) => {
-                let problem = TrialProblem::TwoData { inputs: inputs.key };
+                let problem = problem::TwoData { inputs: inputs.key };
                 self.diagnostics.report(on.key, problem);
                 None
             }
             (None, None) if misspelt("on") || misspelt("inputs") => None,
             (None, None) => {
-                self.diagnostics.report(test.place, TrialProblem::NoData);
+                self.diagnostics.report(test.place, problem::NoData {});
                 None
             }
         };
@@ -207,7 +207,7 @@ impl Declaring<'_> {
         });
         if nothing {
             let place = stated.map_or(test.place, |value| value.place);
-            let problem = TrialProblem::NothingExpected { what: "the test" };
+            let problem = problem::NothingExpected { what: "the test" };
             self.diagnostics.report(place, problem);
         }
         Some(Trial {
@@ -229,8 +229,8 @@ impl Declaring<'_> {
     ) -> Option<Vec<T>> {
         let Some(list) = value.as_list() else {
             let mut problem = wrong_type(key, "a list of tables", value);
-            if let DocumentProblem::WrongType { lacks, .. } = &mut problem {
-                *lacks = Lacks::for_tables(&value.data);
+            if let DocumentProblem::WrongType { hint, .. } = &mut problem {
+                *hint = Hint::for_tables(&value.data);
             }
             self.diagnostics.report(value.place, problem);
             return None;
@@ -268,15 +268,11 @@ impl Declaring<'_> {
 
     fn simulation(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
         let what = format!("\"{key}\"");
-        let read = decode_part::<SimulationTable>(value, &what, self.diagnostics)?;
-        let (table, is_sure) = read.sure();
+        let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
         let place = value.place_of("simulate");
-        if is_sure("days") && !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
+        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
             let found = table.days.to_string();
             self.range(value, "days", found, "above 0 and at most 3653");
-        }
-        if !is_sure("simulate") {
-            return None;
         }
         let known = match machine(&table.simulate) {
             Ok(known) => known,
@@ -295,7 +291,6 @@ impl Declaring<'_> {
             Some(path) => Some(self.schedule(path, value.place_of("schedule"), known.machine)?),
             None => None,
         };
-        read.as_whole()?;
         Some(DataSet::Simulated(Simulation {
             machine: known.machine.name(),
             days: table.days,
@@ -321,7 +316,7 @@ impl Declaring<'_> {
             .map(|source| source.name.clone())
             .collect();
         if !missing.is_empty() {
-            let problem = TrialProblem::MachineLacks {
+            let problem = problem::MachineLacks {
                 machine: machine.name(),
                 channels: missing,
                 has: channels.iter().map(|channel| channel.reference()).collect(),
@@ -332,7 +327,7 @@ impl Declaring<'_> {
         for (source, planned) in plan.sources.iter().zip(&plan.channels) {
             let unit = measures(&source.name).and_then(|channel| Unit::parse(channel.unit).ok());
             if let Some(unit) = unit.filter(|unit| !unit.measures_same(&planned.channel.unit)) {
-                let problem = TrialProblem::Units {
+                let problem = problem::Units {
                     key: "simulate",
                     found: unit,
                     channel: source.name.clone(),
@@ -355,7 +350,7 @@ impl Declaring<'_> {
             Ok(text) => text.into(),
             Err(error) => {
                 let reason = unreadable(&error);
-                let problem = TrialProblem::ScheduleUnreadable {
+                let problem = problem::ScheduleUnreadable {
                     path: shown,
                     reason,
                 };
@@ -370,8 +365,12 @@ impl Declaring<'_> {
                 let file = self.sources.add(shown, Arc::clone(&text));
                 for error in errors {
                     let place = self.sources.line(file, error.line);
-                    self.diagnostics
-                        .report(place, TrialProblem::Schedule(error.reason));
+                    self.diagnostics.report(
+                        place,
+                        problem::InSchedule {
+                            reason: error.reason,
+                        },
+                    );
                 }
             })
             .ok();
@@ -388,7 +387,7 @@ impl Declaring<'_> {
         };
         let mut channels: Vec<(usize, Series)> = Vec::new();
         if table.is_empty() {
-            self.diagnostics.report(value.place, TrialProblem::NoData);
+            self.diagnostics.report(value.place, problem::NoData {});
         }
         let plan = self.plan;
         for (reference, entry) in table.iter() {
@@ -398,7 +397,7 @@ impl Declaring<'_> {
             for slot in slots {
                 if channels.iter().any(|(taken, _)| *taken == slot) {
                     let channel = plan.sources[slot].name.clone();
-                    let problem = TrialProblem::ChannelTwice { channel };
+                    let problem = problem::ChannelTwice { channel };
                     self.diagnostics.report(entry.key, problem);
                     continue;
                 }
@@ -416,28 +415,22 @@ impl Declaring<'_> {
     }
 
     fn fault(&mut self, value: &Value) -> Option<Vec<FaultSpec>> {
-        let read = decode_part::<FaultSpec>(value, "the fault", self.diagnostics)?;
-        let (spec, is_sure) = read.sure();
+        let spec = decode::<FaultSpec>(value, "the fault", self.diagnostics)?;
         if spec.from < Duration::ZERO {
             self.range(value, "from", spec.from.to_string(), "0 or later");
         }
         if let Some(lasting) = spec.lasting.filter(|lasting| *lasting <= Duration::ZERO) {
             self.range(value, "for", lasting.to_string(), "longer than 0");
         }
-        if is_sure("kind") && spec.size.is_some() && !spec.kind.has_size() {
-            let problem = TrialProblem::Keys {
+        if spec.size.is_some() && !spec.kind.has_size() {
+            let problem = problem::ExcludedKeys {
                 key: "size",
                 with: "kind",
-                excluded: true,
             };
             self.diagnostics.report(value.place_of("size"), problem);
         }
         let plan = self.plan;
-        if !is_sure("channel") {
-            return None;
-        }
         let slots = self.measured(&spec.channel, value.place_of("channel"))?;
-        let spec = read.as_whole()?;
         let one = |slot: usize| {
             let name = plan.sources[slot].name.as_str();
             let unit = &plan.channels[slot].channel.unit;
@@ -460,7 +453,7 @@ impl Declaring<'_> {
         let made: Result<Vec<_>, _> = slots.into_iter().map(one).collect();
         made.map_err(|error| {
             let key = if spec.size.is_some() { "size" } else { "kind" };
-            let problem = TrialProblem::Fault(error);
+            let problem = problem::Fault { error };
             self.diagnostics.report(value.place_of(key), problem);
         })
         .ok()
@@ -475,17 +468,14 @@ impl Declaring<'_> {
 
     /// The channels of what is to be beaten, which may be no node as well.
     pub(super) fn rival(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        let problem = match self.channels.look_up(reference) {
-            Ok(slots) => return Some(slots),
-            Err(CompileProblem::UnknownNode { node, known }) => {
-                let names = ["zero", "persistence"].into_iter().chain(known.iter());
-                let known = Arc::new(names.map(str::to_owned).collect());
-                CompileProblem::UnknownNode { node, known }
-            }
-            Err(problem) => problem,
+        let unknown = self.channels.unknown(reference, &["zero", "persistence"]);
+        let found = match unknown {
+            Some(unknown) => Err(unknown.into()),
+            None => self.channels.look_up(reference),
         };
-        self.not_found(reference, place, problem);
-        None
+        found
+            .map_err(|problem| self.not_found(reference, place, problem))
+            .ok()
     }
 
     fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
@@ -494,7 +484,7 @@ impl Declaring<'_> {
             Ok(Ok(slots)) => Some(slots),
             Ok(Err(channel)) => {
                 let known = plan.sources.iter().map(|source| source.name.clone());
-                let problem = TrialProblem::NotMeasured {
+                let problem = problem::NotMeasured {
                     channel,
                     known: known.collect(),
                 };
@@ -509,7 +499,7 @@ impl Declaring<'_> {
     }
 
     /// Tells that a reference names nothing, unless what it names may be missing.
-    fn not_found(&mut self, reference: &str, place: Place, problem: CompileProblem) {
+    fn not_found(&mut self, reference: &str, place: Place, problem: Box<dyn Problem>) {
         let name = Reference::parse(reference).whole_node();
         if !self.part.is_some_and(|part| part.is_broken(&name)) {
             let inherited_by = self.inherited_by.clone();
@@ -529,7 +519,7 @@ impl Declaring<'_> {
         found: String,
         allowed: &'static str,
     ) {
-        let problem = TrialProblem::Range {
+        let problem = problem::Range {
             key,
             found,
             allowed,
@@ -538,16 +528,16 @@ impl Declaring<'_> {
     }
 }
 
-fn unknown_machine(unknown: UnknownMachine) -> TrialProblem {
+fn unknown_machine(unknown: UnknownMachine) -> Box<dyn Problem> {
     match unknown {
-        UnknownMachine::None { name, known, .. } => TrialProblem::UnknownMachine {
+        UnknownMachine::None { name, known, .. } => Box::new(problem::UnknownMachine {
             machine: name,
             known,
-        },
-        UnknownMachine::Several { name, packages } => TrialProblem::MachineTwice {
+        }),
+        UnknownMachine::Several { name, packages } => Box::new(problem::MachineTwice {
             machine: name,
             packages,
-        },
+        }),
     }
 }
 
@@ -556,6 +546,6 @@ fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
-        lacks: None,
+        hint: None,
     }
 }

@@ -1,82 +1,116 @@
-//! Decides what can be wrong with a test before it is run, and how it is said.
+//! What can be wrong with a test before it is run.
 
-use crate::compile::CompileProblem;
-use crate::diagnostic::{Place, Problem, names, nearest};
+use crate::diagnostic::{Code, Place, Problem, code, names, nearest, problem};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
 use crate::unit::Unit;
 
-/// A mistake in `[[tests]]`.
-#[derive(Debug, Clone, PartialEq)]
-#[allow(missing_docs)] // each variant's fields are the data of the sentence that `message` makes of them
-pub enum TrialProblem {
+code!(
+    A070,
+    Error,
+    "nothing to run over",
+    "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
+);
+
+problem! {
     /// Nothing to run over.
-    NoData,
+    A070 NoData {}
+    message: "the test has nothing to run over",
+    label: "neither `on` nor `inputs`",
+    help: "name data with `on = \"FILE\"` or `on = { simulate = \"MACHINE\" }`, or make some up with `inputs`",
+}
+
+problem! {
     /// Both `on` and `inputs`.
-    TwoData { inputs: Place },
+    A070 TwoData { inputs: Place }
+    message: "the test has both `on` and `inputs`",
+    label: "one of them is too much",
+    help: "run over data (`on`) in one test and over `inputs` in another",
+    related: vec![(*inputs, "and here".to_owned())],
+}
+
+code!(
+    A071,
+    Error,
+    "nothing expected",
+    "A test without expectations, and an expectation without checks, could not fail."
+);
+
+problem! {
     /// A test or an expectation that checks nothing.
-    NothingExpected { what: &'static str },
+    A071 NothingExpected { what: &'static str }
+    message: format!("{what} checks nothing"),
+    label: "nothing is expected",
+    help: "add what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals`, `between` or `absent`",
+}
+
+code!(
+    A072,
+    Error,
+    "two tests of one name",
+    "Each test has a name of its own, by which it is reported."
+);
+
+problem! {
     /// Two tests of the same name.
-    DuplicateName { name: String, first: Place },
+    A072 DuplicateName { name: String, first: Place }
+    message: format!("there are two tests named \"{name}\""),
+    label: "the name is taken",
+    help: "give each test a name of its own",
+    related: vec![(*first, "the other is here".to_owned())],
+}
+
+code!(
+    A073,
+    Error,
+    "unknown machine",
+    "`simulate` names a machine that no linked crate brings."
+);
+
+problem! {
     /// A machine that cannot be simulated.
-    UnknownMachine {
-        machine: String,
-        known: Vec<&'static str>,
+    A073 UnknownMachine { machine: String, known: Vec<&'static str> }
+    message: format!("there is no simulated machine `{machine}`"),
+    label: "no such machine",
+    help: match nearest(machine, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("there are {}", names(known)),
     },
+}
+
+problem! {
     /// A machine that several crates bring.
-    MachineTwice {
-        machine: String,
-        packages: Vec<&'static str>,
-    },
-    /// A schedule that cannot be read.
-    ScheduleUnreadable { path: String, reason: String },
-    /// A mistake in a schedule.
-    Schedule(Reason),
+    A073 MachineTwice { machine: String, packages: Vec<&'static str> }
+    message: format!("the machine `{machine}` is in {}", packages.join(" and in ")),
+    label: "which of them?",
+    help: "leave one of these crates out of the program, or rename its machine",
+}
+
+code!(
+    A074,
+    Error,
+    "machine without the channel",
+    "The simulated machine does not measure what the graph measures."
+);
+
+problem! {
     /// A machine that lacks what the graph measures.
-    MachineLacks {
+    A074 MachineLacks {
         machine: &'static str,
         channels: Vec<String>,
         has: Vec<String>,
         /// The file that inherits the test, where it stands in another.
         inherited_by: Option<String>,
+    }
+    message: format!("the machine `{machine}` does not measure {}", names(channels)),
+    label: "lacks a channel",
+    help: {
+        let way_out = "a signal may call channels `optional`";
+        match inherited_by {
+            Some(file) => format!("{way_out}; {}", without_inherited(file)),
+            None => format!("it measures {}; {way_out}", names(has)),
+        }
     },
-    /// A quantity of another kind than the channel.
-    Units {
-        key: &'static str,
-        found: Unit,
-        channel: String,
-        expected: Unit,
-    },
-    /// A figure of predictions asked of something that is none.
-    NotAPrediction { key: &'static str, channel: String },
-    /// A rival that predicts something else.
-    NoRival {
-        rival: String,
-        channel: String,
-        truth: String,
-    },
-    /// Keys that exclude or need each other.
-    Keys {
-        key: &'static str,
-        with: &'static str,
-        excluded: bool,
-    },
-    /// A made-up input without any shape.
-    NoShape,
-    /// A number or duration out of its range.
-    Range {
-        key: &'static str,
-        found: String,
-        allowed: &'static str,
-    },
-    /// A fault that does not fit its channel.
-    Fault(FaultError),
-    /// Something measured is needed, and the reference names something computed.
-    NotMeasured { channel: String, known: Vec<String> },
-    /// A channel that is given twice.
-    ChannelTwice { channel: String },
-    /// A bare number where a unit is needed.
-    BareSample { number: f64, unit: Unit },
 }
 
 /// How a file does without the tests that it inherits.
@@ -86,226 +120,186 @@ fn without_inherited(file: &str) -> String {
     )
 }
 
-impl Problem for TrialProblem {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::NoData | Self::TwoData { .. } => "A070",
-            Self::NothingExpected { .. } => "A071",
-            Self::DuplicateName { .. } => "A072",
-            Self::UnknownMachine { .. } | Self::MachineTwice { .. } => "A073",
-            Self::MachineLacks { .. } => "A074",
-            Self::Units { .. } => "A075",
-            Self::NotAPrediction { .. } | Self::NoRival { .. } => "A076",
-            Self::Keys { .. } | Self::NoShape => "A077",
-            Self::Range { .. } => "A078",
-            Self::Fault(_) => "A079",
-            Self::NotMeasured { .. } => "A080",
-            Self::ChannelTwice { .. } => "A081",
-            Self::BareSample { .. } => "A082",
-            Self::ScheduleUnreadable { .. } | Self::Schedule(_) => "A170",
-        }
-    }
+code!(
+    A075,
+    Error,
+    "unit in a test",
+    "A quantity in a test does not convert to the unit of the channel that it is about."
+);
 
-    fn may_follow_from_a_gap(&self) -> bool {
-        match self {
-            Self::NoData
-            | Self::NothingExpected { .. }
-            | Self::MachineLacks { .. }
-            | Self::Units { .. }
-            | Self::NotAPrediction { .. }
-            | Self::NoRival { .. }
-            | Self::NoShape
-            | Self::Fault(_)
-            | Self::NotMeasured { .. }
-            | Self::ChannelTwice { .. }
-            | Self::BareSample { .. } => true,
-            Self::Keys { excluded, .. } => !excluded,
-            Self::TwoData { .. }
-            | Self::DuplicateName { .. }
-            | Self::UnknownMachine { .. }
-            | Self::MachineTwice { .. }
-            | Self::ScheduleUnreadable { .. }
-            | Self::Schedule(_)
-            | Self::Range { .. } => false,
-        }
-    }
+problem! {
+    /// A quantity of another kind than the channel.
+    A075 Units { key: &'static str, found: Unit, channel: String, expected: Unit }
+    message: format!("`{key}` is in {found} and `{channel}` needs {expected}, which do not convert"),
+    label: "another unit",
+    help: format!("write it in {expected}"),
+}
 
-    // A list replaces the one that it is laid over, whole.
-    fn inherits_nothing(&self) -> bool {
-        matches!(
-            self,
-            Self::NoData | Self::NothingExpected { .. } | Self::Keys { .. } | Self::NoShape
-        )
-    }
+code!(
+    A076,
+    Error,
+    "not a prediction",
+    "Errors, R² and comparisons are about predictions of a measured truth; those compared predict the same one, as far ahead."
+);
 
-    fn message(&self) -> String {
-        match self {
-            Self::NoData => "the test has nothing to run over".to_owned(),
-            Self::TwoData { .. } => "the test has both `on` and `inputs`".to_owned(),
-            Self::NothingExpected { what } => format!("{what} checks nothing"),
-            Self::DuplicateName { name, .. } => format!("there are two tests named \"{name}\""),
-            Self::UnknownMachine { machine, .. } => {
-                format!("there is no simulated machine `{machine}`")
-            }
-            Self::MachineTwice { machine, packages } => {
-                format!(
-                    "the machine `{machine}` is in {}",
-                    packages.join(" and in ")
-                )
-            }
-            Self::ScheduleUnreadable { path, reason } => {
-                format!("the schedule {path} cannot be read: {reason}")
-            }
-            Self::Schedule(reason) => reason.to_string(),
-            Self::MachineLacks {
-                machine, channels, ..
-            } => format!(
-                "the machine `{machine}` does not measure {}",
-                names(channels)
-            ),
-            Self::Units {
-                key,
-                found,
-                channel,
-                expected,
-            } => format!(
-                "`{key}` is in {found} and `{channel}` needs {expected}, which do not convert"
-            ),
-            Self::NotAPrediction { key, channel } => {
-                format!("`{key}` is about predictions, and `{channel}` is none")
-            }
-            Self::NoRival {
-                rival,
-                channel,
-                truth,
-            } => format!("`{rival}` does not predict `{truth}` as `{channel}` does"),
-            Self::Keys {
-                key,
-                with,
-                excluded: true,
-            } => format!("`{key}` has no meaning together with `{with}`"),
-            Self::Keys {
-                key,
-                with,
-                excluded: false,
-            } => format!("`{key}` has no meaning without `{with}`"),
-            Self::NoShape => "the input says no value".to_owned(),
-            Self::Range {
-                key,
-                found,
-                allowed,
-            } => format!("`{key}` is {found} and must be {allowed}"),
-            Self::Fault(error) => error.to_string(),
-            Self::NotMeasured { channel, .. } => {
-                format!("`{channel}` is computed, and only measured channels can be set or broken")
-            }
-            Self::ChannelTwice { channel } => {
-                format!("the measurements of `{channel}` are given twice")
-            }
-            Self::BareSample { number, unit } => {
-                format!("the number {number} needs a unit, such as \"{number} {unit}\"")
-            }
-        }
-    }
+problem! {
+    /// A figure of predictions asked of something that is none.
+    A076 NotAPrediction { key: &'static str, channel: String }
+    message: format!("`{key}` is about predictions, and `{channel}` is none"),
+    label: "not a prediction",
+    help: "`equals`, `between`, `absent`, `max_step_below`, `valid_above` and `given_above` work for every channel",
+}
 
-    fn label(&self) -> String {
-        match self {
-            Self::NoData => "neither `on` nor `inputs`",
-            Self::TwoData { .. } => "one of them is too much",
-            Self::NothingExpected { .. } => "nothing is expected",
-            Self::DuplicateName { .. } => "the name is taken",
-            Self::UnknownMachine { .. } => "no such machine",
-            Self::MachineTwice { .. } => "which of them?",
-            Self::ScheduleUnreadable { .. } => "named here",
-            Self::Schedule(_) => "in this line",
-            Self::MachineLacks { .. } => "lacks a channel",
-            Self::Units { .. } => "another unit",
-            Self::NotAPrediction { .. } => "not a prediction",
-            Self::NoRival { .. } => "predicts something else",
-            Self::Keys { excluded: true, .. } => "too much",
-            Self::Keys { .. } => "stands alone",
-            Self::NoShape => "no shape",
-            Self::Range { .. } => "out of range",
-            Self::Fault(_) => "does not fit",
-            Self::NotMeasured { .. } => "not measured",
-            Self::ChannelTwice { .. } => "given before",
-            Self::BareSample { .. } => "without a unit",
-        }
-        .to_owned()
-    }
+problem! {
+    /// A rival that predicts something else.
+    A076 NoRival { rival: String, channel: String, truth: String }
+    message: format!("`{rival}` does not predict `{truth}` as `{channel}` does"),
+    label: "predicts something else",
+    help: "compare with `zero`, `persistence`, or a prediction of the same truth with the same `ahead`",
+}
 
-    fn help(&self) -> Option<String> {
-        Some(match self {
-            Self::NoData => {
-                "name data with `on = \"FILE\"` or `on = { simulate = \"MACHINE\" }`, or make some up with `inputs`"
-                    .to_owned()
-            }
-            Self::TwoData { .. } => {
-                "run over data (`on`) in one test and over `inputs` in another".to_owned()
-            }
-            Self::NothingExpected { .. } => {
-                "say what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals`, `between` or `absent`"
-                    .to_owned()
-            }
-            Self::DuplicateName { .. } => "give each test a name of its own".to_owned(),
-            Self::UnknownMachine { machine, known } => {
-                match nearest(machine, known.iter().copied()) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("there are {}", names(known)),
-                }
-            }
-            Self::MachineTwice { .. } => {
-                "leave one of these crates out of the program, or rename its machine".to_owned()
-            }
-            Self::ScheduleUnreadable { .. } => {
-                "give the path of a schedule, which starts at the file in which it stands".to_owned()
-            }
-            Self::MachineLacks {
-                has, inherited_by, ..
-            } => {
-                let way_out = "a signal may call channels `optional`";
-                match inherited_by {
-                    Some(file) => format!("{way_out}; {}", without_inherited(file)),
-                    None => format!("it measures {}; {way_out}", names(has)),
-                }
-            }
-            Self::Units { expected, .. } => format!("write it in {expected}"),
-            Self::NotAPrediction { .. } => {
-                "`equals`, `between`, `absent`, `max_step_below`, `valid_above` and `given_above` work for every channel"
-                    .to_owned()
-            }
-            Self::NoRival { .. } => {
-                "compare with `zero`, `persistence`, or a prediction of the same truth with the same `ahead`"
-                    .to_owned()
-            }
-            Self::Keys {
-                key,
-                with,
-                excluded: true,
-            } => format!("leave out `{key}` or `{with}`"),
-            Self::Keys { key, with, .. } => format!("add `{with}` or leave out `{key}`"),
-            Self::NoShape => {
-                "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`".to_owned()
-            }
-            Self::Range { .. } | Self::Fault(_) | Self::Schedule(_) => return None,
-            Self::NotMeasured { known, .. } => format!("measured are {}", names(known)),
-            Self::ChannelTwice { .. } => "let each channel stand once".to_owned(),
-            Self::BareSample { .. } => "only `nan`, for no value, stands without a unit".to_owned(),
-        })
-    }
+code!(
+    A077,
+    Error,
+    "keys of a test",
+    "Keys of a test exclude one another, or one needs another."
+);
 
-    fn related(&self) -> Vec<(Place, String)> {
-        match self {
-            Self::TwoData { inputs } => vec![(*inputs, "and here".to_owned())],
-            Self::DuplicateName { first, .. } => vec![(*first, "the other is here".to_owned())],
-            _ => Vec::new(),
-        }
+problem! {
+    /// Keys that exclude each other.
+    A077 ExcludedKeys { key: &'static str, with: &'static str }
+    message: format!("`{key}` has no meaning together with `{with}`"),
+    label: "too much",
+    help: format!("leave out `{key}` or `{with}`"),
+}
+
+problem! {
+    /// A key that needs another.
+    A077 KeyAlone { key: &'static str, with: &'static str }
+    message: format!("`{key}` has no meaning without `{with}`"),
+    label: "stands alone",
+    help: format!("add `{with}` or leave out `{key}`"),
+}
+
+/// A key that excludes another, or needs it.
+pub(super) fn keys(key: &'static str, with: &'static str, excluded: bool) -> Box<dyn Problem> {
+    match excluded {
+        true => Box::new(ExcludedKeys { key, with }),
+        false => Box::new(KeyAlone { key, with }),
     }
 }
 
+problem! {
+    /// A made-up input without any shape.
+    A077 NoShape {}
+    message: "the input has no value",
+    label: "no shape",
+    help: "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`",
+}
+
+code!(
+    A078,
+    Error,
+    "out of range in a test",
+    "A number or duration in a test is out of its range."
+);
+
+problem! {
+    /// A number or duration out of its range.
+    A078 Range { key: &'static str, found: String, allowed: &'static str }
+    message: format!("`{key}` is {found} and must be {allowed}"),
+    label: "out of range",
+    help: None,
+}
+
+code!(
+    A079,
+    Error,
+    "fault that does not fit",
+    "The size of a fault does not fit its channel, or it needs one and there is no usual one."
+);
+
+problem! {
+    /// A fault that does not fit its channel.
+    A079 Fault { error: FaultError }
+    message: error.to_string(),
+    label: "does not fit",
+    help: None,
+}
+
+code!(
+    A080,
+    Error,
+    "not measured",
+    "Only measured channels can be given measurements or faults."
+);
+
+problem! {
+    /// Something measured is needed, and the reference names something computed.
+    A080 NotMeasured { channel: String, known: Vec<String> }
+    message: format!("`{channel}` is computed, and only measured channels can be set or broken"),
+    label: "not measured",
+    help: format!("measured are {}", names(known)),
+}
+
+code!(
+    A081,
+    Error,
+    "channel given twice",
+    "Two inputs of a test give measurements of the same channel."
+);
+
+problem! {
+    /// A channel that is given twice.
+    A081 ChannelTwice { channel: String }
+    message: format!("the measurements of `{channel}` are given twice"),
+    label: "given before",
+    help: "let each channel stand once",
+}
+
+code!(
+    A082,
+    Error,
+    "sample without a unit",
+    "Samples are quantities; only `nan`, for no value, stands without a unit."
+);
+
+problem! {
+    /// A bare number where a unit is needed.
+    A082 BareSample { number: f64, unit: Unit }
+    message: format!("the number {number} needs a unit, such as \"{number} {unit}\""),
+    label: "without a unit",
+    help: "only `nan`, for no value, stands without a unit",
+}
+
+code!(
+    A170,
+    Error,
+    "schedule of a machine",
+    "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes. Every mistake in it is shown \
+     where it stands."
+);
+
+problem! {
+    /// A schedule that cannot be read.
+    A170 ScheduleUnreadable { path: String, reason: String }
+    message: format!("the schedule {path} cannot be read: {reason}"),
+    label: "named here",
+    help: "give the path of a schedule, which starts at the file in which it stands",
+}
+
+problem! {
+    /// A mistake in a schedule.
+    A170 InSchedule { reason: Reason }
+    message: reason.to_string(),
+    label: "in this line",
+    help: None,
+}
+
 /// A reference of a test that names nothing in the graph.
+#[derive(Debug)]
 pub(super) struct NotFound {
-    pub(super) problem: CompileProblem,
+    pub(super) problem: Box<dyn Problem>,
     /// What the node is called that has what is missing, where the reference means an output of the node's name.
     pub(super) of_the_node: Option<String>,
     /// The file that inherits the test, and maybe lacks on purpose what it names.
@@ -313,12 +307,8 @@ pub(super) struct NotFound {
 }
 
 impl Problem for NotFound {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> &'static Code {
         self.problem.code()
-    }
-
-    fn may_follow_from_a_gap(&self) -> bool {
-        self.problem.may_follow_from_a_gap()
     }
 
     fn message(&self) -> String {
@@ -336,13 +326,8 @@ impl Problem for NotFound {
             )),
             None => self.problem.help(),
         };
-        let Some(file) = &self.inherited_by else {
-            return help;
-        };
-        let way_out = without_inherited(file);
-        Some(match help {
-            Some(help) => format!("{help}; {way_out}"),
-            None => way_out,
-        })
+        let way_out = self.inherited_by.as_deref().map(without_inherited);
+        let all: Vec<_> = help.into_iter().chain(way_out).collect();
+        (!all.is_empty()).then(|| all.join("; "))
     }
 }

@@ -1,10 +1,10 @@
 //! Decides how made-up measurements are written: which keys go together, and quantities in the unit of the channel.
 
-use super::problem::TrialProblem;
+use super::problem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
 use crate::diagnostic::Diagnostics;
-use crate::document::{DocumentProblem, Value, decode_part};
+use crate::document::{DocumentProblem, Value, decode};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -20,8 +20,7 @@ pub(super) fn read(
     diagnostics: &mut Diagnostics,
 ) -> Option<Series> {
     let before = diagnostics.error_count();
-    let read = decode_part::<InputTable>(value, "the input", diagnostics)?;
-    let (table, is_sure) = read.sure();
+    let table = decode::<InputTable>(value, "the input", diagnostics)?;
     let mut shaping = Shaping {
         value,
         channel,
@@ -29,14 +28,11 @@ pub(super) fn read(
         diagnostics,
     };
     let noise = shaping.difference("noise", table.noise.as_ref(), &unit.difference());
-    let shape = match read.as_whole() {
-        Some(table) => shaping.shape(table),
-        None => Shape::Curve(shaping.curve(table)),
-    };
+    let shape = shaping.shape(&table);
     if noise < 0.0 || noise.is_nan() {
         shaping.range("noise", noise.to_string(), "0 or more");
     }
-    if is_sure("every") && table.every <= Duration::ZERO {
+    if table.every <= Duration::ZERO {
         shaping.range("every", table.every.to_string(), "longer than 0");
     }
     (diagnostics.error_count() == before).then_some(Series {
@@ -93,7 +89,7 @@ impl Shaping<'_> {
         let shapeless = given.is_empty() && table.noise.is_none();
         if shapeless {
             self.diagnostics
-                .report(self.value.place, TrialProblem::NoShape);
+                .report(self.value.place, problem::NoShape {});
         }
         if table.constant.is_some() {
             for key in given.into_iter().filter(|key| *key != "constant") {
@@ -178,7 +174,7 @@ impl Shaping<'_> {
                 let place = samples
                     .and_then(|samples| samples.get(nth))
                     .map_or(self.value.place, |value| value.place);
-                let problem = TrialProblem::BareSample {
+                let problem = problem::BareSample {
                     number: *number,
                     unit: self.unit.clone(),
                 };
@@ -211,7 +207,7 @@ impl Shaping<'_> {
             return 0.0;
         };
         convert(quantity).unwrap_or_else(|| {
-            let problem = TrialProblem::Units {
+            let problem = problem::Units {
                 key,
                 found: quantity.unit.clone(),
                 channel: self.channel.to_owned(),
@@ -223,16 +219,12 @@ impl Shaping<'_> {
     }
 
     fn keys(&mut self, key: &'static str, with: &'static str, excluded: bool) {
-        let problem = TrialProblem::Keys {
-            key,
-            with,
-            excluded,
-        };
+        let problem = problem::keys(key, with, excluded);
         self.diagnostics.report(self.value.place_of(key), problem);
     }
 
     fn range(&mut self, key: &'static str, found: String, allowed: &'static str) {
-        let problem = TrialProblem::Range {
+        let problem = problem::Range {
             key,
             found,
             allowed,

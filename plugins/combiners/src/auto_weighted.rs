@@ -33,6 +33,7 @@ use crate::share::{raise, shrink};
 pub struct AutoWeighted {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
     /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives: a voter without a newer one has none.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub memory: Memory,
     /// How strongly errors count: 0 not at all, 2, which is the default, as inverse variances do; at most 16.
     #[serde(default)]
@@ -78,23 +79,15 @@ impl Combiner for AutoWeighted {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.memory.mistakes();
-        if let Some(power) = self.power {
-            if !(0.0..=16.0).contains(&power) {
-                let message = format!("`power` is {power} and must be from 0 to 16");
-                mistakes.push(Mistake::at("power", message));
-            } else if self.weights != Weighting::InversePower {
-                let message = "`power` is for weights by inverse powers of errors";
-                let help = "leave it out, or use `weights = \"inverse_power\"`";
-                let mistake = Mistake::at("power", message).help(help);
-                mistakes.push(mistake.rests_on("weights"));
-            }
+        let mut mistakes = Vec::new();
+        if self.power.is_some() && self.weights != Weighting::InversePower {
+            let message = "`power` is for weights by inverse powers of errors";
+            let help = "leave it out, or use `weights = \"inverse_power\"`";
+            let mistake = Mistake::at("power", message).help(help);
+            mistakes.push(mistake.rests_on("weights"));
         }
         for (name, value) in [("shrinkage", self.shrinkage), ("floor", self.floor)] {
-            if !(0.0..=1.0).contains(&value) {
-                let message = format!("`{name}` is {value} and must be from 0 to 1");
-                mistakes.push(Mistake::at(name, message));
-            } else if value > 0.0 && self.weights == Weighting::AsPrintedRaw {
+            if value > 0.0 && self.weights == Weighting::AsPrintedRaw {
                 let message = format!("`{name}` is for weights that add up to 1");
                 let help = "leave it out, or use `weights = \"as_printed\"`";
                 let mistake = Mistake::at(name, message).help(help);

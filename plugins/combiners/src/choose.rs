@@ -1,6 +1,6 @@
 //! Combiners that pass one vote on: the best of late, or the first that is there.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Votes};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,7 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 pub struct Best {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
     /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub memory: Memory,
 }
 
@@ -36,10 +37,6 @@ impl Combiner for Best {
                 InputPort::truth("what the voters predict, for their errors"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        self.memory.mistakes()
     }
 
     fn has_weights(&self) -> bool {

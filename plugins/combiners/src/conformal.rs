@@ -2,9 +2,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{
-    Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
-};
+use athermal_core::node::{Combine, Combiner, Evidence, InputPort, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,6 +32,7 @@ pub struct Conformal {
     pub coverage: f64,
     /// How long an error is remembered, counted from when the embargo lets its truth through: a duration, such as "2d", and no
     /// number of truths. One in which a few hundred truths come makes a steady interval.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub memory: Duration,
     /// How much a miss widens the next intervals, 0 (not at all) to 1; small is steady, large adapts fast.
     #[serde(default = "one_in_two_hundred")]
@@ -57,23 +56,6 @@ impl Combiner for Conformal {
                 InputPort::truth("what is predicted, for the errors"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if !(self.coverage > 0.0 && self.coverage < 1.0) {
-            let message = format!(
-                "`coverage` is {} and must be above 0 and below 1",
-                self.coverage
-            );
-            mistakes.push(Mistake::at("coverage", message).help("0.9 is nine of ten truths"));
-        }
-        mistakes.extend(Mistake::unless_lasting("memory", self.memory));
-        if !(0.0..=1.0).contains(&self.gain) {
-            let message = format!("`gain` is {} and must be from 0 to 1", self.gain);
-            mistakes.push(Mistake::at("gain", message));
-        }
-        mistakes
     }
 
     fn coverage(&self) -> Option<f64> {

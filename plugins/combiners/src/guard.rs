@@ -21,6 +21,7 @@ use crate::memory::Memory;
 pub struct Guard {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
     /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub memory: Memory,
     /// How many truths of a prediction must be in memory before it is held back; 1 or more. With a `half_life` they count for less
     /// with age: one so short that fewer are ever left holds nothing back.
@@ -51,23 +52,16 @@ impl Combiner for Guard {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.memory.mistakes();
-        if self.min_truths == 0 {
-            mistakes.push(Mistake::at(
-                "min_truths",
-                "`min_truths` is 0 and must be 1 or more",
-            ));
+        match self.memory {
+            Memory::Truths(last) if last.truths < self.min_truths => {
+                let message = format!(
+                    "`min_truths` is {} and the memory holds {} at most",
+                    self.min_truths, last.truths
+                );
+                vec![Mistake::at("min_truths", message).rests_on("memory.truths")]
+            }
+            _ => Vec::new(),
         }
-        if let Memory::Truths(last) = self.memory
-            && last.truths < self.min_truths
-        {
-            let message = format!(
-                "`min_truths` is {} and the memory holds {} at most",
-                self.min_truths, last.truths
-            );
-            mistakes.push(Mistake::at("min_truths", message).rests_on("memory.truths"));
-        }
-        mistakes
     }
 
     fn has_weights(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,7 @@ pub struct Hedge {
     /// The time after which an error counts half, for voters that take turns at being best; without it nothing is forgotten, and
     /// only then do the bounds hold.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_life: Option<Duration>,
     /// The least weight of a voter that is there, 0 to 1, so that one that was bad can come back quickly; where that is more than an equal
     /// share, all weights are equal.
@@ -58,23 +59,6 @@ impl Combiner for Hedge {
                 InputPort::truth("what the voters predict, for their errors"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if let Some(rate) = self.rate
-            && !(rate > 0.0 && rate <= 100.0)
-        {
-            let message = format!("`rate` is {rate} and must be above 0, up to 100");
-            let help = "leave it out, and the rate is found on the way";
-            mistakes.push(Mistake::at("rate", message).help(help));
-        }
-        mistakes.extend(Mistake::unless_lasting("half_life", self.half_life));
-        if !(0.0..=1.0).contains(&self.floor) {
-            let message = format!("`floor` is {} and must be from 0 to 1", self.floor);
-            mistakes.push(Mistake::at("floor", message));
-        }
-        mistakes
     }
 
     fn has_weights(&self) -> bool {
@@ -246,19 +230,16 @@ impl Combine for Hedging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Losses>() {
-            Ok(losses) if losses.sums.len() != self.losses.sums.len() => {
-                Restored::cold("the number of voters differs")
+        state.accept(|losses: Losses| {
+            if losses.sums.len() != self.losses.sums.len() {
+                return Err("the number of voters differs");
             }
-            Ok(losses) if !losses.is_sound() => {
-                Restored::cold("its losses are not all numbers from 0 on")
+            if !losses.is_sound() {
+                return Err("its losses are not all numbers from 0 on");
             }
-            Ok(losses) => {
-                self.losses = losses;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+            self.losses = losses;
+            Ok(())
+        })
     }
 }
 

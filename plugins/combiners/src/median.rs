@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Votes};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -48,14 +48,6 @@ impl Combiner for Median {
 impl Combiner for Trimmed {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        if (0.0..0.5).contains(&self.share) {
-            return Vec::new();
-        }
-        let message = format!("`share` is {} and must be from 0 to below 0.5", self.share);
-        vec![Mistake::at("share", message).help("0.25 takes a quarter away at either end")]
     }
 
     fn has_weights(&self) -> bool {

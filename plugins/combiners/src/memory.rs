@@ -1,6 +1,6 @@
 //! Decides how long errors count: for a time, for so many truths, or ever less.
 
-use athermal_core::node::{Forms, Mistake};
+use athermal_core::node::Forms;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -34,6 +34,7 @@ pub struct LastTruths {
 #[serde(deny_unknown_fields)]
 pub struct Fading {
     /// The time after which an error counts half.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_life: Duration,
 }
 
@@ -75,22 +76,6 @@ impl TryFrom<Table> for Tabled {
 }
 
 impl Memory {
-    /// What is wrong with it as the parameter `memory`.
-    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        let mistake = match *self {
-            Self::Time(time) => Mistake::unless_lasting("memory", time),
-            Self::Truths(LastTruths { truths }) => {
-                let message = format!("`truths` is {truths} and must be from 1 to 10000");
-                let fits = (1..=10_000).contains(&truths);
-                (!fits).then(|| Mistake::at("memory.truths", message))
-            }
-            Self::HalfLife(Fading { half_life }) => {
-                Mistake::unless_lasting("memory.half_life", half_life)
-            }
-        };
-        mistake.into_iter().collect()
-    }
-
     /// Whether no time can be told after which nothing counts: so many truths may take as long as they please.
     pub(crate) fn is_endless(&self) -> bool {
         matches!(self, Self::Truths(_))

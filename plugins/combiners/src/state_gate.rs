@@ -1,6 +1,6 @@
 //! A voter for each state of stability.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,14 +46,6 @@ impl Combiner for StateGate {
                     .in_unit("1"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        if self.dwell >= Duration::ZERO {
-            return Vec::new();
-        }
-        let message = format!("`dwell` is {} and must not be negative", self.dwell);
-        vec![Mistake::at("dwell", message)]
     }
 
     fn has_weights(&self) -> bool {
@@ -150,13 +142,7 @@ impl Combine for Gate {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Seen>() {
-            Ok(seen) => {
-                self.seen = seen;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.seen)
     }
 }
 

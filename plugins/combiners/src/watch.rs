@@ -4,9 +4,7 @@
 mod tests;
 mod usual;
 
-use athermal_core::node::{
-    Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
-};
+use athermal_core::node::{Combine, Combiner, Evidence, InputPort, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{self as numerics, AdwinOptions, MeanChange, PageHinkleyOptions};
 use schemars::JsonSchema;
@@ -187,23 +185,6 @@ const INPUTS: &[InputPort] = &[
     InputPort::truth("what it predicts, for its errors"),
 ];
 
-/// Parameters out of their range, gathered.
-#[derive(Default)]
-struct Checks(Vec<Mistake>);
-
-impl Checks {
-    fn check(&mut self, name: &str, value: impl std::fmt::Display, fits: bool, allowed: &str) {
-        if !fits {
-            let message = format!("`{name}` is {value} and must be {allowed}");
-            self.0.push(Mistake::at(name, message));
-        }
-    }
-
-    fn first(&mut self, first: u64) {
-        self.check("first", first, first >= 2, "2 or more");
-    }
-}
-
 impl PageHinkley {
     fn options(&self) -> PageHinkleyOptions {
         PageHinkleyOptions {
@@ -218,24 +199,6 @@ impl PageHinkley {
 impl Combiner for PageHinkley {
     fn inputs() -> &'static [InputPort] {
         INPUTS
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut checks = Checks::default();
-        let Self {
-            tolerance,
-            threshold,
-            factor,
-            ..
-        } = *self;
-        checks.first(self.first);
-        let fits = tolerance >= 0.0 && tolerance.is_finite();
-        checks.check("tolerance", tolerance, fits, "0 or more");
-        let fits = threshold > 0.0 && threshold.is_finite();
-        checks.check("threshold", threshold, fits, "above 0");
-        let fits = factor > 0.0 && factor <= 1.0;
-        checks.check("factor", factor, fits, "above 0 and at most 1");
-        checks.0
     }
 
     fn has_weights(&self) -> bool {
@@ -276,22 +239,6 @@ impl Adwin {
 impl Combiner for Adwin {
     fn inputs() -> &'static [InputPort] {
         INPUTS
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut checks = Checks::default();
-        let Self {
-            confidence,
-            clock,
-            shortest,
-            ..
-        } = *self;
-        checks.first(self.first);
-        let fits = confidence > 0.0 && confidence < 1.0;
-        checks.check("confidence", confidence, fits, "above 0 and below 1");
-        checks.check("clock", clock, clock >= 1, "1 or more");
-        checks.check("shortest", shortest, shortest >= 1, "1 or more");
-        checks.0
     }
 
     fn has_weights(&self) -> bool {

@@ -38,13 +38,17 @@ use crate::stability::StabilityState;
 #[serde(deny_unknown_fields)]
 pub struct Compensate {
     /// The largest correction to either side: `"20 um"`. The correction is in this unit.
+    #[schemars(extend("minimum" = 0))]
     pub range: Quantity,
     /// The largest predicted rate that is believed: `"1000 nm/min"`.
+    #[schemars(extend("minimum" = 0))]
     pub max_rate: Quantity,
     /// The fastest motion of the correction: `"50 nm/s"`; at least `max_rate`, so that it always catches up.
+    #[schemars(extend("minimum" = 0))]
     pub max_slew: Quantity,
     /// Rates below are not followed: `"1 nm/min"`; none by default.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub deadband: Option<Quantity>,
     /// Stops while the predicted rate is small.
     #[serde(default)]
@@ -54,6 +58,7 @@ pub struct Compensate {
     pub stop_in: Vec<StabilityState>,
     /// The longest time between two ticks that is integrated over.
     #[serde(default = "limit::minute")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: Duration,
 }
 
@@ -62,8 +67,10 @@ pub struct Compensate {
 #[serde(deny_unknown_fields)]
 pub struct Stop {
     /// Stops when the absolute rate falls below: `"3 nm/min"`.
+    #[schemars(extend("minimum" = 0))]
     pub below: Quantity,
     /// Goes on when the absolute rate exceeds this: `"6 nm/min"`; not less than `below`.
+    #[schemars(extend("minimum" = 0))]
     pub above: Quantity,
 }
 
@@ -209,10 +216,6 @@ impl Feature for Compensate {
                 ),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        Vec::from_iter(Mistake::unless_lasting("max_gap", self.max_gap))
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -29,15 +29,19 @@ pub struct Health {
     pub range: Option<[Quantity; 2]>,
     /// The fastest change from one sample to the next, such as `"2 K/s"`.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub max_rate: Option<Quantity>,
     /// For how long the very same value may come again and again. A silence longer than this, or than `max_gap`, ends the count.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub stuck_after: Option<Duration>,
     /// The least noise of a living sensor, such as `"0.1 mK"`.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub noise_above: Option<Quantity>,
     /// The most noise of a sound one, such as `"20 mK"`.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub noise_below: Option<Quantity>,
     /// Over how many samples noise is judged, 3 to 100,000.
     #[serde(default = "thirty")]
@@ -45,6 +49,7 @@ pub struct Health {
     pub noise_samples: usize,
     /// The longest silence.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: Option<Duration>,
     /// For how long a channel must have been in order again.
     #[serde(default)]
@@ -166,20 +171,6 @@ impl Feature for Health {
                 ),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if !(3..=100_000).contains(&self.noise_samples) {
-            let message = format!(
-                "`noise_samples` is {} and must be from 3 to 100000",
-                self.noise_samples
-            );
-            mistakes.push(Mistake::at("noise_samples", message));
-        }
-        mistakes.extend(Mistake::unless_lasting("stuck_after", self.stuck_after));
-        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
-        mistakes
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

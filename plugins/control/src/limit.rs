@@ -6,18 +6,12 @@ use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 
-/// A limit of a size: 0 or more, in `unit`. Of temperatures it is a difference.
+/// A limit of a size, in `unit`. Of temperatures it is a difference.
 pub(crate) fn size(limit: &Quantity, unit: &Unit, at: &str) -> Result<f64, Mistake> {
-    let Some(value) = limit.as_difference(unit) else {
+    limit.as_difference(unit).ok_or_else(|| {
         let message = format!("`{at}` is in {}, which cannot be in {unit}", limit.unit);
-        return Err(Mistake::at(at, message).help(format!("give it in {unit}")));
-    };
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        let message = format!("`{at}` is {limit} and must not be negative");
-        Err(Mistake::at(at, message).help("limits are sizes, without a sign"))
-    }
+        Mistake::at(at, message).help(format!("give it in {unit}"))
+    })
 }
 
 /// The same for a limit that may be left out.

@@ -24,10 +24,12 @@ use crate::limit;
 pub struct OpticalLoss {
     /// The length of the window, such as `"5min"`.
     #[serde(default = "five_minutes")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub over: Duration,
     /// The 1/e² radius of the beam along each axis in the order of the drifts, such as `["10.19 um", "1.911 um", "1.274 um"]`;
     /// one radius stands for all.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub radii: Option<Vec<Quantity>>,
     /// Published radii by the first letter of the axis.
     #[serde(default)]
@@ -76,9 +78,6 @@ impl OpticalLoss {
             return Ok(Vec::new());
         };
         let mut mistakes = Vec::new();
-        if self.over <= Duration::ZERO {
-            mistakes.push(Mistake::at("over", "a window of no length has no loss"));
-        }
         let count = self.radii.as_ref().map_or(0, Vec::len);
         match (&self.radii, self.preset) {
             (Some(_), Some(_)) => {
@@ -118,15 +117,10 @@ impl OpticalLoss {
                 mistakes.push(Mistake::at("inputs.drift", message));
             }
             let radius = match (&self.radii, self.preset) {
-                (Some(radii), _) => radii.get(nth).or(radii.first()).map(|radius| {
-                    limit::size(radius, &um, "radii").and_then(|value| {
-                        if value > 0.0 {
-                            Ok(value)
-                        } else {
-                            Err(Mistake::at("radii", "a beam has a radius above 0"))
-                        }
-                    })
-                }),
+                (Some(radii), _) => {
+                    let radius = radii.get(nth).or(radii.first());
+                    radius.map(|radius| limit::size(radius, &um, "radii"))
+                }
                 (None, Some(preset)) if factor.is_some() => {
                     Some(preset.radius_um(&channel.name).ok_or_else(|| {
                         let message = format!(

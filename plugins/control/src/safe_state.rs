@@ -32,10 +32,12 @@ pub struct SafeState {
     #[serde(default)]
     pub after: u32,
     /// The fastest way to the refuge and back, such as `"50 nm/s"`.
+    #[schemars(extend("minimum" = 0))]
     pub max_slew: Quantity,
     /// The longest time between two ticks that counts for that way: after a longer pause the output goes on from where it is and
     /// does not make up for the pause at once.
     #[serde(default = "limit::minute")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: Duration,
 }
 
@@ -133,10 +135,6 @@ impl Feature for SafeState {
                 ),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        Vec::from_iter(Mistake::unless_lasting("max_gap", self.max_gap))
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -24,17 +24,21 @@ use crate::limit;
 #[serde(deny_unknown_fields)]
 pub struct Settled {
     /// Below this the machine is stable: `"0.2 dB"`.
+    #[schemars(extend("minimum" = 0))]
     pub below: Quantity,
     /// The smallest change of the set point that counts: `"5 K"`.
+    #[schemars(extend("minimum" = 0))]
     pub change: Quantity,
     /// For how long it must be stable.
     #[serde(default = "ten_minutes")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub r#for: Duration,
     /// How long after its start a change still counts as the same one.
     #[serde(default = "ten_minutes")]
     pub same_change: Duration,
     /// The longest pause between values that are stable throughout.
     #[serde(default = "five_minutes")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: Duration,
 }
 
@@ -98,12 +102,6 @@ impl Feature for Settled {
                 ),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("for", self.r#for));
-        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
-        mistakes
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
@@ -237,13 +235,7 @@ impl Operator for Settling {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Known>() {
-            Ok(known) => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.known)
     }
 }
 

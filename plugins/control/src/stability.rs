@@ -23,11 +23,14 @@ use crate::limit;
 #[serde(deny_unknown_fields)]
 pub struct Stability {
     /// Below this absolute drift an axis is stable: `"30 nm/min"`.
+    #[schemars(extend("minimum" = 0))]
     pub stable_below: Quantity,
     /// From this absolute drift on an axis is transient: `"80 nm/min"`.
+    #[schemars(extend("minimum" = 0))]
     pub transient_above: Quantity,
     /// How far below a limit the drift must fall for the calmer state, such as `"5 nm/min"`; none by default.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub hysteresis: Option<Quantity>,
     /// How long another state must have lasted before it is given; no time by default.
     #[serde(default)]
@@ -267,14 +270,11 @@ impl Operator for Judging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Judged>() {
-            Ok(state) if state.axes.len() == self.axes.len() => {
-                self.axes = state.axes;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of axes differs"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Judged| {
+            let fits = state.axes.len() == self.axes.len();
+            fits.then(|| self.axes = state.axes)
+                .ok_or("the number of axes differs")
+        })
     }
 }
 

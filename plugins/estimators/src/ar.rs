@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lag_order::LagOrder;
-use crate::lags::lag_mistakes;
+use crate::lags::repeated;
 use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::solver::Solver;
@@ -26,6 +26,7 @@ use crate::solver::Solver;
 #[serde(deny_unknown_fields)]
 pub struct Ar {
     /// The lags of the truth, such as `["0s", "5min", "10min"]`.
+    #[schemars(length(min = 1))]
     pub lags: Vec<Duration>,
     /// How coefficients are found.
     #[serde(default)]
@@ -63,7 +64,7 @@ impl Estimator for Ar {
 
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = self.solver.mistakes();
-        mistakes.extend(lag_mistakes("lags", &self.lags));
+        mistakes.extend(repeated("lags", &self.lags));
         mistakes.extend(
             self.lag_order()
                 .iter()

@@ -44,6 +44,7 @@ pub struct Arma {
     pub nc: usize,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<Duration>,
     /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
     #[serde(default)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::too_many;
 use crate::lag_order::LagOrder;
-use crate::lags::{lag_mistakes, now};
+use crate::lags::{now, repeated};
 use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
@@ -27,9 +27,11 @@ use crate::solver::Solver;
 #[serde(deny_unknown_fields)]
 pub struct Arx {
     /// The lags of the truth, such as `["0s", "5min", "10min"]`.
+    #[schemars(length(min = 1))]
     pub lags: Vec<Duration>,
     /// The lags at which each feature is read.
     #[serde(default = "now")]
+    #[schemars(length(min = 1))]
     pub feature_lags: Vec<Duration>,
     /// How coefficients are found.
     #[serde(default)]
@@ -72,9 +74,8 @@ impl Estimator for Arx {
 
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = self.solver.mistakes();
-        mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
-        mistakes.extend(lag_mistakes("lags", &self.lags));
-        mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
+        mistakes.extend(repeated("lags", &self.lags));
+        mistakes.extend(repeated("feature_lags", &self.feature_lags));
         let selects = self.selection.is_some();
         mistakes.extend(
             self.lag_order()

@@ -95,34 +95,6 @@ impl<'de> Deserialize<'de> for SparsePenalty {
     }
 }
 
-impl SparsePenalty {
-    /// Parameters out of their range.
-    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        match *self {
-            Self::Fixed(alpha) if alpha >= 0.0 && alpha.is_finite() => Vec::new(),
-            Self::Fixed(alpha) => {
-                let message = format!("`alpha` is {alpha} and must be 0 or more");
-                vec![Mistake::at("alpha", message)]
-            }
-            Self::Chosen(path) => {
-                let mut mistakes = path.folds.mistakes("alpha.folds");
-                let share = path.smallest_share;
-                if !(share > 0.0 && share < 1.0) {
-                    let message =
-                        format!("`smallest_share` is {share} and must be above 0 and below 1");
-                    mistakes.push(Mistake::at("alpha.smallest_share", message));
-                }
-                if !(1..=1000).contains(&path.per_decade) {
-                    let found = path.per_decade;
-                    let message = format!("`per_decade` is {found} and must be from 1 to 1000");
-                    mistakes.push(Mistake::at("alpha.per_decade", message));
-                }
-                mistakes
-            }
-        }
-    }
-}
-
 impl Estimator for ElasticNet {
     fn inputs() -> &'static [InputPort] {
         FEATURES_AND_TRUTH
@@ -130,19 +102,6 @@ impl Estimator for ElasticNet {
 
     fn regressors(&self) -> Regressors {
         present_features()
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.alpha.mistakes();
-        let ratio = self.l1_ratio;
-        if !(ratio > 0.0 && ratio <= 1.0) {
-            let message = format!("`l1_ratio` is {ratio} and must be above 0 up to 1");
-            mistakes.push(
-                Mistake::at("l1_ratio", message)
-                    .help("without absolute values it is `linear` with ridge"),
-            );
-        }
-        mistakes
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {

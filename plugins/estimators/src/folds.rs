@@ -1,6 +1,6 @@
 //! Decides how a user says in which folds rows are cut for cross-validation.
 
-use athermal_core::node::{Forms, Mistake, TrainingReport};
+use athermal_core::node::{Forms, TrainingReport};
 use athermal_numerics::GramBlocks;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -85,23 +85,6 @@ impl Folds {
     /// Three contiguous parts.
     pub(crate) fn three() -> Self {
         Self::Contiguous(3)
-    }
-
-    /// A count out of its range; `place` is the key that holds the folds.
-    pub(crate) fn mistakes(&self, place: &str) -> Vec<Mistake> {
-        let (count, key) = match *self {
-            Self::Contiguous(count) => (count, place.to_owned()),
-            Self::Cut(Cut::Blocked { count, .. } | Cut::Expanding { count, .. }) => {
-                (count, format!("{place}.count"))
-            }
-        };
-        let name = key.rsplit('.').next().unwrap_or(place).to_owned();
-        if (2..=1000).contains(&count) {
-            Vec::new()
-        } else {
-            let message = format!("`{name}` is {count} and must be from 2 to 1000");
-            vec![Mistake::at(key, message)]
-        }
     }
 
     /// As the numerics have it.

@@ -55,20 +55,6 @@ impl Estimator for Huber {
         present_features()
     }
 
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        let (epsilon, alpha) = (self.epsilon, self.alpha);
-        if !(epsilon >= 1.0 && epsilon.is_finite()) {
-            let message = format!("`epsilon` is {epsilon} and must be 1 or more");
-            mistakes.push(Mistake::at("epsilon", message));
-        }
-        if !(alpha >= 0.0 && alpha.is_finite()) {
-            let message = format!("`alpha` is {alpha} and must be 0 or more");
-            mistakes.push(Mistake::at("alpha", message));
-        }
-        mistakes
-    }
-
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
         too_many(features, 1)
     }

@@ -8,22 +8,13 @@ pub(crate) fn now() -> Vec<Duration> {
     vec![Duration::ZERO]
 }
 
-/// Lags that repeat or are negative.
-pub(crate) fn lag_mistakes(name: &str, lags: &[Duration]) -> Vec<Mistake> {
-    let mut mistakes = Vec::new();
-    if lags.is_empty() {
-        mistakes.push(
-            Mistake::at(name, format!("`{name}` is empty"))
-                .help("give one lag or more, such as [\"5min\"]"),
-        );
-    }
-    for (i, lag) in lags.iter().enumerate() {
-        if lags[..i].contains(lag) {
-            mistakes.push(Mistake::at(
-                format!("{name}.{i}"),
-                format!("the lag {lag} stands twice in `{name}`"),
-            ));
-        }
-    }
-    mistakes
+/// Lags that stand twice in a list.
+pub(crate) fn repeated(name: &str, lags: &[Duration]) -> Vec<Mistake> {
+    let twice = |&(i, lag): &(usize, &Duration)| lags[..i].contains(lag);
+    let mistake = |(i, lag)| {
+        let message = format!("the lag {lag} stands twice in `{name}`");
+        Mistake::at(format!("{name}.{i}"), message)
+    };
+    let twice = lags.iter().enumerate().filter(twice);
+    twice.map(mistake).collect()
 }

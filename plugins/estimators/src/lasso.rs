@@ -28,10 +28,6 @@ impl Estimator for Lasso {
         present_features()
     }
 
-    fn mistakes(&self) -> Vec<Mistake> {
-        self.alpha.mistakes()
-    }
-
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
         too_many(features, 1)
     }

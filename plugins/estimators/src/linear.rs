@@ -47,9 +47,7 @@ impl Estimator for Linear {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.solver.mistakes();
-        mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
-        mistakes
+        self.solver.mistakes()
     }
 
     fn learns(&self) -> Learns {

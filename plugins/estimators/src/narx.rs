@@ -11,7 +11,7 @@ use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::lags::{lag_mistakes, now};
+use crate::lags::{now, repeated};
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::unsolved::unsolved;
 
@@ -33,9 +33,11 @@ const MOST_TERMS: usize = 500;
 #[serde(deny_unknown_fields)]
 pub struct Narx {
     /// The lags of the truth, such as `["0s", "5min"]`.
+    #[schemars(length(min = 1))]
     pub lags: Vec<Duration>,
     /// The lags at which each feature is read.
     #[serde(default = "now")]
+    #[schemars(length(min = 1))]
     pub feature_lags: Vec<Duration>,
     /// How many variables a product has at most, from 1 to 4.
     #[serde(default = "two")]
@@ -83,22 +85,8 @@ impl Estimator for Narx {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = lag_mistakes("lags", &self.lags);
-        mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
-        if !(1..=4).contains(&self.degree) {
-            let message = format!("`degree` is {} and must be from 1 to 4", self.degree);
-            mistakes.push(Mistake::at("degree", message));
-        }
-        if !(0.0..1.0).contains(&self.tolerance) {
-            let message = format!(
-                "`tolerance` is {} and must be 0 or more and below 1",
-                self.tolerance
-            );
-            mistakes.push(Mistake::at("tolerance", message));
-        }
-        if self.most == 0 {
-            mistakes.push(Mistake::at("most", "`most` is 0 and must be 1 or more"));
-        }
+        let mut mistakes = repeated("lags", &self.lags);
+        mistakes.extend(repeated("feature_lags", &self.feature_lags));
         mistakes
     }
 

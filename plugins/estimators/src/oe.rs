@@ -51,6 +51,7 @@ pub struct Oe {
     pub penalty: f64,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<Duration>,
     /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given. They are compared
     /// without the penalty, with which the chosen one is fitted.

@@ -154,37 +154,16 @@ impl Settled {
 }
 
 impl Penalty {
-    /// Parameters out of their range; `place` is the key that holds the penalty.
+    /// A range of penalties that is none; `place` is the key that holds the penalty.
     pub(crate) fn mistakes(&self, place: &str) -> Vec<Mistake> {
-        let choice = match *self {
-            Self::Fixed(alpha) if alpha >= 0.0 && alpha.is_finite() => return Vec::new(),
-            Self::Fixed(alpha) => {
-                let message = format!("`alpha` is {alpha} and must be 0 or more");
-                return vec![Mistake::at(place, message)];
-            }
-            Self::Chosen(choice) => choice,
+        let Self::Chosen(choice) = self else {
+            return Vec::new();
         };
-        let mut mistakes = Vec::new();
-        if let Choice::CrossValidation { folds, .. } = choice {
-            mistakes.extend(folds.mistakes(&format!("{place}.folds")));
-        }
-        let (smallest, largest, per_decade) = choice.range();
-        let mut check = |key: &str, value: f64, fits: bool, allowed: &str| {
-            if !fits {
-                let message = format!("`{key}` is {value} and must be {allowed}");
-                mistakes.push(Mistake::at(format!("{place}.{key}"), message));
-            }
-        };
-        let fits = smallest > 0.0 && smallest.is_finite();
-        check("smallest", smallest, fits, "above 0");
-        let fits = (1..=1000).contains(&per_decade);
-        check("per_decade", f64::from(per_decade), fits, "from 1 to 1000");
-        if !(largest > smallest && largest.is_finite()) {
-            let message = format!("`largest` is {largest} and must be finite and above `smallest`");
-            let mistake = Mistake::at(format!("{place}.largest"), message);
-            mistakes.push(mistake.rests_on(format!("{place}.smallest")));
-        }
-        mistakes
+        let (smallest, largest, _) = choice.range();
+        let message = format!("`largest` is {largest} and must be above `smallest`");
+        let mistake = Mistake::at(format!("{place}.largest"), message);
+        let mistake = mistake.rests_on(format!("{place}.smallest"));
+        Vec::from_iter((largest <= smallest).then_some(mistake))
     }
 
     /// Into how many parts it cuts the rows.

@@ -56,9 +56,7 @@ impl Estimator for Polynomial {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.solver.mistakes();
-        mistakes.extend(self.selection.mistakes());
-        mistakes
+        self.solver.mistakes()
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {

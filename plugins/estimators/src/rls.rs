@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::features::too_many;
-use crate::lags::lag_mistakes;
+use crate::lags::repeated;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::penalty::Penalty;
 use crate::regression::LinearTrainer;
@@ -100,29 +100,6 @@ impl Default for Forgetting {
 }
 
 impl Forgetting {
-    fn mistakes(self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        let mut check = |name: &str, value: f64, fits: bool, allowed: &str| {
-            if !fits {
-                let message = format!("`{name}` is {value} and must be {allowed}");
-                mistakes.push(Mistake::at(format!("forgetting.{name}"), message));
-            }
-        };
-        let mut factor = |name: &str, value: f64| {
-            let fits = value > 0.0 && value <= 1.0;
-            check(name, value, fits, "above 0 and at most 1");
-        };
-        match self {
-            Self::Constant { factor: constant } => factor("factor", constant),
-            Self::Variable { memory, lowest } => {
-                factor("lowest", lowest);
-                let fits = memory > 1.0 && memory.is_finite();
-                check("memory", memory, fits, "above 1");
-            }
-        }
-        mistakes
-    }
-
     /// Over how many rows the past counts; infinite where nothing is forgotten.
     fn memory(self) -> f64 {
         match self {
@@ -158,16 +135,7 @@ impl Estimator for Rls {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = self.forgetting.mistakes();
-        if !(self.alpha >= 0.0 && self.alpha.is_finite()) {
-            let message = format!("`alpha` is {} and must be 0 or more", self.alpha);
-            mistakes.push(Mistake::at("alpha", message));
-        }
-        mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
-        if !self.lags.is_empty() {
-            mistakes.extend(lag_mistakes("lags", &self.lags));
-        }
-        mistakes
+        repeated("lags", &self.lags)
     }
 
     fn learns(&self) -> Learns {

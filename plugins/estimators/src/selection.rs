@@ -1,8 +1,6 @@
 //! Decides how a user asks for a selection of regressors, and how it is run and told.
 
-use athermal_core::node::{
-    CandidateScore, Figure, Mistake, Regressor, SelectionStep, TrainingReport,
-};
+use athermal_core::node::{CandidateScore, Figure, Regressor, SelectionStep, TrainingReport};
 use athermal_numerics::{
     Candidates, Change, Direction, GramBlocks, NumericsError, Search, SelectionScore, Stepwise,
 };
@@ -100,52 +98,6 @@ impl Selection {
             leave_share: a_little_below(),
             most: None,
         }
-    }
-
-    /// Parameters out of their range.
-    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        let most = match *self {
-            Self::Forward(how) | Self::Backward(how) | Self::Floating(how) => {
-                mistakes.extend(how.folds.mistakes("selection.folds"));
-                let tolerance = how.tolerance;
-                if !tolerance.is_finite() {
-                    mistakes.push(Mistake::at(
-                        "selection.tolerance",
-                        format!("`tolerance` is {tolerance} and must be a number"),
-                    ));
-                }
-                how.most
-            }
-            Self::Stepwise {
-                f_enter,
-                leave_share,
-                most,
-            } => {
-                if !(f_enter > 0.0 && f_enter.is_finite()) {
-                    mistakes.push(Mistake::at(
-                        "selection.f_enter",
-                        format!("`f_enter` is {f_enter} and must be above 0"),
-                    ));
-                }
-                if !(leave_share > 0.0 && leave_share <= 1.0) {
-                    let message =
-                        format!("`leave_share` is {leave_share} and must be above 0 up to 1");
-                    mistakes.push(
-                        Mistake::at("selection.leave_share", message)
-                            .help("above 1 a regressor would come and go for ever"),
-                    );
-                }
-                most
-            }
-        };
-        if most == Some(0) {
-            mistakes.push(Mistake::at(
-                "selection.most",
-                "`most` is 0 and must be 1 or more",
-            ));
-        }
-        mistakes
     }
 
     /// Into how many parts it cuts the rows.

@@ -110,13 +110,6 @@ impl Feature for Sum {
         const { &[PortSummary::new("sum", "the sum")] }
     }
 
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut weights = self.weights.iter().flatten();
-        let wild = weights.find(|weight| !weight.is_finite());
-        let told = wild.map(|wild| format!("a weight is {wild} and must be a number"));
-        Vec::from_iter(told.map(|told| Mistake::at("weights", told)))
-    }
-
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let channels = inputs.port("signal");
         let weights = self.weights.as_deref();
@@ -250,14 +243,6 @@ impl Feature for Scale {
 
     fn ports() -> &'static [PortSummary] {
         const { &[PortSummary::new("scaled", "each channel, scaled")] }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        if self.factor.is_finite() {
-            return Vec::new();
-        }
-        let message = format!("`factor` is {} and must be a number", self.factor);
-        vec![Mistake::at("factor", message)]
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

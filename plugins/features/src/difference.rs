@@ -26,9 +26,11 @@ use crate::past::{LookingBack, max_age, max_age_mistake};
 pub struct Difference {
     /// Over which time; without it, from one value to the next.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub over: Option<Duration>,
     /// How old the earlier value may have been.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_age: Option<Duration>,
 }
 
@@ -65,12 +67,6 @@ impl Feature for Difference {
                 "how much each channel has changed",
             )]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let nothing = Mistake::unless_lasting("over", self.over);
-        let help = "leave it out for the change from one value to the next";
-        Vec::from_iter(nothing.map(|mistake| mistake.help(help)))
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -37,6 +37,7 @@ use crate::windows::three;
 #[serde(deny_unknown_fields)]
 pub struct Hampel {
     /// How far the window reaches back.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub window: Duration,
     /// How many standard deviations from the median a sample may lie, above 0.
     #[serde(default = "three_deviations")]
@@ -45,6 +46,7 @@ pub struct Hampel {
     /// A distance from the median within which no sample is an outlier: `"5 mK"`; none by default. Of temperatures it is a
     /// difference: as anywhere, `"5 Cel"` stands for 5 K.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub floor: Option<Quantity>,
     /// The fewest samples in the window by which one is judged, 3 or more.
     #[serde(default = "three")]
@@ -80,20 +82,13 @@ impl Hampel {
             return Ok(0.0);
         };
         let unit = of.unit.difference();
-        match floor.as_difference(&unit) {
-            Some(size) if size >= 0.0 && size.is_finite() => Ok(size),
-            Some(_) => {
-                let message = format!("`floor` is {floor} and must not be negative");
-                Err(Mistake::at("floor", message))
-            }
-            None => {
-                let message = format!(
-                    "`floor` is in {}, and `{}` differs in {unit}",
-                    floor.unit, of.name
-                );
-                Err(Mistake::at("floor", message).help(format!("give it in {unit}")))
-            }
-        }
+        floor.as_difference(&unit).ok_or_else(|| {
+            let message = format!(
+                "`floor` is in {}, and `{}` differs in {unit}",
+                floor.unit, of.name
+            );
+            Mistake::at("floor", message).help(format!("give it in {unit}"))
+        })
     }
 }
 
@@ -109,26 +104,6 @@ impl Feature for Hampel {
                 PortSummary::new("outlier", "1 where a sample was one, 0 where it was none"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if self.window <= Duration::ZERO {
-            let message = format!("a window of {} is no window", self.window);
-            mistakes.push(Mistake::at("window", message));
-        }
-        if !(self.threshold > 0.0 && self.threshold.is_finite()) {
-            let message = format!("`threshold` is {} and must be above 0", self.threshold);
-            mistakes.push(Mistake::at("threshold", message).help("3 is usual"));
-        }
-        if self.min_samples < 3 {
-            let message = format!(
-                "`min_samples` is {} and must be 3 or more",
-                self.min_samples
-            );
-            mistakes.push(Mistake::at("min_samples", message));
-        }
-        mistakes
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -22,9 +22,11 @@ use crate::past::{LookingBack, max_age_mistake};
 #[serde(deny_unknown_fields)]
 pub struct Lag {
     /// How far to look back: `["5min", "10min"]`; 0 or more, each once.
+    #[schemars(length(min = 1))]
     pub lags: Vec<Duration>,
     /// How old a value may have been at the instant looked back to; by default as old as a held value of the channel may be.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_age: Option<Duration>,
 }
 
@@ -39,10 +41,6 @@ impl Feature for Lag {
 
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        if self.lags.is_empty() {
-            let mistake = Mistake::at("lags", "there is no lag");
-            mistakes.push(mistake.help("give one or more, such as [\"5min\"]"));
-        }
         for (i, lag) in self.lags.iter().enumerate() {
             if self.lags[..i].contains(lag) {
                 let message = format!("the lag {lag} stands twice");

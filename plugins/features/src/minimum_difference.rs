@@ -23,6 +23,7 @@ use crate::rounding::rounding;
 #[serde(deny_unknown_fields)]
 pub struct MinimumDifference {
     /// The least change that is passed on, above 0: `"5 mK"`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub difference: Quantity,
 }
 
@@ -30,20 +31,13 @@ impl MinimumDifference {
     /// The least change in the unit of a channel.
     fn least(&self, of: &Channel) -> Result<f64, Mistake> {
         let unit = of.unit.difference();
-        match self.difference.as_difference(&unit) {
-            Some(least) if least > 0.0 && least.is_finite() => Ok(least),
-            Some(_) => {
-                let message = format!("`difference` is {} and must be above 0", self.difference);
-                Err(Mistake::at("difference", message))
-            }
-            None => {
-                let message = format!(
-                    "`difference` is in {}, and `{}` differs in {unit}",
-                    self.difference.unit, of.name
-                );
-                Err(Mistake::at("difference", message).help(format!("give it in {unit}")))
-            }
-        }
+        self.difference.as_difference(&unit).ok_or_else(|| {
+            let message = format!(
+                "`difference` is in {}, and `{}` differs in {unit}",
+                self.difference.unit, of.name
+            );
+            Mistake::at("difference", message).help(format!("give it in {unit}"))
+        })
     }
 }
 
@@ -132,14 +126,11 @@ impl Operator for Keeping {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Kept>() {
-            Ok(state) if state.kept.len() == self.kept.len() => {
-                self.kept = state.kept;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the channels differ"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Kept| {
+            let fits = state.kept.len() == self.kept.len();
+            fits.then(|| self.kept = state.kept)
+                .ok_or("the channels differ")
+        })
     }
 }
 

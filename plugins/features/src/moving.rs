@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::slope::kernel::LIMIT;
 use crate::sorted::Sorted;
 use crate::summary::Summary;
-use crate::windows::{Cold, Windows, half, over, three, window_mistakes};
+use crate::windows::{Cold, Windows, half, over, three};
 
 /// Statistics of the samples of each channel in trailing windows: their mean, and more by the name of a port.
 ///
@@ -31,6 +31,7 @@ use crate::windows::{Cold, Windows, half, over, three, window_mistakes};
 #[serde(deny_unknown_fields)]
 pub struct Moving {
     /// The lengths of the windows, such as `["150s", "5min"]`, or a dynamic range of them as of a `slope`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub windows: Windows,
     /// The fewest samples in a window, 1 or more.
     #[serde(default = "three")]
@@ -79,7 +80,7 @@ impl Feature for Moving {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        window_mistakes(&self.windows, self.min_samples, 1, self.min_coverage)
+        self.windows.mistakes()
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -9,14 +9,12 @@ use serde::{Deserialize, Serialize};
 
 /// How old a value of the past may be: as stated, or as a held value of the channel.
 pub(crate) fn max_age(stated: Option<Duration>, of: &Channel) -> Result<Duration, Mistake> {
-    match stated.or_else(|| of.default_max_age()) {
-        Some(age) => Mistake::unless_lasting("max_age", age).map_or(Ok(age), Err),
-        None => {
-            let message = format!("how old a value of `{}` may be is not known", of.name);
-            let help = "add `max_age = \"1min\"` here, or to the signal that has none";
-            Err(Mistake::at("max_age", message).help(help))
-        }
-    }
+    let age = stated.or_else(|| of.default_max_age());
+    age.ok_or_else(|| {
+        let message = format!("how old a value of `{}` may be is not known", of.name);
+        let help = "add `max_age = \"1min\"` here, or to the signal that has none";
+        Mistake::at("max_age", message).help(help)
+    })
 }
 
 /// What is wrong with how old values may be; told once, however many channels it is true of.

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Resample {
     /// The length of a period.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Duration,
     /// How late after the end of its period a value may come, 0 to `every`; by default until the next period ends.
     #[serde(default)]
@@ -71,13 +72,9 @@ impl Feature for Resample {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("every", self.every));
         let late = self.late();
-        if mistakes.is_empty() && !(Duration::ZERO..=self.every).contains(&late) {
-            let message = format!("`late` is {late} and must be from 0 s to {}", self.every);
-            mistakes.push(Mistake::at("late", message));
-        }
-        mistakes
+        let message = format!("`late` is {late} and must be from 0 s to {}", self.every);
+        Vec::from_iter((late > self.every).then(|| Mistake::at("late", message)))
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
@@ -208,19 +205,16 @@ impl Operator for Resampling {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Periods>() {
-            Ok(state) if state.channels.len() != self.known.channels.len() => {
-                Restored::cold("the number of channels differs")
+        state.accept(|state: Periods| {
+            if state.channels.len() != self.known.channels.len() {
+                return Err("the number of channels differs");
             }
-            Ok(state) if state.every != self.known.every => {
-                Restored::cold("the length of the periods differs")
+            if state.every != self.known.every {
+                return Err("the length of the periods differs");
             }
-            Ok(state) => {
-                self.known = state;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+            self.known = state;
+            Ok(())
+        })
     }
 }
 

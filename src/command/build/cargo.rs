@@ -1,4 +1,4 @@
-//! Decides how cargo is called, and what is said when it is missing or fails.
+//! Calling cargo, and what is reported where it is missing or fails.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -17,7 +17,7 @@ pub(super) struct Cargo {
 }
 
 impl Cargo {
-    /// With `quiet` it says only what goes wrong.
+    /// With `quiet` it prints errors only.
     pub(super) fn new(offline: bool, quiet: bool) -> Self {
         Self {
             program: std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()),
@@ -41,10 +41,10 @@ impl Cargo {
         }
         let output = command.output().map_err(|error| self.missing(&error))?;
         if !output.status.success() {
-            let told = String::from_utf8_lossy(&output.stderr);
-            let told = told.trim().trim_start_matches("error: ");
+            let reason = String::from_utf8_lossy(&output.stderr);
+            let reason = reason.trim().trim_start_matches("error: ");
             return Err(Failure::Outside(format!(
-                "cargo cannot put the crates of {} together: {told}",
+                "cargo cannot put the crates of {} together: {reason}",
                 folder.display()
             )));
         }
@@ -60,7 +60,7 @@ impl Cargo {
         lines.find_map(|line| Some(line.strip_prefix("host: ")?.to_owned()))
     }
 
-    /// Builds the crate in a folder; cargo tells its progress itself, unless it is to be quiet.
+    /// Builds the crate in a folder; cargo shows its own progress, unless it is to be quiet.
     ///
     /// # Errors
     /// When cargo is not there or fails.
@@ -75,7 +75,7 @@ impl Cargo {
             return Ok(());
         }
         Err(Failure::Outside(format!(
-            "cargo could not build {}; what it said stands above",
+            "cargo could not build {}; its output stands above",
             folder.display()
         )))
     }

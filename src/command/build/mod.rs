@@ -10,9 +10,9 @@ use std::process::Command;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::aside::copy_aside;
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal::run::live::store::copy_whole;
 use cargo::Cargo;
 use project::Project;
 use wish::Wish;
@@ -89,7 +89,7 @@ impl Build {
         let machines = known(&built, "simulate", "machines")?;
         twice("machine", &machines)?;
         place(&built, &self.output)?;
-        self.tell(terminal, &wishes, &resolved, &kinds, &machines);
+        self.report(terminal, &wishes, &resolved, &kinds, &machines);
         Ok(Answer::Fine)
     }
 
@@ -101,8 +101,8 @@ impl Build {
         })
     }
 
-    /// Tells what the new binary has.
-    fn tell(
+    /// Prints what the new binary has.
+    fn report(
         &self,
         terminal: &Terminal,
         wishes: &[Wish],
@@ -187,7 +187,7 @@ fn twice(what: &str, all: &[Known]) -> Result<(), Failure> {
     for (nth, known) in all.iter().enumerate() {
         if let Some(other) = all[..nth].iter().find(|other| other.name == known.name) {
             return Err(Failure::Request(format!(
-                "the {what} `{}` is in {} {} and in {} {}: no graph could tell which is meant; leave one of them out, or rename it",
+                "the {what} `{}` is in {} {} and in {} {}: a graph could mean either; leave one of them out, or rename it",
                 known.name, other.package, other.version, known.package, known.version
             )));
         }
@@ -225,7 +225,7 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
 fn place(built: &Path, output: &Path) -> Result<(), Failure> {
     let folder = output.parent().map_or(Ok(()), std::fs::create_dir_all);
     folder
-        .and_then(|()| copy_aside(built, output))
+        .and_then(|()| copy_whole(built, output))
         .map_err(|error| {
             Failure::Outside(format!(
                 "cannot put {} at {}: {error}",
@@ -256,12 +256,12 @@ mod tests {
             "node type",
             &[of("one", "a"), of("one", "b"), of("two", "a")],
         );
-        let Err(Failure::Request(told)) = refused else {
+        let Err(Failure::Request(message)) = refused else {
             panic!("{refused:?}")
         };
         assert_eq!(
-            told,
-            "the node type `a` is in one 0.1.0 and in two 0.1.0: no graph could tell which is meant; leave one of them out, or rename it"
+            message,
+            "the node type `a` is in one 0.1.0 and in two 0.1.0: a graph could mean either; leave one of them out, or rename it"
         );
     }
 
@@ -270,9 +270,9 @@ mod tests {
         let core = |path: &str| json!({ "name": "athermal-core", "version": "0.1.0", "manifest_path": path });
         assert!(one_core(&json!({ "packages": [core("/a")] }), &[]).is_ok());
         let refused = one_core(&json!({ "packages": [core("/a"), core("/b")] }), &[]);
-        let Err(Failure::Request(told)) = refused else {
+        let Err(Failure::Request(message)) = refused else {
             panic!("{refused:?}")
         };
-        assert!(told.contains("0.1.0 in /a, 0.1.0 in /b"), "{told}");
+        assert!(message.contains("0.1.0 in /a, 0.1.0 in /b"), "{message}");
     }
 }

@@ -1,4 +1,4 @@
-//! Decides what the cargo project of a binary with chosen plugins consists of.
+//! What the cargo project of a binary with chosen plugins consists of.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Decides what a crate that is asked for is, and whether it is made for this athermal; before anything is built.
+//! A crate that is asked for, and whether it is made for this athermal; checked before anything is built.
 
 use std::path::{Path, PathBuf};
 
@@ -180,7 +180,7 @@ fn made_for(package: &str, core: &Value, checkout: &Checkout) -> Result<(), Fail
     {
         return Err(Failure::Request(format!(
             "{package} builds on the athermal-core in {theirs}, and this binary on that in {}: two copies do not know \
-             each other's nodes. Change the path in its Cargo.toml, or say `--athermal path:DIR` for the other",
+             each other's nodes. Change the path in its Cargo.toml, or give `--athermal path:DIR` for the other",
             ours.display()
         )));
     }
@@ -192,9 +192,9 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn told(result: Result<impl std::fmt::Debug, Failure>) -> String {
+    fn message(result: Result<impl std::fmt::Debug, Failure>) -> String {
         match result {
-            Err(Failure::Request(told) | Failure::Outside(told)) => told,
+            Err(Failure::Request(message) | Failure::Outside(message)) => message,
             other => panic!("{other:?}"),
         }
     }
@@ -210,16 +210,16 @@ mod tests {
             assert_eq!(Wish::read(text).unwrap().dependency(), line);
         }
         for wrong in ["", "a b", "@1", "../there", "x@one"] {
-            assert!(told(Wish::read(wrong)).contains("`--with"), "{wrong}");
+            assert!(message(Wish::read(wrong)).contains("`--with"), "{wrong}");
         }
-        assert!(told(Wish::read("path:no-such-folder")).contains("no crate in no-such-folder"));
+        assert!(message(Wish::read("path:no-such-folder")).contains("no crate in no-such-folder"));
     }
 
     #[test]
     fn a_crate_for_another_version_is_refused_with_both() {
         let checkout = Checkout::find(None).unwrap();
         let core = json!({ "name": "athermal-core", "req": "^99.1" });
-        let told_of = told(made_for("old-nodes", &core, &checkout));
+        let told_of = message(made_for("old-nodes", &core, &checkout));
         assert!(
             told_of.contains("made for athermal-core ^99.1"),
             "{told_of}"
@@ -227,7 +227,7 @@ mod tests {
         assert!(told_of.contains(VERSION), "{told_of}");
         let there =
             json!({ "name": "athermal-core", "req": "*", "path": env!("CARGO_MANIFEST_DIR") });
-        assert!(told(made_for("nodes", &there, &checkout)).contains("two copies"));
+        assert!(message(made_for("nodes", &there, &checkout)).contains("two copies"));
         let here = checkout.core();
         let here = json!({ "name": "athermal-core", "req": "*", "path": here });
         assert!(made_for("nodes", &here, &checkout).is_ok());

@@ -1,4 +1,4 @@
-//! What a comparison is told as; what is compared stands above.
+//! A comparison as tables for a terminal.
 
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison};
 use athermal::run::score::Mode;
@@ -61,7 +61,7 @@ fn heading(comparison: &Comparison, mode: Mode, spans: bool) -> String {
     let few = 2 * BLOCKS;
     let few = match fewest {
         Some(fewest) if fewest < few as u64 => {
-            format!("fewer than {few} instants tell nothing of ±: which is best may be chance\n")
+            format!("fewer than {few} instants give no ±: which is best may be chance\n")
         }
         _ => String::new(),
     };
@@ -176,9 +176,9 @@ mod tests {
             n: 40,
             baseline_zero: Some(2.6),
         });
-        let told = describe(&seldom, Mode::OneStep, false, false);
-        assert!(told.contains(" 2.50 @40"), "{told}");
-        assert!(told.contains("@ valid at so few instants"), "{told}");
+        let text = describe(&seldom, Mode::OneStep, false, false);
+        assert!(text.contains(" 2.50 @40"), "{text}");
+        assert!(text.contains("@ valid at so few instants"), "{text}");
     }
 
     #[test]
@@ -199,10 +199,10 @@ mod tests {
 
     #[test]
     fn of_several_graphs_each_row_stands_below_the_name_of_its_own() {
-        let told = describe(&one_row(100, 2.0), Mode::OneStep, true, false);
-        let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
+        let text = describe(&one_row(100, 2.0), Mode::OneStep, true, false);
+        let lines: Vec<&str> = text.lines().map(str::trim_end).collect();
         let at = lines.iter().position(|line| *line == "  a").unwrap();
-        assert!(lines[at + 1].starts_with("    vote (mean)"), "{told}");
+        assert!(lines[at + 1].starts_with("    vote (mean)"), "{text}");
     }
 
     #[test]
@@ -213,16 +213,16 @@ mod tests {
             ..one_row(100, 2.0)
         };
         let all = [table(300.0, 60.0), table(1800.0, 60.0), table(0.0, 120.0)];
-        let told = all.each_ref().map(|of| {
-            let told = describe(of, Mode::OneStep, false, is_one_of_several(of, &all));
-            told.lines().next().unwrap().to_owned()
+        let text = all.each_ref().map(|of| {
+            let text = describe(of, Mode::OneStep, false, is_one_of_several(of, &all));
+            text.lines().next().unwrap().to_owned()
         });
         let expected = [
             "RMSE in nm of truths over 5min, 1min ahead, 100 instants;",
             "RMSE in nm of truths over 30min, 1min ahead, 100 instants;",
             "RMSE in nm, 2min ahead, 100 instants; * best, ! worse than no model",
         ];
-        assert_eq!(told, expected);
+        assert_eq!(text, expected);
     }
 
     #[test]

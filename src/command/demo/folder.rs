@@ -1,14 +1,15 @@
-//! Decides into which folder the demo writes: its own, and never over somebody's work.
+//! The folder that the demo writes into: its own, and never over somebody's work.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::super::aside::write_aside;
-use super::super::data::content_of;
+use athermal::run::model::content_of;
+
 use crate::invocation::{program, quoted};
 use crate::terminal::Failure;
 
-/// The file that says which files the demo has written, and with which content.
+/// The file that lists the files that the demo has written, with their checksums.
 const MARK: &str = ".athermal-demo.json";
 
 /// A folder that the demo may write into.
@@ -132,7 +133,7 @@ mod tests {
         let mut folder = Folder::open(&path, &["a", "b"]).unwrap();
         let stopped = folder.write("a", |path| {
             write_aside(path, "half")?;
-            Err::<(), _>(Failure::Told(1))
+            Err::<(), _>(Failure::Exit(1))
         });
         assert!(stopped.is_err());
         assert!(Folder::open(&path, &["a", "b"]).is_ok());

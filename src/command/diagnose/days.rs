@@ -1,4 +1,4 @@
-//! Decides how fits on some days, scored on others, look as text.
+//! Fits on some days, scored on others, as tables for a terminal.
 
 use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 
@@ -55,7 +55,7 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
     let most = days.count - 1;
     let verdict = match enough {
-        _ if most == 1 => "two are too few to tell",
+        _ if most == 1 => "two are too few",
         _ if !compares => "nothing to compare",
         Some(enough) => {
             let days = counted(enough as u64, "day");
@@ -112,14 +112,14 @@ mod tests {
             left_out: vec![day(1, 3.0), day(2, 5.0)],
             curve: Vec::new(),
         };
-        let told = text(&days, "nm/min", &["vote.Z"]);
-        let cells = told.lines().map(|line| line.split_whitespace().last());
+        let table = text(&days, "nm/min", &["vote.Z"]);
+        let cells = table.lines().map(|line| line.split_whitespace().last());
         let cells: Vec<&str> = cells.flatten().collect();
         assert_eq!(
             cells[2..7],
             ["vote.Z", "3.00", "4.00", "!5.00", "4.00"],
-            "{told}"
+            "{table}"
         );
-        assert!(told.contains("! worse than no"), "{told}");
+        assert!(table.contains("! worse than no"), "{table}");
     }
 }

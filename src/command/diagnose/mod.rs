@@ -20,9 +20,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::beyond;
-use super::data::{self, Data};
-use super::doubtful::Doubtful;
-use super::faults::{self, FaultWatch, Purpose};
+use super::data::Data;
+use super::doubts::Doubts;
+use super::faults::{FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::report::write_plots;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -31,10 +31,11 @@ use tables::Tables;
 
 /// Show why a model predicts as well as it does, and what would make it better
 ///
-/// Tells whether what predictions leave is white (p of Ljung and Box not below 0.01); which features say something of the truth, at which lag, and of what
-/// predictions leave; how each estimator answers a change of each sensor; how well the data determine it; what each sensor
-/// contributes; and, by fits of its own on the data, how well each day is predicted from the others and how many days are
-/// needed. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all of them are.
+/// Shows whether what predictions leave is white (p of Ljung and Box not below 0.01), and which features explain the truth or
+/// the rest, at which lag. Shows how each estimator answers a change of each sensor, how well the data determine it, and what
+/// each sensor contributes. Fits of its own on the data show how well each day is predicted from the others, and how many
+/// days are needed. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all
+/// of them are.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal diagnose model.json --data week.csv
@@ -51,7 +52,7 @@ pub struct Diagnose {
     /// puts out
     #[arg(long, num_args = 1.., value_name = "NAME")]
     of: Vec<String>,
-    /// Set the signal to noise of each drift against the window that it is taken over, noise being the standard error of its
+    /// Show the signal to noise of each drift against the window that it is taken over. Noise is the standard error of its
     /// slopes, in which scatter and curvature within the window both count
     #[arg(long)]
     window: bool,
@@ -72,14 +73,14 @@ pub struct Diagnose {
 }
 
 impl Diagnose {
-    /// Works out the facts and tells them.
+    /// Works out the facts and prints them.
     ///
     /// # Errors
     /// When the model or the data cannot be used, or a picture cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         if self.day <= Duration::ZERO {
             return Err(Failure::Request(format!(
-                "--day is {} and must be longer than nothing",
+                "--day is {} and must be greater than 0",
                 self.day
             )));
         }
@@ -95,48 +96,39 @@ impl Diagnose {
         let mut bar = None;
         let mut progress = |done: u64, total: u64| {
             bar.get_or_insert_with(|| terminal.progress_to("fitting", total))
-                .tell(done);
+                .set(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
         drop(bar);
-        let faults = watch.found();
         let tables = Tables::new(&diagnosis, &self.of);
         let trace = &observation.trace;
-        let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
+        let doubts = Doubts {
+            plan: &model.plan,
+            dataset: &dataset,
+            refused: trace.refused,
+            rejected: &trace.rejected,
+            faults: watch.found(),
+            outside_fit: beyond::beyond(model.sample_ranges(), &trace.ranges),
+        };
         if terminal.format == Format::Json {
-            let files = dataset.paths().iter();
-            let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
             let mut asked = diagnosis.clone();
             asked.keep_only(&self.of);
-            let mut told = json!({ "data": files, "diagnosis": asked });
-            let doubtful = Doubtful {
-                faults: &faults,
-                outside_fit: &outside_fit,
-                reports: &dataset.reports(),
-            };
-            doubtful.tell(&mut told);
-            println!("{told:#}");
+            let mut facts = json!({ "data": self.data.names(), "diagnosis": asked });
+            doubts.add_to(&mut facts);
+            println!("{facts:#}");
         } else {
             print!("{}", tables.text());
         }
-        data::tell(
-            terminal,
-            &model.plan,
-            &dataset.reports(),
-            trace.refused,
-            &trace.rejected,
-        );
-        beyond::tell(terminal, &outside_fit);
-        faults::tell(terminal, &faults);
-        for told in Lack::told(&diagnosis.lacks) {
-            terminal.warning(told);
+        doubts.warn(terminal);
+        for message in Lack::warnings(&diagnosis.lacks) {
+            terminal.warning(message);
         }
-        self.tell(terminal, &diagnosis);
+        self.report(terminal, &diagnosis);
         if self.of.is_empty() && terminal.format == Format::Table {
-            tell_others(terminal, &model.plan, &diagnosis);
+            note_others(terminal, &model.plan, &diagnosis);
         }
-        tell_empty(terminal, &model.plan, &diagnosis, &observation);
+        warn_empty(terminal, &model.plan, &diagnosis, &observation);
         let drifts = window::any(&model.plan);
         if self.window && !drifts {
             terminal.note("--window shows nothing, since no truth is a slope");
@@ -152,9 +144,9 @@ impl Diagnose {
         Ok(Answer::Fine)
     }
 
-    fn tell(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
+    fn report(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
         if let Some(days) = &diagnosis.days {
-            Self::tell_dropped(terminal, days);
+            Self::warn_dropped(terminal, days);
         }
         if diagnosis.main.is_empty() {
             terminal.warning(
@@ -174,8 +166,8 @@ impl Diagnose {
         }
     }
 
-    /// Tells of what only some of the fits on parts of the data had, so that they differ by more than their days.
-    fn tell_dropped(terminal: &Terminal, days: &Days) {
+    /// Warns of what only some of the fits on parts of the data had, so that they differ by more than their days.
+    fn warn_dropped(terminal: &Terminal, days: &Days) {
         let all = days.left_out.iter().flat_map(|day| &day.dropped);
         let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
         let names: BTreeSet<&String> = all.collect();
@@ -192,7 +184,7 @@ impl Diagnose {
                     format!("fits without day {}", without.join(", "))
                 };
                 terminal.warning(format_args!(
-                    "{name} has a value in too few rows for {which}, which do without it: that tells in their scores too"
+                    "{name} has a value in too few rows for {which}, which do without it; their scores suffer from that too"
                 ));
             }
         }
@@ -218,7 +210,7 @@ impl Diagnose {
 }
 
 /// Names predictions that the graph puts out beside those that are shown.
-fn tell_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
+fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
     let outputs = plan
         .outputs
         .iter()
@@ -236,8 +228,8 @@ fn tell_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
     }
 }
 
-/// Why there is nothing to say of predictions without a residual.
-fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
+/// Warns of predictions without a residual.
+fn warn_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
     for main in &diagnosis.main {
         let residuals = diagnosis.residuals.iter();
         let mut of_main = residuals.filter(|of| of.prediction == main.prediction);
@@ -252,7 +244,7 @@ fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observati
             terminal.warning(format_args!("the data have no value of the truth {truth}"));
         } else {
             terminal.warning(format_args!(
-                "{} is at none of the {} at which {} was measured, so nothing can be told of it",
+                "{} is at none of the {} at which {} was measured, so it cannot be judged",
                 main.prediction,
                 counted(there as u64, "instant"),
                 main.truth

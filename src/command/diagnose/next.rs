@@ -1,4 +1,4 @@
-//! Decides which commands are worth trying after a diagnosis: only those that what was found asks for, two at most.
+//! The commands worth trying after a diagnosis: two at most, each for something that was found.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::invocation::{command, program, quoted};
 use athermal_analysis::figures::paragraph;
 
 impl Diagnose {
-    /// What to try next, each with its reason; nothing where nothing follows. `drifts` says whether any truth is a slope.
+    /// What to try next, each with its reason; none where nothing follows. `drifts`: whether any truth is a slope.
     pub(super) fn next(&self, tables: &Tables, model: &Model, drifts: bool) -> Option<String> {
         let left = self.what_is_left(tables, model);
         let left = left.or_else(|| self.wider_windows(tables).filter(|_| drifts));
@@ -44,7 +44,7 @@ impl Diagnose {
         command(&words)
     }
 
-    /// A feature tells something of what a prediction leaves: does no estimator use it, or is it of little use there?
+    /// A feature explains something of what a prediction leaves: does no estimator use it, or is it of little use there?
     fn what_is_left(&self, tables: &Tables, model: &Model) -> Option<String> {
         let (main, feature) = most_left(tables)?;
         let name = &feature.feature;
@@ -94,7 +94,7 @@ impl Diagnose {
         wanted.then(|| format!("More days may still make it better; with another log beside those of the fit:\n{fit}"))
     }
 
-    /// Where what is left is white, a truth over another window may be told better.
+    /// Where what is left is white, a truth over another window may be predicted better.
     fn wider_windows(&self, tables: &Tables) -> Option<String> {
         let of = self.of.iter().map(|name| quoted(name));
         let of = of.flat_map(|name| ["--of".to_owned(), name]);
@@ -107,11 +107,11 @@ impl Diagnose {
     }
 }
 
-/// Of what predictions leave, that which a feature tells most of for sure.
+/// Of what predictions leave, that which a feature surely explains most of.
 fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
     let left = tables.main().filter_map(|main| {
         let features = tables.lags_of(main)?.features.iter();
-        let sure = features.filter(|of| of.residual.says_something());
+        let sure = features.filter(|of| of.residual.is_significant());
         let size = |of: &FeatureLags| of.residual.best.abs();
         let most = sure.max_by(|a, b| size(a).total_cmp(&size(b)))?;
         Some((main, most))
@@ -119,7 +119,7 @@ fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
     left.max_by(|a, b| a.1.residual.best.abs().total_cmp(&b.1.residual.best.abs()))
 }
 
-/// Whether what an estimator was fitted to tells its coefficients: not every kind does.
+/// Whether a fitted estimator has coefficients to show: not every kind does.
 fn has_coefficients(model: &Model, node: &str) -> bool {
     let fit = model.fitted.get(node);
     fit.is_some_and(|fit| fit.coefficients().is_some())
@@ -134,7 +134,7 @@ mod tests {
 
     use super::*;
 
-    /// Predicts zero, and tells of it or not.
+    /// Predicts zero, with coefficients or without.
     #[derive(Debug, Serialize, Deserialize)]
     struct Reserved {
         tells: bool,

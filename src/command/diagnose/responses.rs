@@ -1,4 +1,4 @@
-//! Decides how the answers of estimators to their sensors look as text.
+//! The responses of estimators to their sensors as tables for a terminal.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -112,7 +112,7 @@ impl<'a> Node<'a> {
         let in_unit = |total: Option<f64>| or_no_end(total.map(|total| factor * total));
         let mut rows = self.rows(sensors, |of| in_unit(of.total));
         if sensors.len() > 1 {
-            // What sensors that tell the same share among them means more than what each has of it.
+            // Sensors that measure the same share an effect, so that their sum means more than each part.
             let together = self
                 .instances
                 .iter()
@@ -172,13 +172,13 @@ impl<'a> Node<'a> {
 }
 
 /// The sum of what an instance makes of the sensors; it may answer none of them.
-fn together(of: &Responses, sensors: &[&Response], told: impl Fn(Option<f64>) -> String) -> String {
+fn together(of: &Responses, sensors: &[&Response], cell: impl Fn(Option<f64>) -> String) -> String {
     let among = |one: &&Response| sensors.iter().any(|other| other.sensor == one.sensor);
     let answers: Vec<&Response> = of.sensors.iter().filter(among).collect();
     if answers.is_empty() {
         return "-".to_owned();
     }
-    told(answers.iter().map(|of| of.total).sum())
+    cell(answers.iter().map(|of| of.total).sum())
 }
 
 fn or_no_end(value: Option<f64>) -> String {
@@ -251,8 +251,8 @@ mod tests {
             (share, "a step of 1 moves"),
             (answer("a", Some(2.0), 60.0), "a step of 1 K moves"),
         ] {
-            let told = text(&[&instance("X", "nm/min", vec![of])]);
-            assert!(told.contains(step), "{told}");
+            let table = text(&[&instance("X", "nm/min", vec![of])]);
+            assert!(table.contains(step), "{table}");
         }
     }
 
@@ -269,12 +269,12 @@ mod tests {
             instance("Y", "nm/min", vec![heater]),
             instance("Z", "nm/min", endless),
         ];
-        let told = text(&of.iter().collect::<Vec<_>>());
-        let together = told.lines().find(|line| line.contains("all together"));
+        let table = text(&of.iter().collect::<Vec<_>>());
+        let together = table.lines().find(|line| line.contains("all together"));
         let cells: Vec<&str> = together.unwrap().split("  ").collect();
         let cells: Vec<&str> = cells.into_iter().map(str::trim).collect();
         let cells: Vec<&str> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();
-        assert_eq!(cells, ["all together", "3.00", "-", "no end"], "{told}");
+        assert_eq!(cells, ["all together", "3.00", "-", "no end"], "{table}");
     }
 
     #[test]
@@ -287,26 +287,26 @@ mod tests {
             instance("X", "nm", vec![stays]),
             instance("Z", "nm", vec![answer("a", Some(2.0), 60.0)]),
         ];
-        let told = text(&of.iter().collect::<Vec<_>>());
-        let lines = told.lines().filter(|line| line.contains("temperature.a"));
+        let table = text(&of.iter().collect::<Vec<_>>());
+        let lines = table.lines().filter(|line| line.contains("temperature.a"));
         let cells = lines.map(|line| line.split_once("temperature.a").map(|of| of.1.trim()));
         let cells: Vec<Vec<&str>> = cells
             .map(|row| row.unwrap_or_default().split("  ").map(str::trim).collect())
             .map(|row: Vec<&str>| row.into_iter().filter(|cell| !cell.is_empty()).collect())
             .collect();
-        assert_eq!(cells[..2], [["no end", "2.00"], ["3.00", "0"]], "{told}");
+        assert_eq!(cells[..2], [["no end", "2.00"], ["3.00", "0"]], "{table}");
     }
 
     #[test]
     fn settling_is_told_in_the_unit_in_which_the_longest_is_read_best() {
         for (settled_s, unit, number) in [(90.0, "s", "90.00"), (43_200.0, "h", "12.00")] {
             let of = instance("X", "nm/min", vec![answer("a", Some(2.0), settled_s)]);
-            let told = text(&[&of]);
+            let table = text(&[&of]);
             assert!(
-                told.contains(&format!("a tenth of that, in {unit}\n")),
-                "{told}"
+                table.contains(&format!("a tenth of that, in {unit}\n")),
+                "{table}"
             );
-            assert!(told.trim_end().ends_with(number), "{told}");
+            assert!(table.trim_end().ends_with(number), "{table}");
         }
     }
 }

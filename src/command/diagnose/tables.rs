@@ -1,4 +1,4 @@
-//! Decides how the facts of a diagnosis look as text, in 80 columns.
+//! A diagnosis as tables for a terminal, 80 columns wide.
 
 use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
@@ -63,7 +63,7 @@ impl<'a> Tables<'a> {
         is_asked(node, self.asked)
     }
 
-    /// A text for the predictions of each unit, since headings tell it.
+    /// A text for the predictions of each unit, which stands in the heading.
     fn of_each_unit(&self, text: impl Fn(&str, &[&str]) -> String) -> String {
         let all = self.diagnosis.residuals.iter();
         let shown = all.filter(|of| self.shows(&of.prediction));
@@ -133,20 +133,20 @@ impl<'a> Tables<'a> {
                 let unknown = of.features.len() - features.clone().filter(known).count();
                 let mut found: Vec<_> = features
                     .filter(known)
-                    .filter(|of| all || side(of).says_something())
+                    .filter(|of| all || side(of).is_significant())
                     .collect();
                 found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
                 let more = found.len().saturating_sub(FEATURES);
                 let too_short = |of: &FeatureLags| side(of).bound >= 1.0;
-                let told = match (found.is_empty(), !all && more > 0) {
+                let more = match (found.is_empty(), !all && more > 0) {
                     (true, _) if !all && of.features.iter().any(too_short) => {
-                        format!("  {title}: too short a recording to tell")
+                        format!("  {title}: the recording is too short")
                     }
                     (true, _) => format!("  {title}: nothing"),
                     (_, true) => format!("  {title}, and {} more", counted(more as u64, "feature")),
                     _ => format!("  {title}"),
                 };
-                rows.push(vec![told]);
+                rows.push(vec![more]);
                 rows.extend(found.iter().take(FEATURES).map(|feature| {
                     let correlogram = side(feature);
                     vec![
@@ -196,7 +196,7 @@ impl<'a> Tables<'a> {
         let mut text = String::from(
             "how well the data determine each estimator: condition number of its regressors,\n\
              and the largest variance inflation factor (VIF); beyond 10 the regressor is\n\
-             named: others tell nearly the same, its coefficient means little by itself;\n\
+             named: others are nearly the same, its coefficient means little by itself;\n\
              - of models that filter their inputs or past, which other columns determine\n",
         );
         let rows: Vec<Vec<String>> = shown
@@ -284,7 +284,7 @@ impl<'a> Tables<'a> {
             let node = of.estimator.as_ref();
             node.is_none_or(|node| self.shows_estimator(node))
         });
-        let told = shown.map(|of| {
+        let rows = shown.map(|of| {
             let silent = &of.silent;
             match (&of.estimator, &of.sensor) {
                 (Some(node), Some(sensor)) => {
@@ -299,7 +299,7 @@ impl<'a> Tables<'a> {
                 }
             }
         });
-        told.collect()
+        rows.collect()
     }
 
     fn days(&self) -> String {
@@ -326,7 +326,7 @@ impl<'a> Tables<'a> {
         if widths.is_empty() {
             return String::new();
         }
-        // Two truths of one axis are told apart by their nodes.
+        // Two truths of one axis differ in their nodes.
         let namesakes = |of: &str| {
             let all = shown
                 .iter()

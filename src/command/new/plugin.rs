@@ -113,7 +113,7 @@ impl Plugin {
         Ok(names)
     }
 
-    /// Refuses the name of what this program has already, and could not tell from the new one.
+    /// Refuses the name of what this program has already.
     fn free(&self, names: &Names) -> Result<(), Failure> {
         let kind = kinds().get(names.kind.as_str()).and_then(|all| all.first());
         let machine = machines()
@@ -158,7 +158,7 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
         ),
         Role::Source | Role::Sink => (
             format!("a {}", role.word()),
-            "run a graph with it (README.md says more)",
+            "run a graph with it (see README.md)",
         ),
     };
     let graph = format!("graphs/{package}.toml");

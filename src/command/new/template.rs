@@ -1,5 +1,5 @@
-//! Decides what a new plugin crate consists of; the texts are files beside this one, in which `my-node`, `my_node` and
-//! `MyNode` stand for the name, `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
+//! The files of a new plugin crate. Their texts are those of `templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
+//! name, and `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 
@@ -141,7 +141,7 @@ pub struct Athermal<'a> {
     pub version: &'a str,
 }
 
-/// The files of a crate: paths in it and what they say.
+/// The files of a crate: paths in it, and their texts.
 #[must_use]
 pub fn files(names: &Names, role: Role, athermal: &Athermal<'_>) -> Vec<(String, String)> {
     let texts = texts(role).into_iter().map(|(path, text)| {
@@ -171,89 +171,55 @@ fn put(text: &str, words: &[(&str, &str)]) -> String {
     parts.join(meaning)
 }
 
-const LIBRARY: &str = "src/lib.rs";
-const CONFORMANCE: &str = "tests/conformance.rs";
-const LIVE: &str = "tests/live.rs";
-const PROGRAM: &str = "examples/run.rs";
-const GRAPH: &str = "graphs/my-node.toml";
-const MANIFEST: &str = "Cargo.toml";
-const README: &str = "README.md";
-
-/// The text of a file of the template.
-macro_rules! text {
-    ($path:literal) => {
-        include_str!(concat!("template/", $path))
+/// Files of a crate, each with its place there and the template of its text.
+macro_rules! files {
+    ($($path:literal: $template:literal),* $(,)?) => {
+        vec![$(($path, include_str!(concat!("../../../templates/", $template)))),*]
     };
 }
 
 /// The files of a role: paths and texts, with what stands for the names still in them.
+#[rustfmt::skip]
 fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
-    let node = [
-        (MANIFEST, text!("node/Cargo.toml.txt")),
-        (README, text!("node/README.md.txt")),
-    ];
-    let live = [
-        (MANIFEST, text!("live/Cargo.toml.txt")),
-        (GRAPH, text!("live/graph.toml")),
-    ];
-    let machine = [
-        (MANIFEST, text!("machine/Cargo.toml.txt")),
-        (README, text!("machine/README.md.txt")),
-    ];
-    let (shared, own) = match role {
-        Role::Feature => (
-            node,
-            vec![
-                (LIBRARY, text!("feature/lib.rs")),
-                (CONFORMANCE, text!("feature/conformance.rs")),
-                (GRAPH, text!("feature/graph.toml")),
-            ],
-        ),
-        Role::Estimator => (
-            node,
-            vec![
-                (LIBRARY, text!("estimator/lib.rs")),
-                (CONFORMANCE, text!("estimator/conformance.rs")),
-                (GRAPH, text!("estimator/graph.toml")),
-            ],
-        ),
-        Role::Combiner => (
-            node,
-            vec![
-                (LIBRARY, text!("combiner/lib.rs")),
-                (CONFORMANCE, text!("combiner/conformance.rs")),
-                (GRAPH, text!("combiner/graph.toml")),
-            ],
-        ),
-        Role::Source => (
-            live,
-            vec![
-                (LIBRARY, text!("source/lib.rs")),
-                (LIVE, text!("source/live.rs")),
-                (PROGRAM, text!("source/run.rs")),
-                (README, text!("source/README.md.txt")),
-            ],
-        ),
-        Role::Sink => (
-            live,
-            vec![
-                (LIBRARY, text!("sink/lib.rs")),
-                (LIVE, text!("sink/live.rs")),
-                (PROGRAM, text!("sink/run.rs")),
-                (README, text!("sink/README.md.txt")),
-            ],
-        ),
-        Role::Machine => (
-            machine,
-            vec![
-                (LIBRARY, text!("machine/lib.rs")),
-                (CONFORMANCE, text!("machine/conformance.rs")),
-                (GRAPH, text!("machine/graph.toml")),
-            ],
-        ),
+    let mut texts = match role {
+        Role::Feature | Role::Estimator | Role::Combiner => files![
+            "Cargo.toml": "node/Cargo.toml.txt", "README.md": "node/README.md.txt",
+        ],
+        Role::Source | Role::Sink => files![
+            "Cargo.toml": "live/Cargo.toml.txt", "graphs/my-node.toml": "live/graph.toml",
+        ],
+        Role::Machine => files![
+            "Cargo.toml": "machine/Cargo.toml.txt", "README.md": "machine/README.md.txt",
+        ],
     };
-    let ignored = (".gitignore", "/target\n");
-    shared.into_iter().chain(own).chain([ignored]).collect()
+    texts.extend(match role {
+        Role::Feature => files![
+            "src/lib.rs": "feature/lib.rs", "tests/conformance.rs": "feature/conformance.rs",
+            "graphs/my-node.toml": "feature/graph.toml",
+        ],
+        Role::Estimator => files![
+            "src/lib.rs": "estimator/lib.rs", "tests/conformance.rs": "estimator/conformance.rs",
+            "graphs/my-node.toml": "estimator/graph.toml",
+        ],
+        Role::Combiner => files![
+            "src/lib.rs": "combiner/lib.rs", "tests/conformance.rs": "combiner/conformance.rs",
+            "graphs/my-node.toml": "combiner/graph.toml",
+        ],
+        Role::Source => files![
+            "src/lib.rs": "source/lib.rs", "tests/live.rs": "source/live.rs",
+            "examples/run.rs": "source/run.rs", "README.md": "source/README.md.txt",
+        ],
+        Role::Sink => files![
+            "src/lib.rs": "sink/lib.rs", "tests/live.rs": "sink/live.rs",
+            "examples/run.rs": "sink/run.rs", "README.md": "sink/README.md.txt",
+        ],
+        Role::Machine => files![
+            "src/lib.rs": "machine/lib.rs", "tests/conformance.rs": "machine/conformance.rs",
+            "graphs/my-node.toml": "machine/graph.toml",
+        ],
+    });
+    texts.push((".gitignore", "/target\n"));
+    texts
 }
 
 #[cfg(test)]

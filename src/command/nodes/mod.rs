@@ -108,24 +108,24 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         let name = format!("  {port:<17} ");
         print!("{}", paragraph(&name, 6, &what));
     }
-    let schema = Value::from((kind.schema)());
+    let schema = (kind.schema)();
     println!("\nParameters:");
     if kind.framework_keys().contains(&"ahead") {
         let truth = match kind.role {
             RoleName::Feature => "that it is fitted on is measured",
             RoleName::Estimator | RoleName::Combiner => "is predicted",
         };
-        let tell = |what: &str| print!("{}", paragraph("  ", 6, what));
-        tell(&format!(
+        let line = |what: &str| print!("{}", paragraph("  ", 6, what));
+        line(&format!(
             "ahead (duration) – how far ahead of now the truth {truth}; required"
         ));
-        tell(
+        line(
             "train.abs_truth (table) – `{ below = \"…\", above = \"…\" }`: the truths that are fitted on",
         );
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
-            tell(
+            line(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
-                 truths that miss by more than so many times the recent error (both in units of `std_dev` where the kind tells it), \
+                 truths that miss by more than so many times the recent error (both in units of `std_dev` where the kind has it), \
                  nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `armax`",
             );
         }
@@ -137,7 +137,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
 }
 
-/// The output ports that nodes of a kind may have, and what each says.
+/// The output ports that nodes of a kind may have, each with its meaning.
 fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
     let settings = settings(kind);
     let specs: Vec<Role<'_>> = settings.iter().map(|spec| spec.role()).collect();
@@ -189,7 +189,7 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                 port("weights", "the weight of each voter, by its name", weighs),
                 port(
                     "reason",
-                    "the number of why it does what it does, as told above",
+                    "the number of its reason, as listed above",
                     |spec| matches!(spec, Role::Combiner(of) if of.has_reason()),
                 ),
                 port("lower", "where the interval begins", covers),
@@ -228,6 +228,6 @@ fn describe(kind: &Kind) -> Value {
             .iter()
             .map(|(name, summary)| json!({ "name": name, "summary": summary }))
             .collect::<Vec<_>>(),
-        "parameters": Value::from((kind.schema)()),
+        "parameters": (kind.schema)(),
     })
 }

@@ -1,5 +1,4 @@
-//! Explains the parameters of a node type from their schema. Decides how forms and choices are laid out; what they are called
-//! and mean stands beside them in the source.
+//! The parameters of a node type as text, from their schema.
 
 use athermal::core::node::{first_paragraph, inline_toml};
 use serde_json::{Map, Value};
@@ -12,7 +11,7 @@ pub fn explain(schema: &Value) -> String {
     let definitions = schema["$defs"].as_object().unwrap_or(&empty);
     let mut page = Page {
         definitions,
-        told: Vec::new(),
+        explained: Vec::new(),
         text: String::new(),
     };
     page.properties(schema, None, 1);
@@ -22,7 +21,7 @@ pub fn explain(schema: &Value) -> String {
 struct Page<'a> {
     definitions: &'a Map<String, Value>,
     /// What has been explained already, and so is not once more.
-    told: Vec<&'a str>,
+    explained: Vec<&'a str>,
     text: String,
 }
 
@@ -33,7 +32,7 @@ impl<'a> Page<'a> {
             .push_str(&paragraph(&" ".repeat(indent), indent + 4, text));
     }
 
-    /// The parameters of a table, but for the one that tells which form it has.
+    /// The parameters of a table, but for the one that chooses its form.
     fn properties(&mut self, table: &'a Value, tag: Option<&str>, depth: usize) {
         let required: Vec<&str> = table["required"]
             .as_array()
@@ -63,8 +62,8 @@ impl<'a> Page<'a> {
             .and_then(|path| path.rsplit('/').next())
             && let Some(definition) = self.definitions.get(name)
         {
-            if !self.told.contains(&name) {
-                self.told.push(name);
+            if !self.explained.contains(&name) {
+                self.explained.push(name);
                 self.forms(definition, depth);
             }
             return;

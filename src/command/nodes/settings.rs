@@ -1,5 +1,5 @@
-//! Decides in which settings a kind is looked at to see which output ports its nodes may have: one in which all that must be given
-//! is, and those in which one parameter is another.
+//! The settings in which a kind is tried to see its output ports: one with all required parameters, and those in which one parameter
+//! is another.
 
 use athermal::core::node::{Kind, NodeSpec};
 use serde_json::{Map, Value, json};
@@ -9,13 +9,13 @@ const MOST_TRIED: usize = 1000;
 /// How deep values lie in each other that are tried.
 const DEEPEST: usize = 4;
 
-/// The specifications of a kind in these settings; none where its schema does not tell what it takes.
+/// The specifications of a kind in these settings; none where no setting fits its schema.
 pub fn settings(kind: &Kind) -> Vec<Box<dyn NodeSpec>> {
-    let schema = Value::from((kind.schema)());
+    let schema = (kind.schema)();
     let values = Values {
         definitions: &schema["$defs"],
     };
-    let Some((usual, spec)) = values.usual(&schema, kind) else {
+    let Some((usual, spec)) = values.usual(schema, kind) else {
         return Vec::new();
     };
     let mut specs = vec![spec];

@@ -1,6 +1,5 @@
 //! `athermal show`: a graph as a plan, or as a picture; a model by its coefficients.
 
-mod coefficients;
 mod tables;
 
 use std::path::PathBuf;
@@ -9,6 +8,7 @@ use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::nearest;
 use athermal::diagnosis::{is_asked, is_called};
+use athermal::run::model::FittedEstimator;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
@@ -16,16 +16,17 @@ use serde_json::{Value, json};
 use super::model::{self, load_fitted};
 use crate::drawing::{Class, Diagram, Flow, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
-use coefficients::Told;
 
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
 ///
-/// Coefficients are in the units of the data, temperatures as K, with their standard errors where theory tells them: those of
-/// least squares; with a penalty those of the posterior of ridge, on which the port `std_dev` stands too; of `rls` those that
-/// its memory leaves; of models that are identified by the prediction error those that its derivatives tell, with none for a
-/// polynomial that would be unstable if the search had let it. They take the errors of rows for independent, and are too small
-/// where windows overlap. In products regressors count from their means. What follows its own past comes to rest in time
-/// constants; those of a state space are its eigenvalues.
+/// Coefficients are in the units of the data, temperatures as K. Standard errors stand beside them where theory has them.
+/// Least squares: the usual ones. With a penalty: those of the posterior of ridge, on which the port `std_dev` stands too.
+/// `rls`: what its memory leaves. Models identified by the prediction error: those of its derivatives, and none for a
+/// polynomial that would be unstable if the search had let it. All take the errors of rows as independent, and are too small
+/// where windows overlap.
+///
+/// In products regressors count from their means. What follows its own past comes to rest in time constants; those of a
+/// state space are its eigenvalues.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal show graphs/die-tester.toml
@@ -42,7 +43,7 @@ pub struct Show {
     /// Show each instance of a node with `each` on its own
     #[arg(long)]
     expand: bool,
-    /// Tell the coefficients of these estimators only, by node, instance or axis
+    /// Show the coefficients of these estimators only, by node, instance or axis
     #[arg(long = "node", value_name = "NAME")]
     nodes: Vec<String>,
 }
@@ -67,10 +68,10 @@ impl Show {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         if self.format == "coefficients" {
             let model = load_fitted(&self.graph, Wanted::default(), terminal)?;
-            let told = self.told(&model)?;
+            let estimators = self.estimators(&model)?;
             let mut unfitted = model.unfitted();
             unfitted.retain(|node| is_asked(node, &self.nodes));
-            print(tables::text(&told, &unfitted).as_bytes())?;
+            print(tables::text(&estimators, &unfitted).as_bytes())?;
             return Ok(Answer::Fine);
         }
         if !self.nodes.is_empty() && self.format != "json" {
@@ -85,7 +86,7 @@ impl Show {
             "mermaid" => mermaid::text(&drawn()),
             "dot" => dot::text(&drawn()),
             "svg" => svg::text(&drawn()),
-            "json" => format!("{:#}\n", facts(&drawn(), &self.told(&model)?)),
+            "json" => format!("{:#}\n", facts(&drawn(), &self.estimators(&model)?)),
             _ => plan::text(&model.plan, self.expand),
         };
         print(text.as_bytes())?;
@@ -93,17 +94,17 @@ impl Show {
     }
 
     /// The coefficients of the estimators asked for; every name must be that of one.
-    fn told(&self, model: &Model) -> Result<Vec<Told>, Failure> {
-        let mut told = coefficients::told(model);
+    fn estimators(&self, model: &Model) -> Result<Vec<FittedEstimator>, Failure> {
+        let mut estimators = model.estimators();
         let unfitted = model.unfitted();
-        let known = told.iter().map(|of| &of.node).chain(&unfitted);
+        let known = estimators.iter().map(|of| &of.node).chain(&unfitted);
         let known: Vec<&str> = known.map(String::as_str).collect();
         let is_known = |name: &&String| known.iter().any(|of| is_called(of, name));
         if let Some(name) = self.nodes.iter().find(|name| !is_known(name)) {
             return Err(Failure::Request(no_estimator(name, &known)));
         }
-        told.retain(|of| is_asked(&of.node, &self.nodes));
-        Ok(told)
+        estimators.retain(|of| is_asked(&of.node, &self.nodes));
+        Ok(estimators)
     }
 }
 
@@ -123,7 +124,7 @@ fn no_estimator(name: &str, known: &[&str]) -> String {
     format!("there is no fitted estimator `{name}`{near} ({there})")
 }
 
-fn facts(diagram: &Diagram, told: &[Told]) -> Value {
+fn facts(diagram: &Diagram, estimators: &[FittedEstimator]) -> Value {
     let boxes: Vec<Value> = diagram
         .boxes
         .iter()
@@ -151,8 +152,8 @@ fn facts(diagram: &Diagram, told: &[Told]) -> Value {
         })
         .collect();
     let mut facts = json!({ "name": diagram.name, "boxes": boxes, "arrows": arrows });
-    if !told.is_empty() {
-        facts["estimators"] = json!(told);
+    if !estimators.is_empty() {
+        facts["estimators"] = json!(estimators);
     }
     facts
 }

@@ -1,48 +1,50 @@
-//! Decides how the coefficients of a model look in text for people.
+//! The coefficients of a model as tables for a terminal.
 
 use std::fmt::Write as _;
 
 use athermal::core::node::Mode;
 
-use super::coefficients::{Found, Told};
+use athermal::run::model::{EstimatorParts, FittedEstimator};
 use athermal_analysis::figures::{digits, paragraph, stated, table, time};
 
-/// The longest name that numbers stand beside; what is longer is told above them.
+/// The longest name that numbers stand beside; longer ones stand above them.
 const LONGEST_NAME: usize = 36;
 
-/// All that is told of a model.
-pub(super) fn text(told: &[Told], unfitted: &[String]) -> String {
+/// The text about a model.
+pub(super) fn text(estimators: &[FittedEstimator], unfitted: &[String]) -> String {
     let mut text = String::new();
-    for of in told {
-        let found = of.found.as_ref();
-        text.push_str(&found.map_or_else(|| untold(of), |found| estimator(of, found)));
+    for of in estimators {
+        let found = of.parts.as_ref();
+        text.push_str(
+            &found.map_or_else(|| without_coefficients(of), |found| estimator(of, found)),
+        );
         text.push('\n');
     }
     for node in unfitted {
         let _ = writeln!(text, "{node} could not be fitted\n");
     }
-    let all = told.iter().filter_map(|of| of.found.as_ref());
+    let all = estimators.iter().filter_map(|of| of.parts.as_ref());
     let mut all = all.flat_map(|found| &found.coefficients);
     if all.any(|of| of.standard_error.is_some()) {
         text.push_str(
             "std. error: as if the errors of rows were independent, so too small where\n\
              windows overlap; with a penalty, the spread of the posterior\n",
         );
-        let mut found = told.iter().filter_map(|of| of.found.as_ref());
+        let mut found = estimators.iter().filter_map(|of| of.parts.as_ref());
         if found.any(is_bounded) {
             text.push_str(
                 "polynomials without one are held by the bound of stability, or the rows hardly\n\
-                 tell them: none is known\n",
+                 determine them: none is known\n",
             );
         }
-    } else if told.is_empty() && unfitted.is_empty() {
+    } else if estimators.is_empty() && unfitted.is_empty() {
         text.push_str("nothing in the graph is fitted\n");
     }
     text
 }
 
 /// Whether some polynomials have standard errors, and others have not.
-fn is_bounded(found: &Found) -> bool {
+fn is_bounded(found: &EstimatorParts) -> bool {
     let of_polynomials = found
         .coefficients
         .iter()
@@ -52,15 +54,15 @@ fn is_bounded(found: &Found) -> bool {
     !with.is_empty() && !without.is_empty()
 }
 
-fn untold(of: &Told) -> String {
-    let Told {
+fn without_coefficients(of: &FittedEstimator) -> String {
+    let FittedEstimator {
         node, kind, truth, ..
     } = of;
-    format!("{node} ({kind} of {truth}): nodes of this type do not tell their coefficients\n")
+    format!("{node} ({kind} of {truth}): nodes of this type have no coefficients to show\n")
 }
 
-fn estimator(of: &Told, found: &Found) -> String {
-    let Told {
+fn estimator(of: &FittedEstimator, found: &EstimatorParts) -> String {
+    let FittedEstimator {
         node,
         kind,
         truth,
@@ -107,7 +109,7 @@ fn estimator(of: &Told, found: &Found) -> String {
 }
 
 /// The equation that the polynomials are of.
-fn equation(found: &Found) -> String {
+fn equation(found: &EstimatorParts) -> String {
     let all = || found.coefficients.iter();
     let has = |polynomial: char| all().any(|of| of.polynomial == Some(polynomial));
     let has_constant = all().any(|of| of.polynomial.is_none());
@@ -174,7 +176,7 @@ fn name_lines(name: &str) -> Vec<String> {
 }
 
 /// From where regressors in products count, and how far.
-fn held(found: &Found) -> String {
+fn held(found: &EstimatorParts) -> String {
     let factors = || found.coefficients.iter().flat_map(|of| &of.factors);
     let mut regressors: Vec<&str> = Vec::new();
     for factor in factors().filter(|of| of.about.is_some() || of.held.is_some()) {
@@ -212,7 +214,7 @@ fn fading(mode: &Mode) -> String {
     }
 }
 
-/// How many digits of a coefficient are told: five, and where it is known better, up to the second of its standard error.
+/// How many digits of a coefficient are shown: five, and where it is known better, up to the second of its standard error.
 fn places(value: f64, error: Option<f64>) -> usize {
     let known = error.map_or(0.0, |error| (value / error).abs().log10().ceil() + 2.0);
     // As a number of digits NaN is none.
@@ -224,33 +226,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_coefficient_is_told_to_the_second_digit_of_its_standard_error() {
-        let told = |value: f64, error| digits(value, places(value, error));
-        assert_eq!(told(1_000_010.0, Some(0.0182)), "1.000010000e6");
-        assert_eq!(told(-0.523_456, Some(0.1)), "-0.52346");
-        assert_eq!(told(98.765_432_1, Some(0.000_12)), "98.765432");
-        assert_eq!(told(2.0, Some(0.0)), "2.00000000000");
-        assert_eq!(told(0.0, Some(0.0)), "0");
-        assert_eq!(told(1.5, None), "1.5000");
+    fn a_coefficient_is_shown_to_the_second_digit_of_its_standard_error() {
+        let shown = |value: f64, error| digits(value, places(value, error));
+        assert_eq!(shown(1_000_010.0, Some(0.0182)), "1.000010000e6");
+        assert_eq!(shown(-0.523_456, Some(0.1)), "-0.52346");
+        assert_eq!(shown(98.765_432_1, Some(0.000_12)), "98.765432");
+        assert_eq!(shown(2.0, Some(0.0)), "2.00000000000");
+        assert_eq!(shown(0.0, Some(0.0)), "0");
+        assert_eq!(shown(1.5, None), "1.5000");
     }
 
     #[test]
-    fn a_type_that_does_not_tell_its_coefficients_is_said_to() {
-        let of = Told {
+    fn a_type_without_coefficients_is_reported() {
+        let of = FittedEstimator {
             node: "model.Z".to_owned(),
             kind: "my_node",
             truth: "drift.Z".to_owned(),
             unit: "nm/min".to_owned(),
-            found: None,
+            parts: None,
         };
         assert_eq!(
-            untold(&of),
-            "model.Z (my_node of drift.Z): nodes of this type do not tell their coefficients\n"
+            without_coefficients(&of),
+            "model.Z (my_node of drift.Z): nodes of this type have no coefficients to show\n"
         );
     }
 
     #[test]
-    fn what_does_not_come_to_rest_is_said_to() {
+    fn what_does_not_come_to_rest_stays_or_grows() {
         let mode = |time_constant_s: f64| Mode {
             of: "A".to_owned(),
             time_constant_s,

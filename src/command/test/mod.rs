@@ -20,9 +20,10 @@ use work::Status;
 
 /// Run the tests that graph files carry
 ///
-/// Each `[[tests]]` of a graph names data (files, a simulated machine, or made-up measurements), faults of sensors and what must
-/// come out; the graph is fitted and run over the data by the engine that runs live. One line is printed per test, in the order of
-/// the files, and the figures of those that fail. The exit status is 1 if any fails, 2 if a file has mistakes, 3 if one cannot be read.
+/// Each `[[tests]]` of a graph names data (files, a simulated machine, or made-up measurements), faults of sensors, and what
+/// must come out. The graph is fitted and run over the data by the engine that runs live. One line is printed per test, in
+/// the order of the files, with the figures of those that fail. The exit status is 1 if any fails, 2 if a file has mistakes,
+/// 3 if one cannot be read.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  athermal test graphs/die-tester.toml\n  \
                         athermal test graphs/*.toml --junit tests.xml\n  \
@@ -42,7 +43,7 @@ pub struct Test {
 }
 
 impl Test {
-    /// Runs the tests and tells their results.
+    /// Runs the tests and prints their results.
     ///
     /// # Errors
     /// When a file has mistakes, data cannot be read, or the results not be written.
@@ -53,8 +54,8 @@ impl Test {
             .as_deref()
             .is_some_and(|path| path.as_os_str() == "-");
         if printed && terminal.format == Format::Json {
-            let told = "--junit -: the results as JUnit XML and as JSON cannot both go to standard output; name a file for the XML";
-            return Err(Failure::Request(told.to_owned()));
+            let message = "--junit -: the results as JUnit XML and as JSON cannot both go to standard output; name a file for the XML";
+            return Err(Failure::Request(message.to_owned()));
         }
         if let Some(path) = &self.junit {
             check_apart("--junit", path, self.graphs.iter().map(|path| &**path))?;
@@ -79,13 +80,13 @@ impl Test {
             }
         }
         let people = terminal.format != Format::Json && !printed;
-        let mut told = None;
+        let mut shown = None;
         let results = work::run(&suites, self.threads.count(), &mut |result| {
             if people {
                 let suite = &suites[result.suite];
-                if told != Some(result.suite) && !terminal.quiet {
+                if shown != Some(result.suite) && !terminal.quiet {
                     offer(format_args!("{}\n", suite.path));
-                    told = Some(result.suite);
+                    shown = Some(result.suite);
                 }
                 if !(terminal.quiet && matches!(result.status, Status::Passed)) {
                     offer(format_args!("{}", report::lines(suite, result)));

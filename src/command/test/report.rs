@@ -100,7 +100,7 @@ impl<'a> Summary<'a> {
             Status::Passed | Status::Failed => None,
         });
         match broken.max() {
-            Some(status) => Err(Failure::Told(status)),
+            Some(status) => Err(Failure::Exit(status)),
             None if self.failed() > 0 => Ok(Answer::No),
             None => Ok(Answer::Fine),
         }

@@ -1,4 +1,4 @@
-//! Decides how graph files become plans with tests; all mistakes of all files are told together.
+//! Graph files as plans with tests; all mistakes of all files are reported together.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -75,7 +75,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
     }
     if diagnostics.has_errors() {
         terminal.diagnostics(&diagnostics, &sources);
-        return Err(Failure::Told(status_of(&diagnostics)));
+        return Err(Failure::Exit(status_of(&diagnostics)));
     }
     terminal.doubts(&diagnostics, &sources);
     Ok(suites)

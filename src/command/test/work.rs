@@ -1,5 +1,4 @@
-//! Decides which thread fits what and runs which test, and that results come in the order of the files; a fit that several tests
-//! of a graph share is made once.
+//! Which thread fits what and runs which test. Results come in the order of the files; a fit that several tests share is made once.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -60,7 +59,7 @@ impl Broken {
         match failure.into() {
             Failure::Outside(message) => Self { message, status: 3 },
             Failure::Request(message) => Self { message, status: 2 },
-            Failure::Graph { .. } | Failure::Told(_) => Self {
+            Failure::Graph { .. } | Failure::Exit(_) => Self {
                 message: "the graph has mistakes".to_owned(),
                 status: 2,
             },
@@ -68,7 +67,7 @@ impl Broken {
     }
 }
 
-/// What a job gives, or what a node that panicked in it says: other tests wait for its fit.
+/// The result of a job, or the message of a node that panicked in it: other tests wait for its fit.
 fn caught<T>(job: impl FnOnce() -> Result<T, Broken>) -> Result<T, Broken> {
     panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| {
         Err(Broken {
@@ -93,7 +92,7 @@ struct Made {
     warnings: Vec<String>,
 }
 
-/// Runs all tests; `tell` is called for each as soon as it and all before it are done.
+/// Runs all tests; `report` is called for each as soon as it and all before it are done.
 pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) -> Vec<Ran> {
     let tests: Vec<(usize, usize)> = suites
         .iter()
@@ -143,12 +142,12 @@ pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) 
             });
         }
         drop(done);
-        let mut told = 0;
+        let mut shown = 0;
         for (number, ran) in results {
             waiting[number] = Some(ran);
-            while let Some(Some(ran)) = waiting.get(told) {
+            while let Some(Some(ran)) = waiting.get(shown) {
                 tell(ran);
-                told += 1;
+                shown += 1;
             }
         }
     });
@@ -188,8 +187,8 @@ impl Opened {
     fn warnings(&self) -> Vec<String> {
         match self {
             Self::Files(dataset) => {
-                let told = of_files(&dataset.reports());
-                told.iter().map(ToString::to_string).collect()
+                let messages = of_files(&dataset.reports());
+                messages.iter().map(ToString::to_string).collect()
             }
             Self::Simulated(_) => Vec::new(),
         }

@@ -58,13 +58,13 @@ expect = [{ of = "thermal", beats = ["thermal:std_dev"] }]
     let expected = [
         (
             30,
-            "`thermal:std_dev.X` tells of the prediction `thermal.X` and cannot be the truth",
+            "`thermal:std_dev.X` describes the prediction `thermal.X` and cannot be the truth",
         ),
-        (35, "`vote:weights.weight-thermal` tells of the prediction"),
-        (39, "`thermal:learning.X` tells of the prediction"),
+        (35, "`vote:weights.weight-thermal` describes the prediction"),
+        (39, "`thermal:learning.X` describes the prediction"),
         (
             43,
-            "`thermal:std_dev.X` tells of the prediction `thermal` and is none",
+            "`thermal:std_dev.X` describes the prediction `thermal` and is none",
         ),
         (49, "`thermal:std_dev` does not predict `drift.X`"),
     ];

@@ -32,9 +32,9 @@ fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_t
     );
     assert!(cause.truth.best > 0.95, "{}", cause.truth.best);
     let bystander = of("gradients.b@150s");
-    assert!(!bystander.truth.says_something(), "{bystander:?}");
+    assert!(!bystander.truth.is_significant(), "{bystander:?}");
     // What the model leaves still follows the sensor that it does not use.
-    assert!(cause.residual.best > 0.9 && cause.residual.says_something());
+    assert!(cause.residual.best > 0.9 && cause.residual.is_significant());
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn of_many_features_that_have_nothing_to_do_with_a_truth_hardly_ever_one_seems_t
         let found = lag::lags(&model, &table, &observation, &[]).unwrap();
         let left = || found[0].features.iter().map(|of| &of.residual);
         assert_eq!(left().count(), 12);
-        said += usize::from(left().any(|of| of.says_something()));
+        said += usize::from(left().any(|of| of.is_significant()));
         beyond_three += usize::from(left().any(|of| of.best.abs() > 3.0 * of.error));
     }
     assert!(said <= 2, "{said} of 40");

@@ -331,7 +331,7 @@ expect = [
     let path = scratch.file("graph.toml", text);
     athermal(&[&"test", &path]).ended(0);
     athermal(&[&"check", &path]).ended(0).tells(&[
-        "nothing that comes out depends on the node `model",
+        "no output depends on the node `model",
         "or leave it out of the module",
     ]);
     for (right, wrong, told) in [

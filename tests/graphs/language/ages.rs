@@ -201,10 +201,10 @@ warm = "warm"
 fn a_held_sample_that_nothing_bounds_is_a_mistake() {
     let told = problems(&held("\"warm\"").replace("max_age = \"1min\"", ""));
     assert!(
-        told.contains("nothing says how long a value of `temperature.room` counts"),
+        told.contains("nothing defines how long a value of `temperature.room` counts"),
         "{told}"
     );
-    let advice = "say `max_age` on the signal `temperature`, or `inputs.";
+    let advice = "set `max_age` on the signal `temperature`, or `inputs.";
     assert!(told.contains(advice), "{told}");
 }
 

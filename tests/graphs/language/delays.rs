@@ -126,7 +126,7 @@ delay = "1 tick"
 unit = "nm"
 "#;
     let told = problems(&graph(nodes, "now"));
-    let advice = "say it where it is read: `inputs.signal = { from = \"…\", max_age = \"1min\" }`";
+    let advice = "set it where it is read: `inputs.signal = { from = \"…\", max_age = \"1min\" }`";
     assert!(told.contains(advice), "{told}");
     let heeded = nodes.replace(
         "inputs.signal = [\"position.Z\", \"before\"]",

@@ -19,15 +19,15 @@ fn what_is_wrong_with_a_parameter_is_told_though_the_inputs_are_wrong_too() {
             "type = \"hampel\"\nwindow = \"1min\"\nthreshold = -3.0",
             "`threshold` is -3",
         ),
-        ("type = \"lag\"\nlags = []", "there is no lag"),
+        ("type = \"lag\"\nlags = []", "`lags` has 0 values"),
         ("type = \"difference\"\nover = \"0s\"", "`over` is 0s"),
         ("type = \"resample\"\nevery = \"0s\"", "`every` is 0s"),
         (
             "type = \"first_order\"\ntime_constants = []",
-            "there must be one",
+            "`time_constants` has 0 values",
         ),
         ("type = \"scale\"\nfactor = inf", "`factor` is inf"),
-        ("type = \"sum\"\nweights = [inf]", "a weight is inf"),
+        ("type = \"sum\"\nweights = [inf]", "`weights` is inf"),
         (
             "type = \"health\"\nnoise_samples = 1",
             "`noise_samples` is 1",

@@ -1,4 +1,4 @@
-//! Decides the colours and lines of all charts, light and dark.
+//! The colours and lines of all charts, light and dark.
 
 /// Lines and areas by class.
 pub const STYLE: &str = "\

@@ -1,6 +1,4 @@
-//! Series as pictures: [`Chart`] says what is drawn, as SVG for a page or a file.
-//!
-//! Decides where things stand in a picture; not how numbers fall on an axis (`scale`), nor how shapes are written (`svg`).
+//! Series as pictures: [`Chart`] holds what is drawn and lays it out; `scale` sets the axes and `svg` writes the shapes.
 
 mod colours;
 mod plot;

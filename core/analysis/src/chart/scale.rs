@@ -1,4 +1,4 @@
-//! Decides how numbers fall on an axis: ranges, round marks, decimation of lines that keeps extremes and of dots that keeps density.
+//! How numbers fall on an axis: ranges, round marks, decimation of lines that keeps extremes and of dots that keeps density.
 
 /// At most about twice as many points as `buckets`: of each stretch of x the lowest and the highest, in their order.
 pub(super) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)> {

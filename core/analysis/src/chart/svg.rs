@@ -1,4 +1,4 @@
-//! Decides how shapes are written as SVG.
+//! How shapes are written as SVG.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! Decides how the predictions of several graphs are set against each other: the same truths, on the instants at which all of them
+//! How the predictions of several graphs are set against each other: the same truths, on the instants at which all of them
 //! are valid.
 
 use std::collections::{BTreeMap, BTreeSet};

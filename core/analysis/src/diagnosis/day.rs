@@ -1,4 +1,4 @@
-//! Decides how fits on some days of a recording are scored on the others: each day left out once, and how many are needed.
+//! How fits on some days of a recording are scored on the others: each day left out once, and how many are needed.
 //!
 //! Days that are left out are cut out of the recording, so that no window of a row that is fitted on reaches into them; scores
 //! come from a pass over the whole of it. What a model learns at run time it learns there too.
@@ -23,7 +23,7 @@ pub const ENOUGH: f64 = 1.05;
 pub const MOST_DAYS: usize = 60;
 /// How many fits on as many days, from different places of the recording, make a point of the learning curve.
 const PLACINGS: usize = 3;
-/// Numbers of days that are tried; all of the last few would tell the same.
+/// Numbers of days that are tried; the last few would all show the same.
 const NUMBERS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 11, 15, 21, 30, 42];
 
 /// What fits on some days are worth on others.
@@ -187,7 +187,7 @@ pub fn count(observation: &Observation, day: Duration) -> usize {
     Calendar::new(observation, day).count()
 }
 
-/// Fits a model's graph anew on some days and scores it on the others. `progress` is told how many fits of how many are done.
+/// Fits a model's graph anew on some days and scores it on the others. `progress` gets the number of fits done, and of all.
 /// None where there are fewer than two days, or more than [`MOST_DAYS`].
 ///
 /// # Errors
@@ -397,7 +397,7 @@ struct SomeRows<'a> {
     segment: u32,
     given: bool,
     broken: bool,
-    /// A row that waits for the break before it to be told.
+    /// A row that waits until the break before it is reported.
     waiting: Option<(Instant, Vec<f64>)>,
 }
 

@@ -1,7 +1,7 @@
-//! Decides whether a correction is told by positions that it moves itself; not what it is worth.
+//! Whether a correction depends on positions that it moves itself.
 //!
-//! Where the rate that is integrated goes by past truths, by lags, a vote or learning, and these are made of measured positions, a
-//! machine under the correction shows a drift that is not there: what the correction took away. An `uncorrected` node puts it back.
+//! The rate that is integrated may depend on past truths: by lags, by a vote, or by learning. Where these truths are positions, a
+//! machine under correction shows a drift that is not there. An `uncorrected` node puts back what the correction took away.
 
 use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 
@@ -39,7 +39,7 @@ fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
     read
 }
 
-/// What is told of a graph whose correction goes by what it moves; nothing of others.
+/// The warning about a graph whose correction goes by what it moves; none for others.
 #[must_use]
 pub fn in_words(plan: &Plan) -> Option<String> {
     let channels = corrected_channels(plan);

@@ -1,11 +1,10 @@
-//! Decides what time usually lies between two samples: a quantile of the gaps, which neither a pause nor a few missing samples move.
-//! Not what counts as a sample.
+//! The usual time between two samples: a quantile of the gaps, which neither a pause nor a few missing samples move.
 
 use std::collections::BTreeMap;
 
 use athermal_core::time::Duration;
 
-/// Gaps within such a part of each other are one, told by their mean: a regular series has its exact interval, and an irregular one
+/// Gaps within such a part of each other are one, given by their mean: a regular series has its exact interval, and an irregular one
 /// costs no more memory than a regular one.
 const SHARES_OF_OCTAVE: i64 = 64;
 

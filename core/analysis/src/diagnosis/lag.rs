@@ -1,4 +1,4 @@
-//! Decides how features are compared with truths and residuals over a range of lags (Mandelli, Dankwart and Napoli, Fig. 3).
+//! How features are compared with truths and residuals over a range of lags (Mandelli, Dankwart and Napoli, Fig. 3).
 //!
 //! Features, truths and residuals are set on one regular grid: of a feature the last value, of a truth the next one, as long as
 //! each counts. At a positive lag the truth follows the feature, so that the feature can tell of it beforehand.
@@ -25,7 +25,7 @@ const MOST_LAGS: i64 = 60;
 const FEWEST_LAGS: i64 = 20;
 /// Instants of the grid, at most.
 const MOST_INSTANTS: i64 = 20_000;
-/// Lags are told up to this share of a recording (Box and Jenkins 1976, section 2.1.6): beyond, too little is left to compare.
+/// Lags are shown up to this share of a recording (Box and Jenkins 1976, section 2.1.6): beyond, too little is left to compare.
 const SHARE_OF_LENGTH: i64 = 4;
 /// A lag at which fewer than this share of the pairs of others are left is not set against them.
 const SHARE_OF_PAIRS: usize = 4;
@@ -82,7 +82,7 @@ pub struct Correlogram {
 impl Correlogram {
     /// Whether chance alone would hardly give a correlation as large.
     #[must_use]
-    pub fn says_something(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.best.abs() > self.bound
     }
 }
@@ -116,8 +116,8 @@ pub fn lags(
     let pause = Duration::from_ns(interval.as_ns().saturating_mul(FEWEST_LAGS));
     let length = observation.rows.length(pause);
     let longest = Duration::from_ns(length.as_ns() / MOST_INSTANTS);
-    let told = Duration::from_ns(length.as_ns() / SHARE_OF_LENGTH);
-    let reach = reach::of_estimators(plan).min(told);
+    let share = Duration::from_ns(length.as_ns() / SHARE_OF_LENGTH);
+    let reach = reach::of_estimators(plan).min(share);
     let widest = Duration::from_ns(reach.as_ns() / MOST_LAGS);
     let step = interval.max(longest).max(widest).max(Duration::from_ns(1));
     let main =
@@ -235,7 +235,7 @@ fn bound(features: &mut [FeatureLags], side: fn(&mut FeatureLags) -> &mut Correl
 }
 
 /// The channels that estimators of a truth are offered, the truth itself and predictions of it left out: those of good voters go
-/// with it best, and tell nothing of what it hangs on.
+/// with it best, and do not show what it depends on.
 fn features(plan: &Plan, truth: usize) -> Vec<usize> {
     let mut slots = Vec::new();
     for node in &plan.nodes {

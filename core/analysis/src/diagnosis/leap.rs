@@ -1,9 +1,8 @@
-//! Decides where a series leaps from one sample to the next, as that of a sensor does which fails, or of a position that is zeroed
-//! anew; not what follows from it.
+//! Where a series leaps from one sample to the next: a sensor that fails, or a position that is zeroed anew.
 //!
-//! A body changes its temperature, and a position drifts, step by step. A leap is 20 times as large as nineteen in twenty
-//! of the changes between two samples, or, where leaps are many, 200 times as large as three in four, and stands alone: the changes before and after it are less than a tenth of it, or take it
-//! back. A heater that is switched on makes large changes too, but many of them, one after the other.
+//! Temperatures and positions change step by step. A leap is 20 times as large as nineteen in twenty of the changes between two
+//! samples. Where leaps are many, it is 200 times as large as three in four of them. It also stands alone: the changes before and
+//! after it are less than a tenth of it, or take it back. A heater that is switched on makes many large changes in a row.
 
 use std::fmt;
 

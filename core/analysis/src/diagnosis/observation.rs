@@ -1,4 +1,4 @@
-//! Decides what is written down of one pass of a model over a recording; not what follows from it.
+//! What one pass of a model over a recording yields.
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;

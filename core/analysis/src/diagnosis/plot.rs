@@ -1,5 +1,4 @@
-//! Decides which pictures a diagnosis has, and how correlations and responses are shown wherever they are; how a picture is drawn
-//! is decided by [`crate::chart`].
+//! The pictures of a diagnosis; [`crate::chart`] draws them.
 
 use super::day::{CurvePoint, DayScore, Days, ENOUGH};
 use super::lag::{Correlogram, FeatureLags, Lags};

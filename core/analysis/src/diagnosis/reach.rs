@@ -1,5 +1,4 @@
-//! Decides over how long the answers and the lags of estimators are looked at: as far back as what they read reaches. What votes and
-//! intervals remember of errors is not theirs, however long that is.
+//! Over how long responses and lags of estimators are looked at: as far back as what they read reaches.
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::time::Duration;

@@ -1,4 +1,4 @@
-//! Decides how well the data determine what an estimator has learned: condition, variance inflation, and what each regressor
+//! How well the data determine what an estimator has learned: condition, variance inflation, and what each regressor
 //! moves.
 
 use athermal_core::compile::{PlannedNode, PlannedRole, TrainingLimits};
@@ -38,7 +38,7 @@ pub struct RegressorFacts {
     /// How much the prediction moves when it moves by one standard deviation and the others stay at their means.
     pub effect: f64,
     /// Its variance inflation factor; NaN (null in JSON) where it is constant, and where there is no condition number, infinite
-    /// (`"inf"`) where the others tell the same.
+    /// (`"inf"`) where the others determine it.
     #[serde(serialize_with = "or_null")]
     pub inflation: f64,
 }
@@ -182,12 +182,12 @@ impl Collecting<'_> {
         };
         let node = &model.plan.nodes[self.node];
         let truth = &model.plan.channels[self.truth].channel;
-        let told = found.as_ref().filter(|_| !filters(node, self.predictor));
+        let collinearity = found.as_ref().filter(|_| !filters(node, self.predictor));
         Design {
             node: node.instance(),
             unit: truth.unit.difference().to_string(),
             rows: gram.count(),
-            condition: told.map_or(f64::NAN, |of| of.condition),
+            condition: collinearity.map_or(f64::NAN, |of| of.condition),
             regressors: self
                 .predictor
                 .uses()
@@ -200,7 +200,7 @@ impl Collecting<'_> {
                     } else {
                         f64::NAN
                     },
-                    inflation: told.map_or(f64::NAN, |of| of.inflation[nth]),
+                    inflation: collinearity.map_or(f64::NAN, |of| of.inflation[nth]),
                 })
                 .collect(),
         }

@@ -1,4 +1,4 @@
-//! Decides whether what predictions leave of a truth is white, so that nothing in its own past could still improve them.
+//! Whether what predictions leave of a truth is white, so that nothing in its own past could still improve them.
 //!
 //! Truths over windows that overlap share noise, and forecasts made before the last error was known repeat it. So residuals are
 //! taken one per window or horizon, whichever is longer: those of a perfect model are white, and others are not. Where truths are

@@ -1,4 +1,4 @@
-//! Decides how a fitted estimator answers a change of one sensor: step and impulse responses, reconstructed from the frame.
+//! How a fitted estimator answers a change of one sensor: step and impulse responses, reconstructed from the frame.
 //!
 //! The impulse response of a linear estimator is `Γ = Σ c_k e_k`, its coefficients times what each feature makes of an impulse
 //! (Mandelli, Dankwart and Napoli, section 3.2). It is found by asking the graph itself: all sensors rest at their means, one of
@@ -72,7 +72,7 @@ pub struct Response {
     /// Where the step response comes to rest, in the unit of the truth: the static gain. None where it comes back to nothing, and
     /// where it does not come to rest.
     pub gain: Option<f64>,
-    /// The time in s at which the step response is first as large in size as it gets, within the times that are told.
+    /// The time in s at which the step response is first as large in size as it gets, within the times shown.
     pub peak_s: f64,
     /// The step response there.
     pub peak: f64,

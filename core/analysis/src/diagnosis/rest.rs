@@ -1,7 +1,7 @@
-//! Decides how a sensor rests so that nodes which watch over sensors still take it for alive, and what is told where they do not.
+//! How a sensor rests so that nodes that watch over sensors still find it alive.
 //!
 //! A watch finds a sensor stuck that repeats its value, or dead that has no noise. So where rest makes a node silent, the sensor
-//! goes from one side of its mean to the other, sample by sample: by next to nothing, or else by as much as has its own noise.
+//! goes from one side of its mean to the other, sample by sample: by next to nothing, or else by its own noise.
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;
@@ -37,7 +37,7 @@ impl Rest {
     }
 }
 
-/// What could not be told of a sensor, since a node gave nothing when it was tried.
+/// What could not be found of a sensor, since a node gave nothing when it was tried.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Untold {
     /// The sensor; none where nothing came even when all of them rested.

@@ -1,4 +1,4 @@
-//! Decides what each sensor contributes to predictions: how much they move with it, and what they are worth without it.
+//! What each sensor contributes to predictions: how much they move with it, and what they are worth without it.
 //!
 //! The recording is run again with the sensor at rest at its mean, through the whole graph, so that a vote that turns to other
 //! voters is seen to do so. Nothing is fitted anew: a sensor that others could replace after a fit still contributes.
@@ -35,7 +35,8 @@ pub struct Contribution {
     pub rmse_at_rest: f64,
 }
 
-/// What every sensor contributes to every prediction, and of which it cannot be told; measured channels of which truths are made are not taken for sensors.
+/// What every sensor contributes to every prediction, and the sensors of which it cannot be found. Channels that truths are made of
+/// are no sensors.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.

@@ -1,5 +1,5 @@
-//! Decides how high a drift stands above its standard error, against the window that it is taken over (Mandelli, Dankwart and Napoli,
-//! Fig. 2); which window to choose is decided elsewhere.
+//! How high a drift stands above its standard error, against the window that it is taken over (Mandelli, Dankwart and Napoli,
+//! Fig. 2).
 //!
 //! A wider window has less noise in its slope (as `T^−3/2` for evenly spaced samples) but smooths the drift away. The spread of the
 //! slope is set against its standard error from the residuals of its own lines. These hold the bend of the drift beside the noise

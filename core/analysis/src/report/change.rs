@@ -1,4 +1,4 @@
-//! Decides what follows each change of the set point: how long until it is settled, and the largest loss until the next.
+//! What follows each change of the set point: how long until it is settled, and the largest loss until the next.
 
 use serde::Serialize;
 
@@ -141,7 +141,7 @@ impl Changes {
 
     /// The changes in order, and the largest losses after those of one kind; up to half of what counts as a change, set points
     /// are the same.
-    pub(super) fn told(self, change: f64) -> (Vec<Settling>, Vec<StepLoss>) {
+    pub(super) fn steps(self, change: f64) -> (Vec<Settling>, Vec<StepLoss>) {
         let steps = steps(self.steady, &self.settling, change);
         (self.settling, steps)
     }
@@ -174,7 +174,7 @@ fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<St
             }),
         }
     }
-    // Of a recording without a set point there is nothing to tell but the losses.
+    // A recording without a set point has losses only.
     let steady = steady.filter(|steady| !steady.from.is_nan());
     steady.into_iter().chain(steps).collect()
 }
@@ -217,7 +217,7 @@ mod tests {
         changes.go_on(0.0, f64::NAN, [f64::NAN; 2]);
         changes.set(50.0);
         changes.go_on(600.0, 1.0, [f64::NAN; 2]);
-        let (settling, steps) = changes.told(3.0);
+        let (settling, steps) = changes.steps(3.0);
         assert_eq!(
             (settling[0].largest_without, settling[0].largest_with),
             (None, None)
@@ -233,7 +233,7 @@ mod tests {
         assert!(steps(changes.steady.clone(), &[], 3.0).is_empty());
         changes.set(20.0);
         changes.lose([0.2, 0.2]);
-        let (_, steps) = changes.told(3.0);
+        let (_, steps) = changes.steps(3.0);
         let steady = &steps[0];
         assert_eq!((steady.from, steady.to), (20.0, 20.0));
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Decides how far each axis departs from where it was, without and with its correction, and what held the correction back.
+//! How far each axis departs from where it was, without and with its correction, and what held the correction back.
 
 use std::collections::BTreeMap;
 

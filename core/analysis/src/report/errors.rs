@@ -1,4 +1,4 @@
-//! Decides how the errors of a prediction are summarised: their spread and how long they last.
+//! How the errors of a prediction are summarised: their spread and how long they last.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! Decides from where hours are counted: dates from the first of the data, all other times as the data have them.
+//! From where hours are counted: dates from the first of the data, all other times as the data have them.
 
 use jiff::Timestamp;
 

@@ -1,4 +1,4 @@
-//! Decides what a correction does for light: losses and waits without and with it, of one optical loss.
+//! What a correction does for light: losses and waits without and with it, of one optical loss.
 
 use std::fmt::Write as _;
 
@@ -67,7 +67,7 @@ impl Light {
         changes.go_on(at_s, of.since, of.settled);
     }
 
-    /// Works out what all rows together tell.
+    /// Works out the figures over all rows.
     pub(super) fn finish(&mut self, changes: Changes, loss: &TrackLoss) {
         let below = |losses: &Series| {
             let low = losses.value.iter().filter(|loss| **loss < self.loss_limit);
@@ -76,7 +76,7 @@ impl Light {
         self.below_limit = (!self.loss_with.value.is_empty())
             .then(|| (below(&self.loss_without), below(&self.loss_with)));
         let change = loss.settled.as_ref().map_or(0.0, |settled| settled.change);
-        (self.settling, self.steps) = changes.told(change);
+        (self.settling, self.steps) = changes.steps(change);
     }
 
     /// Over which time the losses are, as people say it.

@@ -11,6 +11,7 @@ mod hours;
 mod light;
 mod page;
 mod recomputed;
+mod scores;
 mod sensors;
 mod text;
 mod track;
@@ -24,6 +25,7 @@ pub use errors::Errors;
 use hours::Hours;
 pub use light::Light;
 pub use page::{page, plots};
+pub use scores::scores;
 pub use sensors::SensorFacts;
 pub use text::text;
 pub use track::Unjudged;
@@ -62,9 +64,9 @@ pub struct Facts {
     pub lags: Vec<Lags>,
     /// How estimators answer a change of one sensor.
     pub responses: Vec<Responses>,
-    /// What the correction is worth; none for a graph without a `compensate` node, or where nothing can be told of it.
+    /// What the correction is worth; none for a graph without a `compensate` node, or where it cannot be judged.
     pub worth: Option<Worth>,
-    /// Corrections, losses and settle times that nothing can be told of, and why.
+    /// Corrections, losses and settle times that cannot be judged, and why.
     pub unjudged: Vec<Unjudged>,
     /// How the model was made.
     pub card: Option<Card>,
@@ -170,12 +172,12 @@ mod tests {
 
     #[test]
     fn a_figure_keeps_its_digits_in_any_unit() {
-        let told = [0.0, 107.3, 21.46, 2.534, 0.0683, -4.2e-8, 1.234e-3, 3.5e9]
+        let texts = [0.0, 107.3, 21.46, 2.534, 0.0683, -4.2e-8, 1.234e-3, 3.5e9]
             .map(|value| figure(Some(value)));
         let expected = [
             "0.00", "107", "21.5", "2.53", "0.068", "-4.20e-8", "0.00123", "3.50e9",
         ];
-        assert_eq!(told, expected);
+        assert_eq!(texts, expected);
         assert_eq!([None, Some(f64::NAN)].map(figure), ["–", "–"]);
     }
 }

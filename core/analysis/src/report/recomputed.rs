@@ -1,5 +1,7 @@
-//! Decides by which graph drift, light and settle times are worked out from positions: one of the framework's own nodes, so that
-//! they mean the same here as anywhere, with names of its own, since what a user's channels are called may have another meaning in it.
+//! Drift, light and settle times worked out again from positions.
+//!
+//! A graph of the framework's own nodes does it, so that they mean the same as anywhere. It has channel names of its own, since the
+//! names of a user's channels may mean something else in it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -69,10 +71,10 @@ impl Recomputed {
         );
         let graph = document.and_then(|document| declare(document, &mut diagnostics));
         let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-        // What stands in a graph that the user does not have helps nobody, and its first line tells what is wrong.
+        // The user does not have this graph; the first line of the diagnostic has the reason.
         let plan = plan.ok_or_else(|| {
-            let told = diagnostics.render(&sources, false, 100);
-            told.lines().next().unwrap_or_default().to_owned()
+            let text = diagnostics.render(&sources, false, 100);
+            text.lines().next().unwrap_or_default().to_owned()
         })?;
         Ok(Self {
             samples: Vec::with_capacity(plan.sources.len()),

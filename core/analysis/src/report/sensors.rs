@@ -1,4 +1,4 @@
-//! Decides what is told of a measured channel: gaps, leaps, rejected samples, noise, samples where the fit saw none, and what a `health`
+//! The facts about a measured channel: gaps, leaps, rejected samples, noise, samples outside those of the fit, and what a `health`
 //! node found.
 
 use std::collections::BTreeMap;
@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
-use crate::diagnosis::standstill;
-use crate::diagnosis::{health_reasons, of_truths};
 use crate::figures::{counted, time};
+use athermal_core::compile::origins::{health_reasons, of_truths};
+use athermal_run::live::monitor::standstill;
 
 /// What can be said of a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]

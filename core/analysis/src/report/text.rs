@@ -1,4 +1,4 @@
-//! Decides what of a report is told on a terminal, 80 columns wide.
+//! A report on a terminal, 80 columns wide.
 
 use std::fmt::Write as _;
 
@@ -32,8 +32,8 @@ pub fn text(facts: &Facts) -> String {
     if !odd.is_empty() {
         text.push_str("\nSensors to look at:\n");
         for (sensor, remarks) in odd {
-            let told = format!("{}: {}", sensor.name, remarks.join("; "));
-            text.push_str(&paragraph("  ", 4, &told));
+            let sentence = format!("{}: {}", sensor.name, remarks.join("; "));
+            text.push_str(&paragraph("  ", 4, &sentence));
         }
     }
     text
@@ -67,15 +67,15 @@ fn departures(text: &mut String, departures: &[Departure]) {
     }
     for of in departures {
         if of.is_worse() {
-            let told = format!(
+            let sentence = format!(
                 "Corrected, {} is farther from its start than without, though its drift may be less.",
                 of.axis
             );
-            text.push_str(&paragraph("", 2, &told));
+            text.push_str(&paragraph("", 2, &sentence));
         }
         if let Some(limited) = of.limited() {
-            let told = format!("The correction of {} is {limited}.", of.axis);
-            text.push_str(&paragraph("", 2, &told));
+            let sentence = format!("The correction of {} is {limited}.", of.axis);
+            text.push_str(&paragraph("", 2, &sentence));
         }
     }
 }

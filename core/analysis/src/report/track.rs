@@ -1,4 +1,4 @@
-//! Decides what a correction acts on and which drifts and losses are recomputed from that, and writes both down; not how.
+//! What a correction acts on, and which drifts and losses are recomputed from that.
 
 use std::collections::BTreeMap;
 use std::iter::successors;
@@ -61,7 +61,7 @@ pub(super) struct TrackLoss {
     /// Which of the drifts, in the order in which the node reads them.
     pub(super) drifts: Vec<usize>,
     pub(super) spec: OpticalLoss,
-    /// What tells how long it takes until the loss has settled.
+    /// What measures how long it takes until the loss has settled.
     pub(super) settled: Option<TrackSettled>,
 }
 
@@ -87,7 +87,7 @@ pub(super) struct TrackRow {
     pub(super) begins: bool,
 }
 
-/// What a graph has and a report cannot tell the worth of.
+/// What a graph has and a report cannot judge.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unjudged {
     /// The node, or its channel: `compensate.Z1`.

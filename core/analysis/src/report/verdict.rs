@@ -1,4 +1,4 @@
-//! Decides what is said of each axis in a sentence.
+//! The verdict on each axis, one sentence.
 
 use std::fmt::Write as _;
 

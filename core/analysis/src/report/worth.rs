@@ -1,4 +1,4 @@
-//! Decides what a correction is worth: drift, light and minutes without and with it, recomputed from corrected positions.
+//! What a correction is worth: drift, light and minutes without and with it, recomputed from corrected positions.
 
 use athermal_core::time::Instant;
 use serde::Serialize;
@@ -80,7 +80,7 @@ impl Worth {
     }
 }
 
-/// What can be worked out again of a track; what cannot is left out, and told.
+/// What can be worked out again of a track; what cannot goes into `unjudged`.
 fn recomputed(track: &mut Track, unjudged: &mut Vec<Unjudged>) -> Option<Recomputed> {
     let leave_out = |of: &str, error: &ReportError, unjudged: &mut Vec<Unjudged>| {
         unjudged.push(Unjudged {
@@ -92,7 +92,7 @@ fn recomputed(track: &mut Track, unjudged: &mut Vec<Unjudged>) -> Option<Recompu
         Ok(recomputed) => return Some(recomputed),
         Err(error) => error,
     };
-    // Drifts are told where losses cannot be.
+    // Drifts are shown where losses cannot be.
     for loss in std::mem::take(&mut track.losses) {
         leave_out(&loss.node, &error, unjudged);
     }
@@ -108,7 +108,7 @@ fn recomputed(track: &mut Track, unjudged: &mut Vec<Unjudged>) -> Option<Recompu
     }
 }
 
-/// What is worth telling of a correction; none where no axis is corrected, or none of it can be worked out.
+/// What a correction is worth; none where no axis is corrected, or none of it can be worked out.
 pub(super) fn worth(
     mut track: Track,
     unjudged: &mut Vec<Unjudged>,

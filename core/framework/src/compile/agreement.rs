@@ -3,10 +3,11 @@
 use super::conversion::{factor, mismatch};
 use super::instance::Declared;
 use super::plan::PlannedRole;
-use super::problem::CompileProblem;
+use super::problem;
 use super::reference::Reference;
 use super::resolver::Resolver;
 use super::scope::Found;
+use crate::diagnostic::Problem;
 
 impl Resolver<'_> {
     /// Whether no voter is what an estimator or combiner gives beside its prediction. What else there is may vote: a feature of
@@ -25,7 +26,7 @@ impl Resolver<'_> {
                 continue;
             };
             let reference = Reference::parse(text);
-            let problem = CompileProblem::NoPrediction {
+            let problem = problem::NoPrediction {
                 channel: self.channels[slot].name.clone(),
                 prediction: match reference.channel {
                     Some(_) => self.channels[prediction].name.clone(),
@@ -78,33 +79,33 @@ impl Resolver<'_> {
         votes: bool,
     ) -> bool {
         let (a, b) = (&self.channels[first], &self.channels[second]);
-        let problem = if factor(&b.channel.unit, &a.channel.unit).is_none() {
+        let problem: Box<dyn Problem> = if factor(&b.channel.unit, &a.channel.unit).is_none() {
             mismatch(&b.name, &b.channel.unit, &a.name, &a.channel.unit)
         } else if a.channel.span != b.channel.span {
-            CompileProblem::Spans {
+            Box::new(problem::Spans {
                 first: a.name.clone(),
                 first_span: a.channel.span,
                 second: b.name.clone(),
                 second_span: b.channel.span,
-            }
+            })
         } else if votes && a.channel.ahead != b.channel.ahead {
-            CompileProblem::Horizons {
+            Box::new(problem::Horizons {
                 first: a.name.clone(),
                 first_ahead: a.channel.ahead,
                 second: b.name.clone(),
                 second_ahead: b.channel.ahead,
-            }
+            })
         } else if let Some(of_first) = a.predicts
             && let Some(of_second) = if votes { b.predicts } else { Some(second) }
             && self.are_members(of_first, of_second)
         {
             let name = |slot: usize| self.channels[slot].name.clone();
-            CompileProblem::Truths {
+            Box::new(problem::Truths {
                 first: a.name.clone(),
                 first_truth: name(of_first),
                 second: b.name.clone(),
                 second_truth: name(of_second),
-            }
+            })
         } else {
             return true;
         };

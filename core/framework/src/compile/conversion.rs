@@ -10,7 +10,8 @@
 //! scale is turned into another, since that takes an offset.
 
 use super::plan::Conversion;
-use super::problem::CompileProblem;
+use super::problem;
+use crate::diagnostic::Problem;
 use crate::unit::Unit;
 
 /// The conversions that give channels of these units and names in `target`.
@@ -21,7 +22,7 @@ pub(super) fn conversions<'a>(
     channels: impl Iterator<Item = (&'a str, &'a Unit)>,
     target: &Unit,
     wanted_by: &str,
-) -> Result<Vec<Conversion>, Vec<CompileProblem>> {
+) -> Result<Vec<Conversion>, Vec<Box<dyn Problem>>> {
     let (mut conversions, mut problems) = (Vec::new(), Vec::new());
     for (entry, (name, unit)) in channels.enumerate() {
         match factor(unit, target) {
@@ -52,21 +53,21 @@ pub(super) fn mismatch(
     unit: &Unit,
     wanted_by: &str,
     wanted: &Unit,
-) -> CompileProblem {
+) -> Box<dyn Problem> {
     if unit.measures_same(wanted) && unit.is_temperature_point() != wanted.is_temperature_point() {
-        CompileProblem::PointOrDifference {
+        Box::new(problem::PointOrDifference {
             channel: channel.to_owned(),
             unit: unit.clone(),
             wanted_by: wanted_by.to_owned(),
             wanted: wanted.clone(),
-        }
+        })
     } else {
-        CompileProblem::Units {
+        Box::new(problem::Units {
             first: wanted_by.to_owned(),
             first_unit: wanted.clone(),
             second: channel.to_owned(),
             second_unit: unit.clone(),
-        }
+        })
     }
 }
 

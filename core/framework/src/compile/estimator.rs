@@ -7,7 +7,7 @@ use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{PlannedRole, STD_DEV, TrainingLimits, TruthLink};
-use super::problem::CompileProblem;
+use super::problem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
 use super::row::Row;
@@ -141,7 +141,7 @@ impl Resolver<'_> {
         let ahead = instance.read.estimator.ahead;
         if ahead.is_none() {
             let kind = instance.kind.name;
-            let problem = CompileProblem::NoHorizon { kind };
+            let problem = problem::NoHorizon { kind };
             self.diagnostics.report(instance.node.place, problem);
         }
         ahead
@@ -171,7 +171,7 @@ impl Resolver<'_> {
         };
         let voter = &self.channels[first];
         if voter.channel.ahead != link.ahead {
-            let problem = CompileProblem::Horizons {
+            let problem = problem::Horizons {
                 first: voter.name.clone(),
                 first_ahead: voter.channel.ahead,
                 second: instance.node.name.clone(),
@@ -193,7 +193,7 @@ impl Resolver<'_> {
     ) -> Option<TruthLink> {
         let channel = &self.channels[truth].channel;
         if channel.ahead != Duration::ZERO || self.channels[truth].predicts.is_some() {
-            let problem = CompileProblem::PredictedTruth {
+            let problem = problem::PredictedTruth {
                 channel: self.channels[truth].name.clone(),
             };
             self.diagnostics
@@ -202,7 +202,7 @@ impl Resolver<'_> {
         }
         if let Some(prediction) = self.told_of(truth) {
             let name = |slot: usize| self.channels[slot].name.clone();
-            let problem = CompileProblem::TruthOfPrediction {
+            let problem = problem::TruthOfPrediction {
                 channel: name(truth),
                 prediction: name(prediction),
             };
@@ -214,7 +214,7 @@ impl Resolver<'_> {
         let span = self.provenance[truth].span();
         if let Some(node) = self.endless(truth) {
             let channel = self.channels[truth].name.clone();
-            let problem = CompileProblem::EndlessTruth { channel, node };
+            let problem = problem::EndlessTruth { channel, node };
             self.diagnostics
                 .report(instance.input_place("truth"), problem);
             return None;
@@ -295,7 +295,7 @@ impl Resolver<'_> {
         let mut size = |limit: Option<Quantity>, default: f64, key: &str| match limit {
             None => default,
             Some(limit) => limit.as_difference(&unit).unwrap_or_else(|| {
-                let problem = CompileProblem::LimitUnit {
+                let problem = problem::LimitUnit {
                     found: limit.unit.clone(),
                     expected: unit.clone(),
                 };
@@ -315,7 +315,7 @@ impl Resolver<'_> {
                 value,
                 unit: unit.clone(),
             };
-            let problem = CompileProblem::NoRows {
+            let problem = problem::NoRows {
                 below: unit(limits.below),
                 above: unit(limits.above),
             };

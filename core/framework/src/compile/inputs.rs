@@ -6,7 +6,7 @@ use super::conversion;
 use super::instance::{Declared, Instance};
 use super::misplaced::{INPUTS, misplaced};
 use super::plan::{Conversion, Entry, Gather};
-use super::problem::CompileProblem;
+use super::problem;
 use super::reference::Reference;
 use super::resolver::Resolver;
 use super::scope::Found;
@@ -85,7 +85,7 @@ impl Resolver<'_> {
         if let Some(&slot) = twice {
             let channel = self.channels[slot].name.clone();
             self.diagnostics
-                .report(place, CompileProblem::Repeated { channel, input });
+                .report(place, problem::Repeated { channel, input });
         }
         twice.is_none()
     }
@@ -100,7 +100,7 @@ impl Resolver<'_> {
         {
             return;
         }
-        let problem = CompileProblem::MissingInput {
+        let problem = problem::MissingInput {
             kind: instance.kind.name,
             input: port.name,
             summary: port.summary,
@@ -116,7 +116,7 @@ impl Resolver<'_> {
             }
             Ok(Found::Broken) => None,
             Err(problem) => {
-                self.diagnostics.report_unless_told(place, *problem);
+                self.diagnostics.report_unless_known(place, problem);
                 None
             }
         }
@@ -151,7 +151,7 @@ impl Resolver<'_> {
         expected: &'static str,
     ) {
         let name = |&slot: &usize| self.channels[slot].name.clone();
-        let problem = CompileProblem::ChannelCount {
+        let problem = problem::ChannelCount {
             input,
             found: slots.iter().map(name).collect(),
             expected,
@@ -166,7 +166,7 @@ impl Resolver<'_> {
         for port in ports.filter(|port| port.read == Read::Fresh) {
             let given = instance.input(port.name).and_then(|input| input.max_age);
             if let Some((_, place)) = given {
-                let problem = CompileProblem::Doubt {
+                let problem = problem::Doubt {
                     message: format!(
                         "`max_age` does nothing here: `inputs.{}` takes new values only, and holds none",
                         port.name
@@ -203,7 +203,7 @@ impl Resolver<'_> {
             let unbounded = behind.find(|(of, _)| self.channels[*of].channel.max_age.is_none());
             let signal =
                 unbounded.map(|(of, _)| Reference::parse(&self.channels[of].name).node.to_owned());
-            let problem = CompileProblem::NoMaxAge {
+            let problem = problem::NoMaxAge {
                 channel,
                 input: port.to_owned(),
                 signal,

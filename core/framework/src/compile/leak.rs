@@ -3,7 +3,7 @@
 //! It looks at the graph once all of it is known, since feedback through a delay brings what comes later in the order.
 
 use super::plan::{PlannedNode, PlannedRole, TruthLink};
-use super::problem::CompileProblem;
+use super::problem;
 use super::provenance::{Provenance, leaks};
 use super::resolver::{Resolver, Suspect};
 use crate::node::Role;
@@ -44,8 +44,8 @@ impl Resolver<'_> {
         (lag, late): (Duration, Duration),
         link: &TruthLink,
         path: Vec<String>,
-    ) -> CompileProblem {
-        CompileProblem::Leak {
+    ) -> problem::Leak {
+        problem::Leak {
             regressor: self.regressor(slot, read_at, slot == link.slot).name,
             lag,
             truth: self.channels[link.slot].name.clone(),

@@ -3,7 +3,7 @@
 use super::instance::Instance;
 use super::keys::{Learn, LearnLimits};
 use super::plan::PlannedLearning;
-use super::problem::CompileProblem;
+use super::problem;
 use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::node::{Estimator, FREEZE, InputPort, LearningLimits, Learns, Mistake, OutputPort};
@@ -23,7 +23,7 @@ impl Resolver<'_> {
             (None, _) | (Some(Learn::Switch(false)), _) => None,
             (Some(_), Learns::Never { help }) => {
                 let kind = instance.kind.name;
-                let problem = CompileProblem::NeverLearns { kind, help };
+                let problem = problem::NeverLearns { kind, help };
                 let place = instance.parameter_place("learn");
                 self.diagnostics.report(place, problem);
                 return None;

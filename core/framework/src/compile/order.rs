@@ -7,7 +7,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use petgraph::visit::EdgeRef;
 
 use super::instance::ReadNode;
-use super::problem::CompileProblem;
+use super::problem;
 use super::reference::Reference;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
@@ -56,10 +56,7 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
             .chain(&path[..1])
             .map(|&node| graph.nodes[node].name.clone())
             .collect();
-        diagnostics.report(
-            graph.nodes[path[0]].place,
-            CompileProblem::Cycle { path: names },
-        );
+        diagnostics.report(graph.nodes[path[0]].place, problem::Cycle { path: names });
     }
     order.nodes = sorted(&edges, &order.looping);
     order

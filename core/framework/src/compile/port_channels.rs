@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 
-use super::CompileProblem;
+use super::problem::UnknownChannel;
 use super::reference::{Reference, alternatives, is_pattern};
 use crate::diagnostic::Names;
 use crate::document::Pattern;
@@ -28,8 +28,8 @@ impl PortChannels {
     /// The slots of the channels that a reference to this port stands for, in order.
     ///
     /// # Errors
-    /// [`CompileProblem::UnknownChannel`], also where an alternative of a choice stands for none.
-    pub fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
+    /// Also where an alternative of a choice stands for none.
+    pub fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, UnknownChannel> {
         let slots = self.slots(reference.channel);
         let Some(channel) = reference.channel else {
             return Ok(slots);
@@ -40,7 +40,7 @@ impl PortChannels {
             alternatives(channel).find(|of| self.slots(Some(of)).is_empty())
         };
         match unmatched {
-            Some(channel) => Err(CompileProblem::UnknownChannel {
+            Some(channel) => Err(UnknownChannel {
                 node: reference.node.to_owned(),
                 channel,
                 known: self.known(),
@@ -82,10 +82,7 @@ mod tests {
             port.insert(name.to_owned(), slot);
         }
         port.find(&Reference::parse(reference))
-            .map_err(|problem| match problem {
-                CompileProblem::UnknownChannel { channel, .. } => channel,
-                other => panic!("{other:?}"),
-            })
+            .map_err(|unknown| unknown.channel)
     }
 
     #[test]

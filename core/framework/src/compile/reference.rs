@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::problem::CompileProblem;
+use super::problem;
+use crate::diagnostic::Problem;
 
 /// A reference, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,21 +51,21 @@ impl<'a> Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    /// What is told where the node has no such port; none are known of a signal.
-    pub fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
+    /// The mistake where the node has no such port; none are known of a signal.
+    pub fn no_port(&self, known: Vec<&'static str>) -> Box<dyn Problem> {
         let node = self.node.to_owned();
         match self.port {
-            Some("") => CompileProblem::EmptyPort {
+            Some("") => Box::new(problem::EmptyPort {
                 node,
                 channel: self.channel.map(str::to_owned),
                 known,
-            },
+            }),
             // A node of which something could not be read may have no port that could be meant.
-            port => CompileProblem::UnknownPort {
+            port => Box::new(problem::UnknownPort {
                 node,
                 port: port.unwrap_or_default().to_owned(),
                 known,
-            },
+            }),
         }
     }
 

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use indexmap::{IndexMap, IndexSet};
 
 use super::port_channels::PortChannels;
-use super::problem::CompileProblem;
+use super::problem;
 use super::reference::Reference;
-use crate::diagnostic::Names;
+use crate::diagnostic::{Names, Problem};
 
 /// What the names of a graph stand for, as far as it is known.
 #[derive(Debug, Default)]
@@ -28,8 +28,6 @@ pub(crate) struct Scope {
     pub(crate) ports: IndexMap<&'static str, PortChannels>,
     /// Set when an error has been told of it, so that references to it say nothing more.
     pub(crate) broken: bool,
-    /// Set when it is no node or signal, so that nobody is told to refer to it.
-    hidden: bool,
 }
 
 /// The outcome of looking a reference up.
@@ -66,31 +64,19 @@ impl Scopes {
         &mut self.scopes[name]
     }
 
-    /// Lets references to a name say nothing, where nothing else has it.
-    pub(crate) fn hide(&mut self, name: &str) {
-        if !self.scopes.contains_key(name) {
-            let scope = self.get_mut(name);
-            (scope.broken, scope.hidden) = (true, true);
-        }
-    }
-
     /// The names of which something is missing.
     pub(crate) fn broken(&self) -> BTreeSet<String> {
         let broken = self.scopes.iter().filter(|(_, scope)| scope.broken);
         broken.map(|(name, _)| name.clone()).collect()
     }
 
-    fn shown(&self) -> impl Iterator<Item = &str> {
-        let shown = self.scopes.iter().filter(|(_, scope)| !scope.hidden);
-        shown.map(|(name, _)| name.as_str())
-    }
-
     /// What there is to refer to. It is listed once: a graph may refer to thousands of names that it does not have.
     fn known(&self) -> &Arc<Names> {
-        self.known.get_or_init(|| outermost(self.shown()))
+        self.known
+            .get_or_init(|| outermost(self.scopes.keys().map(String::as_str)))
     }
 
-    pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
+    pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<dyn Problem>> {
         let reference = Reference::parse(text);
         if reference.is_member() {
             // Such a reference was made from one that named a node.
@@ -106,11 +92,11 @@ impl Scopes {
                 return Ok(Found::Broken);
             }
             if self.removed.iter().any(|removed| removed == outer) {
-                return Err(Box::new(CompileProblem::RemovedNode {
+                return Err(Box::new(problem::RemovedNode {
                     node: outer.to_owned(),
                 }));
             }
-            return Err(Box::new(CompileProblem::UnknownNode {
+            return Err(Box::new(problem::UnknownNode {
                 node: reference.node.to_owned(),
                 known: Arc::clone(self.known()),
             }));
@@ -127,7 +113,7 @@ impl Scopes {
         let Some(channels) = named else {
             let ports = scope.ports.keys().copied();
             let ports = ports.filter(|port| !port.is_empty());
-            return Err(Box::new(reference.no_port(ports.collect())));
+            return Err(reference.no_port(ports.collect()));
         };
         Ok(Found::Slots(channels.find(&reference)?))
     }

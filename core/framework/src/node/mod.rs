@@ -24,6 +24,8 @@ pub mod number_or_none;
 pub mod numbers;
 mod port;
 mod predictor;
+pub mod prelude;
+mod range;
 mod reach;
 mod recent_error;
 mod registry;
@@ -40,6 +42,7 @@ pub use estimator::{
     Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
+pub(crate) use feature::{PortValues, SlotTime};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
@@ -50,14 +53,13 @@ pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read
 #[doc(hidden)]
 pub use predictor::InModel;
 pub use predictor::Predictor;
+pub use range::{ParameterPart, Range, each_parameter, out_of_range};
 pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
-#[cfg(feature = "testkit")]
-pub use registry::as_toml;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{
-    Kind, NodeSpec, ReadSpec, Role, RoleName, first_paragraph, inline_toml, kind, kinds,
+    Kind, NodeSpec, ReadSpec, Role, RoleName, as_toml, first_paragraph, inline_toml, kind, kinds,
 };
 pub use state::{Restored, State};
 pub use training_error::TrainingError;

@@ -3,7 +3,6 @@
 use super::FeatureFit;
 use crate::channel::Channel;
 use crate::diagnostic::counted;
-use crate::time::Duration;
 
 /// How an input port reads its channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -189,16 +188,6 @@ impl Mistake {
             help: None,
             rests_on: Vec::new(),
         }
-    }
-
-    /// That of a length of time which is nothing or less, where one is stated.
-    #[must_use]
-    pub fn unless_lasting(at: &str, length: impl Into<Option<Duration>>) -> Option<Self> {
-        let length = length.into().filter(|length| *length <= Duration::ZERO)?;
-        let mut names = at.rsplit('.').filter(|name| name.parse::<usize>().is_err());
-        let name = names.next().unwrap_or(at);
-        let message = format!("`{name}` is {length} and must be longer than nothing");
-        Some(Self::at(at, message))
     }
 
     /// A mistake at each of these lists that has more or fewer values than it must have.

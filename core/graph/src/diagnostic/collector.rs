@@ -1,10 +1,9 @@
-//! Collecting diagnostics in any order and telling each mistake once; how they look is decided by the renderer.
+//! Collects diagnostics in any order and reports each mistake once.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::fmt::Debug;
 
-use super::gaps::Gaps;
-use super::{Place, Sources, render};
+use super::{Code, Place, Sources, render};
 
 /// How bad a problem is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -25,15 +24,10 @@ impl Severity {
     }
 }
 
-/// One kind of mistake. Each layer has an enum of its own whose variants carry the data of their texts.
-pub trait Problem {
-    /// The stable code, registered in [`super::CODES`].
-    fn code(&self) -> &'static str;
-
-    /// How bad it is.
-    fn severity(&self) -> Severity {
-        Severity::Error
-    }
+/// One kind of mistake, with the data of its texts; [`problem!`](crate::problem) declares it.
+pub trait Problem: Debug {
+    /// The code, which says how bad it is.
+    fn code(&self) -> &'static Code;
 
     /// What is wrong, in one sentence that stands alone.
     fn message(&self) -> String;
@@ -52,14 +46,11 @@ pub trait Problem {
     fn related(&self) -> Vec<(Place, String)> {
         Vec::new()
     }
+}
 
-    /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
-    fn may_follow_from_a_gap(&self) -> bool;
-
-    /// Whether that is so only of what could not be read beside it, since nothing of another file would be laid under what stands
-    /// there.
-    fn inherits_nothing(&self) -> bool {
-        false
+impl<P: Problem + 'static> From<P> for Box<dyn Problem> {
+    fn from(problem: P) -> Self {
+        Box::new(problem)
     }
 }
 
@@ -112,10 +103,6 @@ pub struct Diagnostics {
     scope: Option<String>,
     errors: usize,
     reported: usize,
-    /// Where something is missing that could not be read.
-    gaps: Arc<Gaps>,
-    /// Something may be missing anywhere.
-    open: bool,
 }
 
 /// What is known of one code at one place.
@@ -146,20 +133,25 @@ impl Diagnostics {
     }
 
     /// Notes a problem. `place` is a [`Place`] or `None`.
-    pub fn report(&mut self, place: impl Into<Option<Place>>, problem: impl Problem) {
+    pub fn report(
+        &mut self,
+        place: impl Into<Option<Place>>,
+        problem: impl Into<Box<dyn Problem>>,
+    ) {
         let context = self.scope.clone();
-        self.note(context, place.into(), &problem);
+        self.note(context, place.into(), &*problem.into());
     }
 
-    /// Notes a problem unless another has been told at its place, from which it may follow.
-    pub fn report_unless_told(&mut self, place: Place, problem: impl Problem) {
-        if !self.is_told(problem.code(), place) {
+    /// Notes a problem unless another is known at its place, from which it may follow.
+    pub fn report_unless_known(&mut self, place: Place, problem: impl Into<Box<dyn Problem>>) {
+        let problem = problem.into();
+        if !self.is_known(problem.code().code, place) {
             self.report(place, problem);
         }
     }
 
     /// Whether an error of another code, or the same one of no member, stands at a place.
-    pub fn is_told(&self, code: &str, place: Place) -> bool {
+    pub fn is_known(&self, code: &str, place: Place) -> bool {
         let there = self.known.get(&Some(place)).into_iter().flatten();
         let mut errors = there.filter(|known| known.is_error);
         errors.any(|known| known.code != code || known.is_of_none)
@@ -172,9 +164,9 @@ impl Diagnostics {
         &mut self,
         context: impl Into<String>,
         place: impl Into<Option<Place>>,
-        problem: impl Problem,
+        problem: impl Into<Box<dyn Problem>>,
     ) {
-        self.note(Some(context.into()), place.into(), &problem);
+        self.note(Some(context.into()), place.into(), &*problem.into());
     }
 
     /// Runs `work`, whose [`Diagnostics::report`]s get this context; scopes inside it replace it for their duration.
@@ -194,23 +186,9 @@ impl Diagnostics {
         std::mem::replace(&mut self.scope, context)
     }
 
-    /// An empty collector for the same files.
-    pub fn aside(&self) -> Self {
-        Self {
-            open: self.open,
-            gaps: Arc::clone(&self.gaps),
-            ..Self::default()
-        }
-    }
-
-    /// Takes over what another collector found.
+    /// Takes over what another collector found; what is known here already is counted with it.
     pub fn extend(&mut self, other: Self) {
-        self.extend_where(other, |_| true);
-    }
-
-    /// Takes over those that are wanted of what another collector found; what is known here already is counted with it.
-    pub fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
-        for diagnostic in other.found.into_iter().filter(wanted) {
+        for diagnostic in other.found {
             self.take(diagnostic);
         }
     }
@@ -220,31 +198,10 @@ impl Diagnostics {
         self.reported
     }
 
-    /// Notes where parts of files could not be read: at `places`, or anywhere. What may only follow from that is not told.
-    pub fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
-        self.open |= anywhere;
-        if !places.is_empty() {
-            let gaps = Arc::make_mut(&mut self.gaps);
-            places.iter().for_each(|gap| gaps.add(*gap));
-        }
-    }
-
-    /// Whether something that could not be read may be missing at a place.
-    pub fn is_open(&self, place: Place) -> bool {
-        self.open || self.gaps.hold(place)
-    }
-
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
-        let open = self.open && !problem.inherits_nothing();
-        let is_open = open || place.is_some_and(|place| self.gaps.hold(place));
-        if problem.may_follow_from_a_gap() && is_open {
-            // Whoever counts learns that something is wrong here.
-            self.reported += usize::from(problem.severity() == Severity::Error);
-            return;
-        }
         let new = self.take(Diagnostic {
-            code: problem.code(),
-            severity: problem.severity(),
+            code: problem.code().code,
+            severity: problem.code().severity,
             place,
             context,
             repeats: 0,

@@ -1,17 +1,29 @@
 use super::*;
 
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Colour {
     name: &'static str,
     severity: Severity,
 }
 
 impl Problem for Colour {
-    fn code(&self) -> &'static str {
-        "A009"
-    }
-    fn severity(&self) -> Severity {
-        self.severity
+    fn code(&self) -> &'static Code {
+        const fn colour(severity: Severity) -> Code {
+            Code {
+                code: "A009",
+                severity,
+                title: "",
+                explanation: "",
+                wrong: "",
+                right: "",
+            }
+        }
+        const ERROR: Code = colour(Severity::Error);
+        const WARNING: Code = colour(Severity::Warning);
+        match self.severity {
+            Severity::Error => &ERROR,
+            Severity::Warning => &WARNING,
+        }
     }
     fn message(&self) -> String {
         format!("\"{}\" is no colour", self.name)
@@ -21,9 +33,6 @@ impl Problem for Colour {
     }
     fn help(&self) -> Option<String> {
         Some("did you mean \"red\"?".to_owned())
-    }
-    fn may_follow_from_a_gap(&self) -> bool {
-        false
     }
 }
 

@@ -1,8 +1,13 @@
-//! Decides what a model says of its own making.
+//! A model's card: where it comes from, and how its fit went.
+
+use std::fs::{File, Metadata};
+use std::hash::Hasher as _;
+use std::io::{self, BufRead as _, BufReader};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::SampleRange;
+use crate::engine::{Fnv1a, SampleRange};
 use crate::fit::Dropped;
 use crate::node::TrainingReport;
 
@@ -37,8 +42,51 @@ pub struct DataCard {
     pub rows: u64,
     /// Its length in bytes.
     pub bytes: u64,
-    /// A checksum of its content, for telling files apart (FNV-1a, 64 bits).
+    /// A checksum of its content, by which files are known again (FNV-1a, 64 bits).
     pub hash: String,
+}
+
+impl DataCard {
+    /// The card of a file with so many rows.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn of(path: &Path, rows: u64) -> io::Result<Self> {
+        let (bytes, hash) = content_of(path)?;
+        Ok(Self {
+            path: path.display().to_string(),
+            rows,
+            bytes,
+            hash,
+        })
+    }
+
+    /// Whether a file has the content of this one. Only a file of the same length is read for its checksum.
+    #[must_use]
+    pub fn is_of(&self, path: &Path) -> bool {
+        let has_length = |of: Metadata| of.is_file() && of.len() == self.bytes;
+        std::fs::metadata(path).is_ok_and(has_length)
+            && content_of(path).is_ok_and(|(bytes, hash)| bytes == self.bytes && hash == self.hash)
+    }
+}
+
+/// The length of a file in bytes and the checksum of its content as text: [`Fnv1a`] in hexadecimal digits.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn content_of(path: &Path) -> io::Result<(u64, String)> {
+    let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
+    let (mut bytes, mut hash) = (0, Fnv1a::default());
+    loop {
+        let piece = file.fill_buf()?;
+        if piece.is_empty() {
+            return Ok((bytes, format!("{:016x}", hash.finish())));
+        }
+        hash.write(piece);
+        let read = piece.len();
+        bytes += read as u64;
+        file.consume(read);
+    }
 }
 
 /// A stretch of time.

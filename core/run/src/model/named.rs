@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use indexmap::IndexMap;
 
-use super::problem::NamedModelProblem;
+use super::problem;
 use super::{Model, ModelError};
 use crate::compile::{Change, Plan, PlanDiff, Wanted, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
@@ -35,7 +35,7 @@ impl Model {
         let other = match Self::load_fitted(&path, wanted) {
             Ok(other) => other,
             Err(error) => {
-                let problem = NamedModelProblem::Unusable {
+                let problem = problem::Unusable {
                     path: path.display().to_string(),
                     reason: in_words(&error),
                     machine: graph.display().to_string(),
@@ -53,7 +53,7 @@ impl Model {
             let mut nodes = self.plan.nodes.iter();
             let node = nodes.find(|node| node.instance() == *first);
             let place = node.and_then(|node| self.place_of(&node.name));
-            let problem = NamedModelProblem::ReadsOther {
+            let problem = problem::ReadsOther {
                 instances: doubtful,
                 path,
                 named,
@@ -89,7 +89,7 @@ impl Model {
             }
         }
         for (name, (instance, more, change)) in unlike {
-            let problem = NamedModelProblem::Unlike {
+            let problem = problem::Unlike {
                 instance,
                 more,
                 change: change.clone(),

@@ -1,16 +1,20 @@
-//! Decides what can be wrong with the fitted model that a machine file names, and how it is said.
+//! What can be wrong with the fitted model that a machine file names.
 
 use serde_json::Value;
 
 use crate::compile::{Change, ParameterChange};
-use crate::diagnostic::{Place, Problem, Severity, listed};
+use crate::diagnostic::{Place, code, listed, problem};
 
-/// Why a machine file cannot run with the model that it names, or only with doubt.
-#[derive(Debug, Clone, PartialEq)]
-#[allow(missing_docs)] // each variant's fields are the data of the sentence that `message` makes of them
-pub enum NamedModelProblem {
+code!(
+    A190,
+    Error,
+    "unusable model",
+    "`model` names what `athermal fit` has written. `fit`, `compare`, `diff` and `test` do without it."
+);
+
+problem! {
     /// The model cannot be read.
-    Unusable {
+    A190 Unusable {
         path: String,
         /// In words.
         reason: String,
@@ -18,9 +22,26 @@ pub enum NamedModelProblem {
         machine: String,
         /// Whether there is no file at its path, which a fit may then write.
         is_free: bool,
+    }
+    message: format!("the model {path} cannot be used: {reason}"),
+    label: "",
+    help: match is_free {
+        true => format!("`athermal fit {machine} --data FILE -o {path}` writes it"),
+        // What stands there may be somebody's data.
+        false => format!("name what `athermal fit {machine} --data FILE -o MODEL.json` writes"),
     },
+}
+
+code!(
+    A191,
+    Error,
+    "model of another graph",
+    "A machine file runs with the fits of its `model` only where the parameters and inputs of each estimator are those of the fit."
+);
+
+problem! {
     /// An estimator is another than the model's.
-    Unlike {
+    A191 Unlike {
         instance: String,
         /// How many more instances of the node are.
         more: usize,
@@ -29,112 +50,50 @@ pub enum NamedModelProblem {
         /// Where the machine file names the model.
         named: Place,
         machine: String,
+    }
+    message: {
+        let are_not = match more {
+            0 => "is not".to_owned(),
+            more => format!("and {more} more of its node are not"),
+        };
+        let differs = match change {
+            Change::Changed(parameters) => differs(parameters),
+            _ => "there is none of that name".to_owned(),
+        };
+        format!("`{instance}` {are_not} as in the model {path}: {differs}")
     },
-    /// What estimators read is made in another way than it was for the fit.
-    ReadsOther {
-        instances: Vec<String>,
-        path: String,
-        named: Place,
-    },
+    label: "not what was fitted",
+    help: format!(
+        "fit this graph (`athermal fit {machine} --data FILE -o {path}`), or restore what was fitted"
+    ),
+    related: vec![(*named, "the model that was fitted".to_owned())],
 }
 
-impl Problem for NamedModelProblem {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Unusable { .. } => "A190",
-            Self::Unlike { .. } => "A191",
-            Self::ReadsOther { .. } => "A192",
+code!(
+    A192,
+    Warning,
+    "fit on other values",
+    "An estimator is as in the `model`, and what it reads is now made in another way: its coefficients may no longer be right."
+);
+
+problem! {
+    /// What estimators read is made in another way than it was for the fit.
+    A192 ReadsOther { instances: Vec<String>, path: String, named: Place }
+    message: format!(
+        "{} as in the model {path}, though what is read is now made in another way",
+        match &instances[..] {
+            [one] => format!("`{one}` is"),
+            [one, rest @ ..] => format!("`{one}` and {} more are", rest.len()),
+            [] => "estimators are".to_owned(),
         }
-    }
-
-    fn severity(&self) -> Severity {
-        match self {
-            Self::Unusable { .. } | Self::Unlike { .. } => Severity::Error,
-            Self::ReadsOther { .. } => Severity::Warning,
-        }
-    }
-
-    // What has gaps is not compared.
-    fn may_follow_from_a_gap(&self) -> bool {
-        false
-    }
-
-    fn message(&self) -> String {
-        match self {
-            Self::Unusable { path, reason, .. } => {
-                format!("the model {path} cannot be used: {reason}")
-            }
-            Self::Unlike {
-                instance,
-                more,
-                change,
-                path,
-                ..
-            } => {
-                let are_not = match more {
-                    0 => "is not".to_owned(),
-                    more => format!("and {more} more of its node are not"),
-                };
-                let differs = match change {
-                    Change::Changed(parameters) => differs(parameters),
-                    _ => "there is none of that name".to_owned(),
-                };
-                format!("`{instance}` {are_not} as in the model {path}: {differs}")
-            }
-            Self::ReadsOther {
-                instances, path, ..
-            } => format!(
-                "{} as in the model {path}, though what is read is now made in another way",
-                match &instances[..] {
-                    [one] => format!("`{one}` is"),
-                    [one, rest @ ..] => format!("`{one}` and {} more are", rest.len()),
-                    [] => "estimators are".to_owned(),
-                }
-            ),
-        }
-    }
-
-    fn label(&self) -> String {
-        match self {
-            Self::Unusable { .. } => String::new(),
-            Self::Unlike { .. } => "not what was fitted".to_owned(),
-            Self::ReadsOther { .. } => "fitted on other values".to_owned(),
-        }
-    }
-
-    fn help(&self) -> Option<String> {
-        Some(match self {
-            Self::Unusable {
-                path,
-                machine,
-                is_free: true,
-                ..
-            } => format!("`athermal fit {machine} --data FILE -o {path}` writes it"),
-            // What stands there may be somebody's data.
-            Self::Unusable { machine, .. } => {
-                format!("name what `athermal fit {machine} --data FILE -o MODEL.json` writes")
-            }
-            Self::Unlike { path, machine, .. } => format!(
-                "fit this graph (`athermal fit {machine} --data FILE -o {path}`), or say what was fitted"
-            ),
-            Self::ReadsOther { .. } => {
-                "fit the graph anew to be sure; `athermal diff` tells what has changed".to_owned()
-            }
-        })
-    }
-
-    fn related(&self) -> Vec<(Place, String)> {
-        match self {
-            Self::Unusable { .. } => Vec::new(),
-            Self::Unlike { named, .. } | Self::ReadsOther { named, .. } => {
-                vec![(*named, "the model that was fitted".to_owned())]
-            }
-        }
-    }
+    ),
+    label: "fitted on other values",
+    help: "fit the graph anew to be sure; `athermal diff` shows what has changed",
+    related: vec![(*named, "the model that was fitted".to_owned())],
 }
 
 /// The first few properties that differ: what the file says, then what was fitted. Where an input reads other channels, their
-/// properties say no more.
+/// properties add nothing.
 fn differs(parameters: &[ParameterChange]) -> String {
     const MOST: usize = 3;
     let follows = |change: &&ParameterChange| {
@@ -145,15 +104,19 @@ fn differs(parameters: &[ParameterChange]) -> String {
         .iter()
         .filter(|change| !follows(change))
         .collect();
-    let mut told: Vec<_> = own.iter().take(MOST).map(|change| told(change)).collect();
+    let mut shown: Vec<_> = own
+        .iter()
+        .take(MOST)
+        .map(|change| differs_in(change))
+        .collect();
     let more = own.len().saturating_sub(MOST);
     if more > 0 {
-        told.push(format!("and {more} more"));
+        shown.push(format!("and {more} more"));
     }
-    told.join("; ")
+    shown.join("; ")
 }
 
-fn told(change: &ParameterChange) -> String {
+fn differs_in(change: &ParameterChange) -> String {
     let path = &change.path;
     match (&change.from, &change.to) {
         (Some(Value::Array(fitted)), Some(Value::Array(now))) => {

@@ -2,7 +2,10 @@
 
 use serde_json::Value as Json;
 
-use crate::node::Kind;
+use super::parameters::written;
+use crate::diagnostic::{Place, SourceId};
+use crate::document::Value;
+use crate::node::{Kind, out_of_range};
 
 /// The fewest characters that explain anything.
 const WORDS: usize = 10;
@@ -14,7 +17,7 @@ const HIDDEN_UNITS: [&str; 12] = [
 
 /// All that a kind leaves unsaid.
 pub(in super::super) fn explained(kind: &Kind) -> Vec<String> {
-    let schema = Json::from((kind.schema)());
+    let schema = (kind.schema)();
     let mut found = Vec::new();
     if kind.summary().len() < WORDS {
         found.push(format!(
@@ -33,7 +36,14 @@ pub(in super::super) fn explained(kind: &Kind) -> Vec<String> {
     {
         found.push(format!("the input port `{}` has no summary", port.name));
     }
-    parameters(&schema, "", &mut found);
+    let defaults = schema["properties"].as_object().into_iter().flatten();
+    let defaults = defaults.map(|(name, of)| (name.clone(), written(&of["default"])));
+    let defaults: Json = defaults.filter(|(_, value)| !value.is_null()).collect();
+    if let Ok(defaults) = Value::from_json(&defaults, Place::new(SourceId(0), 0, 0)) {
+        let wrong = out_of_range(schema, &defaults).into_iter();
+        found.extend(wrong.map(|(_, mistake)| format!("by default {mistake}")));
+    }
+    parameters(schema, "", &mut found);
     for (name, definition) in schema["$defs"].as_object().into_iter().flatten() {
         parameters(definition, name, &mut found);
         for choice in ["anyOf", "oneOf"] {

@@ -11,7 +11,6 @@ mod names;
 mod parameters;
 mod past;
 mod repeat;
-mod schema;
 mod shapes;
 mod snapshots;
 mod stamps;
@@ -56,7 +55,7 @@ pub(super) const ALL: [(Rule, Check); 25] = [
     (Rule::Names, |subject, _| names::names(subject)),
     (Rule::Answers, answers::answers),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
-    (Rule::Ranges, parameters::ranges),
+    (Rule::Ranges, |subject, _| parameters::ranges(subject)),
     (Rule::Deterministic, |subject, _| {
         repeat::deterministic(subject)
     }),

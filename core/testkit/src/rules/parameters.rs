@@ -1,4 +1,6 @@
-//! Decides whether parameters read back as they were written, and whether what the schema says of them is what is taken.
+//! Whether parameters read back as they were written, and whether a node runs with all that its schema allows.
+
+use std::borrow::Cow;
 
 use serde_json::Value as Json;
 use toml::Value;
@@ -7,8 +9,10 @@ use super::super::compared::course;
 use super::super::fixture::Fixture;
 use super::super::tried::{PANICS, tried};
 use super::Subject;
-use super::schema::{Bound, Leaf, Sort, defaults, leaves};
+use crate::diagnostic::{Place, SourceId};
+use crate::document::Value as DocumentValue;
 use crate::fit::{FitOptions, fit};
+use crate::node::{ParameterPart, Range, as_toml, each_parameter};
 use crate::recording::{Event, Table};
 
 pub(super) fn read_back(subject: &Subject<'_>) -> Result<(), String> {
@@ -33,61 +37,39 @@ fn reads_back(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
     }
 }
 
-pub(super) fn ranges(subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), String> {
-    let schema = Json::from((subject.kind.schema)());
-    let parameters = subject.fixture.plan.nodes[0].spec.parameters();
-    let mut found = left_out(subject, &schema);
-    // What the schema says of itself is told once.
-    if all
-        .first()
-        .is_some_and(|first| std::ptr::eq(first, subject))
-    {
-        let defaults = defaults(&schema).into_iter();
-        found.extend(defaults.filter(|leaf| !leaf.is_allowed()).map(|leaf| {
-            let name = leaf.path.join(".");
-            format!(
-                "`{name}` is {} by default, which the schema does not allow",
-                leaf.value
-            )
-        }));
-    }
-    for leaf in leaves(&schema, &parameters) {
-        let name = leaf.path.join(".");
-        let last = leaf
-            .path
-            .iter()
-            .rfind(|part| part.parse::<usize>().is_err());
-        let last = last.cloned().unwrap_or_default();
-        for (value, allowed) in probes(&leaf) {
+pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
+    let parameters = written(&subject.fixture.plan.nodes[0].spec.parameters());
+    let parameters = DocumentValue::from_json(&parameters, Place::new(SourceId(0), 0, 0))
+        .map_err(|error| error.to_string())?;
+    let mut found = Vec::new();
+    each_parameter((subject.kind.schema)(), &parameters, &mut |part| {
+        for (value, allowed) in probes(&part) {
             let mut table = in_full(subject, &subject.fixture);
-            if !set(&mut table, &leaf.path, value.clone()) {
+            if !set(&mut table, part.path, value.clone()) {
                 continue;
             }
+            let (path, name) = (part.path.join("."), part.name());
             let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
             match (read, allowed) {
-                (Ok(fixture), Allowed::Yes | Allowed::Maybe) => {
-                    if let Err(told) = tried(|| lives(subject, &fixture)) {
-                        found.push(format!("with `{name} = {value}` {told}"));
+                (Ok(_), Allowed::No) => {
+                    found.push(format!("`{path} = {value}` is accepted"));
+                }
+                (Ok(fixture), _) => {
+                    if let Err(why) = tried(|| lives(subject, &fixture)) {
+                        found.push(format!("with `{path} = {value}` {why}"));
                     }
                 }
-                (Err(told), _) if told.starts_with(PANICS) => {
-                    found.push(format!("with `{name} = {value}` {told}"));
+                (Err(why), _) if why.starts_with(PANICS) => {
+                    found.push(format!("with `{path} = {value}` {why}"));
                 }
-                (Ok(_), Allowed::No) => {
-                    found.push(format!("`{name} = {value}` is taken without a word"))
-                }
-                (Err(told), Allowed::Yes) if told.contains(&last) => found.push(format!(
-                    "`{name} = {value}` is allowed by the schema, and refused: {told}"
+                (Err(why), Allowed::Yes) if why.contains(name) => found.push(format!(
+                    "`{path} = {value}` is allowed by the schema, and refused: {why}"
                 )),
                 // Something else does not go together with it.
-                (Err(_), Allowed::Yes | Allowed::Maybe) => {}
-                (Err(told), Allowed::No) if told.contains(&last) => {}
-                (Err(told), Allowed::No) => found.push(format!(
-                    "`{name} = {value}` is refused without naming `{last}`: {told}"
-                )),
+                (Err(_), _) => {}
             }
         }
-    }
+    });
     if found.is_empty() {
         Ok(())
     } else {
@@ -95,27 +77,18 @@ pub(super) fn ranges(subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), S
     }
 }
 
-/// Parameters with a default that is refused where they are left out.
-fn left_out(subject: &Subject<'_>, schema: &Json) -> Vec<String> {
-    let mut found = Vec::new();
-    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
-        let default = &property["default"];
-        let mut table = in_full(subject, &subject.fixture);
-        if default.is_null() || table.remove(name).is_none() {
-            continue;
+/// JSON without its nulls, which a graph file cannot hold.
+pub(super) fn written(json: &Json) -> Json {
+    match json {
+        Json::Object(table) => {
+            let there = table.iter().filter(|(_, value)| !value.is_null());
+            there
+                .map(|(key, value)| (key.clone(), written(value)))
+                .collect()
         }
-        // Whether it can learn may hang on the parameter.
-        table.remove("learn");
-        let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
-        if let Err(told) = read
-            && told.contains(name.as_str())
-        {
-            found.push(format!(
-                "left out, `{name}` is {default}, which is refused: {told}"
-            ));
-        }
+        Json::Array(list) => list.iter().map(written).collect(),
+        other => other.clone(),
     }
-    found
 }
 
 /// What is taken runs, and is written as it was read.
@@ -137,81 +110,59 @@ fn lives(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether the schema allows a value.
+/// Whether a value of a parameter must be accepted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Allowed {
     Yes,
     No,
-    /// It does not say.
+    /// It depends on others.
     Maybe,
 }
 
 /// Values to try.
-fn probes(leaf: &Leaf) -> Vec<(Value, Allowed)> {
-    let text = |text: String, allowed| (Value::String(text), allowed);
-    match &leaf.sort {
-        Sort::Duration => vec![
-            text("-1s".to_owned(), Allowed::No),
-            text("0s".to_owned(), Allowed::Maybe),
-        ],
-        Sort::Quantity => {
-            let unit = leaf.value.as_str().and_then(|text| text.split_once(' '));
-            let unit = unit.map_or("nm", |(_, unit)| unit);
-            vec![
-                text(format!("nan {unit}"), Allowed::No),
-                text(format!("inf {unit}"), Allowed::No),
-                text("1 cd".to_owned(), Allowed::No),
-                text("1".to_owned(), Allowed::No),
-                text(format!("0 {unit}"), Allowed::Maybe),
-            ]
-        }
-        Sort::Number { integer, low, high } => numbers(*integer, *low, *high),
-        // What one of them needs beside it is for a case to say.
-        Sort::Choice(choices) => choices
-            .iter()
-            .filter(|choice| **choice != leaf.value)
-            .filter_map(|choice| Some((crate::node::as_toml(choice)?, Allowed::Maybe)))
-            .collect(),
+fn probes(part: &ParameterPart<'_>) -> Vec<(Value, Allowed)> {
+    let text = |text: &str, allowed| (Value::String(text.to_owned()), allowed);
+    if part.is_text("Duration") {
+        return vec![text("0s", Allowed::Maybe)];
     }
+    if part.is_text("Quantity") {
+        let unit = part
+            .value
+            .and_then(|value| value.as_text()?.split_once(' '));
+        let zero = format!("0 {}", unit.map_or("nm", |(_, unit)| unit));
+        return vec![text("1 cd", Allowed::No), text(&zero, Allowed::Maybe)];
+    }
+    let integer = part.is("integer");
+    if integer || part.is("number") {
+        return numbers(integer, &part.range);
+    }
+    // What a choice needs beside it is for a case to state.
+    let present = part.value.map(DocumentValue::to_json);
+    let choices = part.choices().into_iter();
+    let choices = choices.filter(|choice| Some(choice) != present.as_ref());
+    let choices = choices.filter_map(|choice| Some((as_toml(&choice)?, Allowed::Maybe)));
+    choices.collect()
 }
 
-fn numbers(integer: bool, low: Bound, high: Bound) -> Vec<(Value, Allowed)> {
-    let number = |value: f64| {
-        if integer {
-            Value::Integer(value as i64)
-        } else {
-            Value::Float(value)
-        }
+/// The ends of a range, and what is far away where there is none.
+fn numbers(integer: bool, range: &Range) -> Vec<(Value, Allowed)> {
+    let low = match (range.min, range.above) {
+        (_, Some(_)) => vec![],
+        (Some(min), _) => vec![min],
+        (None, None) => vec![-1e6, -1.0, 0.0],
     };
-    let mut probes = Vec::new();
-    match low {
-        Bound::Inclusive(low) => probes.extend([
-            (number(low), Allowed::Yes),
-            (number(low - 1.0), Allowed::No),
-        ]),
-        Bound::Exclusive(low) => {
-            probes.extend([(number(low), Allowed::No), (number(low - 1.0), Allowed::No)])
-        }
-        Bound::None => probes.extend([-1e6, -1.0, 0.0].map(|value| (number(value), Allowed::Yes))),
-    }
-    match high {
-        Bound::Inclusive(high) => probes.extend([
-            (number(high), Allowed::Yes),
-            (number(high + 1.0), Allowed::No),
-        ]),
-        Bound::Exclusive(high) => probes.extend([
-            (number(high), Allowed::No),
-            (number(high + 1.0), Allowed::No),
-        ]),
+    let high = match (range.max, range.below) {
+        (_, Some(_)) => None,
+        (Some(max), _) => Some(max),
         // A count may stand for room that nobody has.
-        Bound::None if integer => {}
-        Bound::None => probes.push((number(1e6), Allowed::Yes)),
-    }
-    if !integer {
-        let none = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
-        probes.extend(none.map(|value| (number(value), Allowed::No)));
-    }
-    probes
+        (None, None) => (!integer).then_some(1e6),
+    };
+    let ends = low.into_iter().chain(high);
+    let value = |value: f64| match integer {
+        true => Value::Integer(value as i64),
+        false => Value::Float(value),
+    };
+    ends.map(|end| (value(end), Allowed::Yes)).collect()
 }
 
 /// The parameters with defaults filled in, as the specification has them, and what the framework reads beside them.
@@ -220,28 +171,28 @@ fn in_full(subject: &Subject<'_>, fixture: &Fixture) -> toml::Table {
     let elsewhere = subject.kind.framework_keys();
     table.retain(|key, _| elsewhere.contains(&key));
     let own = fixture.plan.nodes[0].spec.parameters();
-    if let Some(Value::Table(own)) = crate::node::as_toml(&own) {
+    if let Some(Value::Table(own)) = as_toml(&own) {
         table.extend(own);
     }
     table
 }
 
 /// Puts a value in its place; whether there is one.
-fn set(table: &mut toml::Table, path: &[String], value: Value) -> bool {
+fn set(table: &mut toml::Table, path: &[Cow<'_, str>], value: Value) -> bool {
     let Some((last, way)) = path.split_last() else {
         return false;
     };
     let Some((first, way)) = way.split_first() else {
-        table.insert(last.clone(), value);
+        table.insert(last.to_string(), value);
         return true;
     };
-    let mut place = table.get_mut(first);
+    let mut place = table.get_mut(&**first);
     for part in way {
         place = place.and_then(|place| step(place, part));
     }
     match place {
         Some(Value::Table(table)) => {
-            table.insert(last.clone(), value);
+            table.insert(last.to_string(), value);
             true
         }
         Some(list @ Value::Array(_)) => step(list, last).is_some_and(|place| {

@@ -156,7 +156,7 @@ t = "health"
         let never = GRAPH.replace(at, &format!("{name} = \"0s\""));
         let told = compiled(&never).0.unwrap_err();
         assert!(
-            told.contains(&format!("`{name}` is 0s and must be longer")),
+            told.contains(&format!("`{name}` is 0s and must be greater than 0")),
             "{told}"
         );
     }

@@ -17,7 +17,6 @@ use athermal_numerics::{InputOrders, Orders};
 
 use crate::features::too_many;
 use crate::order::{LARGEST, Order};
-use model::MOST_DIFFERENCES;
 pub use per_input::PerInput;
 pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 
@@ -133,7 +132,6 @@ impl Asked {
     }
 
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
         let has = [
             self.na.is_some(),
             self.nb.is_some(),
@@ -142,37 +140,10 @@ impl Asked {
             self.nf.is_some(),
             self.nk.is_some(),
         ];
-        let of_all = [("na", self.na), ("nc", self.nc), ("nd", self.nd)];
-        let mut check = |name: &str, order: usize| {
-            if order > LARGEST {
-                let message = format!("`{name}` is {order} and must be 0 to {LARGEST}");
-                mistakes.push(Mistake::at(name, message));
-            }
-        };
-        for (name, order) in of_all {
-            order.into_iter().for_each(|order| check(name, order));
-        }
-        for (name, orders) in self.of_inputs() {
-            let orders = orders.iter().flat_map(PerInput::each);
-            orders.for_each(|order| check(name, order));
-        }
-        match self.differences {
-            Differences::Given(differences) if differences > MOST_DIFFERENCES => {
-                let message =
-                    format!("`differences` is {differences} and must be 0 to {MOST_DIFFERENCES}");
-                mistakes.push(Mistake::at("differences", message));
-            }
-            _ => {}
-        }
-        if !(self.penalty >= 0.0 && self.penalty.is_finite()) {
-            let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
-            mistakes.push(Mistake::at("penalty", message));
-        }
-        mistakes.extend(Mistake::unless_lasting("every", self.every));
-        if let Some(order) = &self.order {
-            mistakes.extend(order.mistakes(has.map(|has| has.then_some(LARGEST))));
-        }
-        mistakes
+        let order = self.order.as_ref();
+        order.map_or_else(Vec::new, |order| {
+            order.mistakes(has.map(|has| has.then_some(LARGEST)))
+        })
     }
 
     /// Lists of orders that are not as long as there are features.

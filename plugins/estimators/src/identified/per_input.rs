@@ -11,7 +11,7 @@ pub enum PerInput {
     /// A number for all.
     All(#[schemars(range(min = 0, max = 100))] usize),
     /// A list with one for each.
-    Each(Vec<usize>),
+    Each(#[schemars(inner(range(min = 0, max = 100)))] Vec<usize>),
 }
 
 impl PerInput {
@@ -31,14 +31,6 @@ impl PerInput {
             Self::All(order) => *order,
             Self::Each(orders) => orders.get(nth).copied().unwrap_or(0),
         }
-    }
-
-    pub(super) fn each(&self) -> impl Iterator<Item = usize> + '_ {
-        let (one, list) = match self {
-            Self::All(order) => (Some(*order), &[][..]),
-            Self::Each(orders) => (None, &orders[..]),
-        };
-        one.into_iter().chain(list.iter().copied())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Decides which identified models can be, and what one predicts that is not followed.
 
 use athermal_core::node::{Coefficients, Learner, Mistake, Predictor};
+use athermal_core::time::Duration;
 
 use super::follow::Following;
 use super::model::{Identified, MOST_DIFFERENCES, MOST_SERIES};
@@ -35,7 +36,10 @@ impl Predictor for Identified {
                 mistakes.push(Mistake::at(at, message));
             }
         }
-        mistakes.extend(Mistake::unless_lasting("step", self.step));
+        if self.step <= Duration::ZERO {
+            let message = format!("`step` is {} and must be greater than 0", self.step);
+            mistakes.push(Mistake::at("step", message));
+        }
         mistakes.extend(told::mistakes(self));
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));

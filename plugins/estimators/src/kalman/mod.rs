@@ -81,16 +81,21 @@ pub struct Kalman {
 #[serde(deny_unknown_fields)]
 pub struct Noises {
     /// Of one truth, such as "3.85 nm/min"; above 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub observation: Quantity,
     /// What the level wanders in the time `per`, such as "10 nm/min"; 0 or more.
+    #[schemars(extend("minimum" = 0))]
     pub level: Quantity,
     /// By what the change of the level within `per` wanders in the time `per`, such as "1 nm/min"; 0 or more, for a level with a trend.
     #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub trend: Option<Quantity>,
     /// The time in which they do, such as "1h".
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub per: Duration,
     /// The time in which a level without a trend returns to its mean, but for 1/e of the way; without it, it does not.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub returns: Option<Duration>,
 }
 
@@ -122,21 +127,8 @@ impl Estimator for Kalman {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if !(self.penalty >= 0.0 && self.penalty.is_finite()) {
-            let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
-            mistakes.push(Mistake::at("penalty", message));
-        }
-        if let Some(every) = self.every
-            && every.is_negative()
-        {
-            let message = format!("`every` is {every} and must be 0s or longer");
-            mistakes.push(Mistake::at("every", message));
-        }
-        if let Some(noises) = &self.noises {
-            noises.find_mistakes(self.trend, &mut mistakes);
-        }
-        mistakes
+        let noises = self.noises.as_ref();
+        noises.map_or_else(Vec::new, |noises| noises.mistakes(self.trend))
     }
 
     fn mistakes_beside(&self, truth: &Unit) -> Vec<Mistake> {
@@ -186,41 +178,15 @@ impl Noises {
         other.map(mistake).collect()
     }
 
-    fn find_mistakes(&self, trend: bool, mistakes: &mut Vec<Mistake>) {
-        let mut check = |name: &str, given: &Quantity, fits: bool, allowed: &str| {
-            if !fits {
-                let message = format!("`{name}` is \"{given}\" and must be {allowed}");
-                mistakes.push(Mistake::at(format!("noises.{name}"), message));
-            }
-        };
-        let observation = &self.observation;
-        check(
-            "observation",
-            observation,
-            observation.value > 0.0,
-            "above 0",
-        );
-        check("level", &self.level, self.level.value >= 0.0, "0 or more");
-        if let Some(given) = &self.trend {
-            check("trend", given, given.value >= 0.0, "0 or more");
-        }
-        if self.per <= Duration::ZERO {
-            let message = format!("`per` is {} and must be longer than nothing", self.per);
-            mistakes.push(Mistake::at("noises.per", message));
-        }
-        if let Some(returns) = self.returns {
-            if returns <= Duration::ZERO {
-                let message = format!("`returns` is {returns} and must be longer than nothing");
-                mistakes.push(Mistake::at("noises.returns", message));
-            }
-            if trend {
-                let message = "a level with a trend does not return to a mean";
-                mistakes.push(
-                    Mistake::at("noises.returns", message)
-                        .help("leave `returns` out, or say `trend = false`")
-                        .rests_on("trend"),
-                );
-            }
+    fn mistakes(&self, trend: bool) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if self.returns.is_some() && trend {
+            let message = "a level with a trend does not return to a mean";
+            mistakes.push(
+                Mistake::at("noises.returns", message)
+                    .help("leave `returns` out, or say `trend = false`")
+                    .rests_on("trend"),
+            );
         }
         match (&self.trend, trend) {
             (None, true) => mistakes.push(
@@ -238,6 +204,7 @@ impl Noises {
             ),
             _ => {}
         }
+        mistakes
     }
 }
 

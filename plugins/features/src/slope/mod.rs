@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::windows::{Cold, Windows};
-use crate::windows::{half, over, three, window_mistakes};
+use crate::windows::{half, over, three};
 
 /// The slope of the least-squares line through the samples of each channel in trailing windows.
 ///
@@ -33,6 +33,7 @@ use crate::windows::{half, over, three, window_mistakes};
 #[serde(deny_unknown_fields)]
 pub struct Slope {
     /// The lengths of the windows, such as `["150s", "5min"]`, or a dynamic range of them.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub windows: Windows,
     /// The unit of the slopes, such as `mK/min` of a temperature; without it, that of differences of the input per minute: of Cel
     /// and K it is K/min, of \[degF\] \[degR\]/min.
@@ -113,7 +114,7 @@ impl Feature for Slope {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        window_mistakes(&self.windows, self.min_samples, 2, self.min_coverage)
+        self.windows.mistakes()
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

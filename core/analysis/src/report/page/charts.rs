@@ -1,4 +1,4 @@
-//! Decides which pictures there are of an axis and of a correction; how one is drawn is decided by [`crate::chart`].
+//! The pictures of an axis and of a correction; [`crate::chart`] draws them.
 
 use std::fmt::Write as _;
 
@@ -73,7 +73,7 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
     }
 }
 
-/// What each voter says.
+/// The prediction of each voter.
 pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
     let shown = shown(axis);
     let mut chart = over_time(axis, "Predictions", hours);
@@ -96,7 +96,7 @@ pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
     chart
 }
 
-/// The voters of which lines can be told apart: all, or of many what is put out and those that weigh most.
+/// The voters whose lines can be distinguished: all, or of many the output and those that weigh most.
 fn shown(axis: &Axis) -> Vec<&Voter> {
     let weight = |voter: &Voter| {
         let of = axis.weights.iter().find(|of| of.slot == voter.slot);

@@ -1,4 +1,4 @@
-//! Decides which correlations and responses of an axis are shown; how, is decided by [`crate::diagnosis`].
+//! The correlations and responses of an axis that a page shows; [`crate::diagnosis`] makes the pictures.
 
 use super::super::{Axis, Facts};
 use crate::chart::Chart;

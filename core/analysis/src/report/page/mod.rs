@@ -1,4 +1,4 @@
-//! Decides what stands on the page and in which order; how a picture is drawn is decided by [`crate::chart`].
+//! What stands on the page and in which order; [`crate::chart`] draws its pictures.
 
 mod charts;
 mod curves;
@@ -71,7 +71,7 @@ fn worth_section(html: &mut String, facts: &Facts) {
     for of in &facts.unjudged {
         let _ = write!(
             html,
-            "<p class=\"bad\">Nothing is told of <b>{}</b>: {}.</p>",
+            "<p class=\"bad\">Nothing is known of <b>{}</b>: {}.</p>",
             escaped(&of.of),
             escaped(&of.why)
         );
@@ -140,10 +140,10 @@ fn limits(axes: &[Axis]) -> Vec<(String, String)> {
         let Some((stable, transient)) = axis.states else {
             continue;
         };
-        let told = format!("{stable}, transient from {transient} {}", axis.unit);
-        match limits.iter_mut().find(|(known, _)| *known == told) {
+        let text = format!("{stable}, transient from {transient} {}", axis.unit);
+        match limits.iter_mut().find(|(known, _)| *known == text) {
             Some((_, names)) => names.push(&axis.name),
-            None => limits.push((told, vec![&axis.name])),
+            None => limits.push((text, vec![&axis.name])),
         }
     }
     let several = limits.len() > 1;
@@ -152,7 +152,7 @@ fn limits(axes: &[Axis]) -> Vec<(String, String)> {
         false => String::new(),
     };
     let limits = limits.into_iter();
-    limits.map(|(told, names)| (told, of(names))).collect()
+    limits.map(|(text, names)| (text, of(names))).collect()
 }
 
 fn wide(html: &mut String, chart: &Chart<'_>) {
@@ -161,7 +161,7 @@ fn wide(html: &mut String, chart: &Chart<'_>) {
 
 fn votes(html: &mut String, facts: &Facts) {
     html.push_str(
-        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
+        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can predict it. \
          Responses are the estimator's to one sensor alone: a step of one unit, and an impulse of the size that stands at its axis.</p>",
     );
     let hours = Hours::of(&facts.course);

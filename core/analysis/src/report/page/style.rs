@@ -1,4 +1,4 @@
-//! Decides how the page looks and how its pictures are zoomed.
+//! How the page looks and how its pictures are zoomed.
 
 pub(super) const STYLE: &str = "\
 body{font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:1100px;margin:0 auto;padding:1rem}\

@@ -1,4 +1,4 @@
-//! Decides the columns of the page's tables.
+//! The columns of the page's tables.
 
 use std::fmt::Write as _;
 

@@ -240,7 +240,7 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
     };
     // A schema takes long to make: only those of the kinds that a graph has are.
     measured.get_or_init(|| {
-        let schema = Value::from((kind.schema)());
+        let schema = (kind.schema)();
         let parameters = schema["properties"].as_object().into_iter().flatten();
         let definitions = &schema["$defs"];
         let measured =

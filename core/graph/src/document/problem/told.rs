@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::DocumentProblem;
-use crate::diagnostic::{Names, Place, Problem, listed, nearest};
-use crate::document::lacks::Lacks;
-use crate::document::salvage::DUPLICATE_KEY;
+use super::{DocumentProblem, codes};
+use crate::diagnostic::{Code, Names, Place, Problem, listed, nearest};
+use crate::document::hint::Hint;
+use crate::document::toml_text::DUPLICATE_KEY;
 use crate::quantity::QuantityError;
 
 /// At most twelve names in quotes, for a list of what there is.
@@ -54,42 +54,42 @@ fn for_key(key: Option<&String>) -> String {
 }
 
 impl Problem for DocumentProblem {
-    fn code(&self) -> &'static str {
+    fn code(&self) -> &'static Code {
         match self {
-            Self::Syntax { .. } => "A001",
-            Self::Unreadable { .. } => "A002",
+            Self::Syntax { .. } => &codes::A001,
+            Self::Unreadable { .. } => &codes::A002,
             Self::TooLarge { .. }
             | Self::TooDeep { .. }
             | Self::LongList { .. }
-            | Self::LongChain { .. } => "A003",
-            Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
-            Self::ExtendsLoop { .. } => "A005",
-            Self::UnknownKey { .. } | Self::InputAsKey { .. } => "A006",
-            Self::MissingKey { .. } => "A007",
-            Self::WrongType { .. } => "A008",
-            Self::UnknownChoice { .. } => "A009",
+            | Self::LongChain { .. } => &codes::A003,
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => &codes::A004,
+            Self::ExtendsLoop { .. } => &codes::A005,
+            Self::UnknownKey { .. } | Self::InputAsKey { .. } => &codes::A006,
+            Self::MissingKey { .. } => &codes::A007,
+            Self::WrongType { .. } => &codes::A008,
+            Self::UnknownChoice { .. } => &codes::A009,
             Self::Refused { .. }
             | Self::NumberTooLarge { .. }
             | Self::NoLength { .. }
-            | Self::StepNotPositive => "A010",
-            Self::BadName { .. } => "A011",
-            Self::DuplicateName { .. } => "A012",
-            Self::UnknownSet { .. } => "A013",
-            Self::UnknownPlaceholder { .. } => "A014",
-            Self::EmptyList { .. } => "A015",
-            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => "A016",
-            Self::Unit(_) => "A017",
-            Self::Duration(_) | Self::Quantity(_) | Self::UnitTwice { .. } => "A018",
-            Self::NothingToRemove { .. } => "A019",
-            Self::SamplesWithoutClock { .. } => "A020",
-            Self::OneColumn { .. } => "A021",
-            Self::RangeUnit { .. } | Self::RangeOrder { .. } => "A022",
-            Self::UnknownChannel { .. } => "A023",
-            Self::TimeContradiction { .. } => "A024",
-            Self::UnknownModule { .. } => "A025",
-            Self::ModuleLoop { .. } => "A026",
-            Self::OutOfReach { .. } => "A027",
-            Self::UnknownOutput { .. } => "A028",
+            | Self::StepNotPositive => &codes::A010,
+            Self::BadName { .. } => &codes::A011,
+            Self::DuplicateName { .. } => &codes::A012,
+            Self::UnknownSet { .. } => &codes::A013,
+            Self::UnknownPlaceholder { .. } => &codes::A014,
+            Self::EmptyList { .. } => &codes::A015,
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => &codes::A016,
+            Self::Unit(_) => &codes::A017,
+            Self::Duration(_) | Self::Quantity(_) | Self::UnitTwice { .. } => &codes::A018,
+            Self::NothingToRemove { .. } => &codes::A019,
+            Self::SamplesWithoutClock { .. } => &codes::A020,
+            Self::OneColumn { .. } => &codes::A021,
+            Self::RangeUnit { .. } | Self::RangeOrder { .. } => &codes::A022,
+            Self::UnknownChannel { .. } => &codes::A023,
+            Self::TimeContradiction { .. } => &codes::A024,
+            Self::UnknownModule { .. } => &codes::A025,
+            Self::ModuleLoop { .. } => &codes::A026,
+            Self::OutOfReach { .. } => &codes::A027,
+            Self::UnknownOutput { .. } => &codes::A028,
         }
     }
 
@@ -259,8 +259,8 @@ impl Problem for DocumentProblem {
                 Some("begin the file with `schema = 1`".to_owned())
             }
             Self::Syntax {
-                slip: Some(slip), ..
-            } => Some(slip.help()),
+                foreign: Some(foreign), ..
+            } => Some(foreign.help()),
             Self::Syntax { reason, .. } if reason == DUPLICATE_KEY => Some(
                 "a key stands once, be it `key = …`, `[key]` or `[[key]]`: take one of the two away"
                     .to_owned(),
@@ -301,7 +301,7 @@ impl Problem for DocumentProblem {
                 Some(format!("`{input}` is an input: write `inputs.{input} = …`"))
             }
             Self::MissingKey { advice, .. } => advice.clone(),
-            Self::WrongType { lacks, .. } => lacks.as_ref().map(Lacks::help),
+            Self::WrongType { hint, .. } => hint.as_ref().map(Hint::help),
             Self::UnknownChoice { found, choices, .. } => {
                 suggestion(found, choices, "the choices are")
             }
@@ -422,52 +422,6 @@ impl Problem for DocumentProblem {
                 )
             }
             _ => None,
-        }
-    }
-
-    fn may_follow_from_a_gap(&self) -> bool {
-        match self {
-            Self::MissingKey { .. }
-            | Self::UnknownSet { .. }
-            | Self::NothingToRemove { .. }
-            | Self::SamplesWithoutClock { .. }
-            | Self::UnknownChannel { .. }
-            | Self::UnknownModule { .. }
-            | Self::OutOfReach { .. }
-            | Self::UnknownOutput { .. } => true,
-            // In an output none has a meaning.
-            Self::UnknownPlaceholder { instead, .. } => instead.is_none(),
-            Self::Syntax { .. }
-            | Self::Unreadable { .. }
-            | Self::TooLarge { .. }
-            | Self::TooDeep { .. }
-            | Self::LongList { .. }
-            | Self::LongChain { .. }
-            | Self::ExtendsLoop { .. }
-            | Self::SchemaMissing
-            | Self::SchemaUnknown { .. }
-            | Self::UnknownKey { .. }
-            | Self::InputAsKey { .. }
-            | Self::WrongType { .. }
-            | Self::UnknownChoice { .. }
-            | Self::Refused { .. }
-            | Self::NumberTooLarge { .. }
-            | Self::BadName { .. }
-            | Self::DuplicateName { .. }
-            | Self::EmptyList { .. }
-            | Self::TooManyInstances { .. }
-            | Self::TooLargeExpanded { .. }
-            | Self::Unit(_)
-            | Self::Duration(_)
-            | Self::Quantity(_)
-            | Self::OneColumn { .. }
-            | Self::RangeUnit { .. }
-            | Self::RangeOrder { .. }
-            | Self::TimeContradiction { .. }
-            | Self::NoLength { .. }
-            | Self::StepNotPositive
-            | Self::UnitTwice { .. }
-            | Self::ModuleLoop { .. } => false,
         }
     }
 

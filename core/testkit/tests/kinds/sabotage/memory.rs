@@ -9,8 +9,10 @@ use super::*;
 #[serde(deny_unknown_fields)]
 struct Window {
     /// How long the window is.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     window: Duration,
     /// How much of the window it tells that it looks back.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     told: Duration,
 }
 
@@ -20,12 +22,6 @@ impl Feature for Window {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let lengths = [("window", self.window), ("told", self.told)];
-        let mistakes = lengths.map(|(name, length)| Mistake::unless_lasting(name, length));
-        let mistakes: Vec<Mistake> = mistakes.into_iter().flatten().collect();
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
         let mut channels = inputs.port("signal").to_vec();
         for channel in &mut channels {
             channel.span += self.window;
@@ -194,13 +190,7 @@ impl Combine for Errors {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known() {
-            Ok(known) => {
-                *self = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(self)
     }
 }
 

@@ -1,0 +1,130 @@
+//! Mistakes about node types: which there are, and what a type refuses or doubts.
+
+use super::nearest_or_all;
+use crate::compile::KindFault;
+use crate::diagnostic::{code, names, problem};
+use crate::node::{Kind, Written};
+
+code!(
+    A040,
+    Error,
+    "unknown node type",
+    "No crate in this program has a node of this type. `athermal nodes` lists the types that there are."
+);
+
+problem! {
+    /// A `type` that no linked crate brings.
+    A040 UnknownKind { kind: String, known: Vec<&'static str> }
+    message: format!("there is no node type `{kind}`"),
+    label: "no such type",
+    help: nearest_or_all(
+        kind,
+        known,
+        "`athermal build --with CRATE` brings those of a plugin crate; types in this program:",
+    ),
+}
+
+code!(
+    A041,
+    Error,
+    "ambiguous name",
+    "Two crates in this program have a node of the same type, or write what a node knows under the same name, so that a graph or a \
+     file could mean either."
+);
+
+problem! {
+    /// Two crates bring the same kind.
+    A041 KindTwice { kind: String, packages: Vec<&'static str> }
+    message: format!("the node type `{kind}` is brought by several crates: {}", names(packages)),
+    label: "which of them?",
+    help: "leave one of the crates out when the program is built",
+}
+
+problem! {
+    /// Something that the kind's crate writes has a name that is taken twice.
+    A041 WrittenTwice {
+        kind: String,
+        of: Written,
+        name: &'static str,
+        packages: Vec<&'static str>,
+    }
+    message: format!(
+        "`{kind}` cannot be used, since the name of the {of} `{name}` is taken twice, by {}",
+        names(packages)
+    ),
+    label: "which of them?",
+    help: format!(
+        "give one of them another name in its `{of}!`, or leave one of the crates out when the program is built"
+    ),
+}
+
+code!(
+    A054,
+    Error,
+    "parameters that do not fit",
+    "The node's type refuses a parameter, or how its inputs fit together. `athermal nodes TYPE` lists what it takes."
+);
+
+problem! {
+    /// A mistake that the kind found.
+    A054 Parameter { message: String, help: Option<String> }
+    message: message.as_str(),
+    label: "here",
+    help: help.clone(),
+}
+
+code!(
+    A065,
+    Warning,
+    "doubtful use",
+    "The node works as it is written, but not as it is meant to be used. Its documentation describes what it needs."
+);
+
+problem! {
+    /// Something that the kind can use and doubts to be meant.
+    A065 Doubt { message: String, help: Option<String> }
+    message: message.as_str(),
+    label: "here",
+    help: help.clone(),
+}
+
+code!(
+    A110,
+    Error,
+    "estimator that does not learn",
+    "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters."
+);
+
+problem! {
+    /// An estimator with `learn` that cannot learn while it runs.
+    A110 NeverLearns { kind: &'static str, help: Option<&'static str> }
+    message: format!("`{kind}`, as it is here, does not learn while it runs"),
+    label: "stays as it was fitted",
+    help: help.unwrap_or("leave `learn` out, or choose a kind that learns"),
+}
+
+code!(
+    A180,
+    Error,
+    "mistake of a plugin",
+    "The code of the node's type does what no node may: it panics, or asks for values from the future. The graph is not at fault, and \
+     can only do without the type until its author has fixed it; `athermal nodes TYPE` names the crate."
+);
+
+problem! {
+    /// A mistake in the code of a kind.
+    A180 FaultyKind { kind: &'static str, author: String, fault: KindFault }
+    message: format!("`{kind}` {}", fault.found),
+    label: "a mistake of its kind, not of the graph",
+    help: format!("for {author}: {}", fault.remedy),
+}
+
+impl FaultyKind {
+    pub(in crate::compile) fn new(kind: &Kind, fault: KindFault) -> Self {
+        Self {
+            kind: kind.name,
+            author: kind.author(),
+            fault,
+        }
+    }
+}
