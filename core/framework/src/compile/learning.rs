@@ -19,7 +19,7 @@ impl Resolver<'_> {
     ) -> Option<Option<PlannedLearning>> {
         let learns = estimator.learns();
         let limits = match (instance.read.estimator.learn, learns) {
-            (None, Learns::UnlessTold) => Some(LearnLimits::default()),
+            (None, Learns::ByDefault) => Some(LearnLimits::default()),
             (None, _) | (Some(Learn::Switch(false)), _) => None,
             (Some(_), Learns::Never { help }) => {
                 let kind = instance.kind.name;

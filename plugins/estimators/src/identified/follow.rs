@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Beginning, Polynomials, Stepper};
+use athermal_numerics::{Beginning, Stepper};
 use serde::{Deserialize, Serialize};
 
 use super::model::Identified;
@@ -31,8 +31,8 @@ struct Followed {
     stepper: Stepper,
     /// The instant of its last sample.
     at: Instant,
-    /// How many truths have been told since the segment began, as far as that counts.
-    told: u32,
+    /// How many truths have come since the segment began, as far as that counts.
+    truths: u32,
 }
 
 /// What is known since the segment began.
@@ -50,24 +50,6 @@ struct Known {
 }
 
 athermal_core::state!(Known, "identified/4");
-
-/// How it was kept while filters were taken to be where the first truth had put them.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(untagged)]
-enum Sure {
-    /// Of a model without filters it is the same.
-    Same(Known),
-    /// Of others it does not tell how unsure they are, and what it says of the rest has other places.
-    Other {},
-}
-
-athermal_core::state!(Sure, "identified/3");
-
-/// How it was kept while what was predicted in a gap was taken for measured.
-#[derive(Debug, Serialize, Deserialize)]
-struct Before {}
-
-athermal_core::state!(Before, "identified/2");
 
 /// Follows a model.
 #[derive(Debug)]
@@ -98,7 +80,7 @@ impl Following {
         let followed = Followed {
             stepper: stepper.clone(),
             at: Instant::MIN,
-            told: 0,
+            truths: 0,
         };
         Self {
             known: Known {
@@ -189,12 +171,12 @@ impl Known {
                 .stepper
                 .begin(&input, before, |nth| begins.squares[nth]);
             followed.at = of - *step + part(*step, nth as i64, count);
-            followed.told = 0;
+            followed.truths = 0;
         }
         self.begun = true;
     }
 
-    /// Makes room for the runs that are kept where truths are missing, of which the next may be told so long after its run.
+    /// Makes room for the runs that are kept where truths are missing, of which the next may come so long after its run.
     fn make_room(&mut self, after: Duration) {
         let steps = after.secs() / self.step.secs() + 2.0;
         let runs = (RUNS_PER_STEP as f64 * steps).min(MOST_RUNS) as usize;
@@ -240,12 +222,6 @@ impl Known {
             .is_some_and(|(&last, longest)| self.steps(last, of) > longest)
     }
 
-    /// Of how many values of filters it is known what they gave.
-    fn filters(&self) -> usize {
-        let models = self.series.iter().map(|followed| followed.stepper.model());
-        models.map(Polynomials::starts).sum()
-    }
-
     /// Forgets where it was.
     fn end(&mut self) {
         self.begun = false;
@@ -261,7 +237,7 @@ impl Known {
     /// The series whose newest sample is the newest that lies a step before an instant.
     fn nearest(&self, of: Instant) -> &Followed {
         let before = of - part(self.step, 1, 2);
-        let key = |followed: &&Followed| (followed.at <= before, followed.told > 0, followed.at);
+        let key = |followed: &&Followed| (followed.at <= before, followed.truths > 0, followed.at);
         self.series
             .iter()
             .max_by_key(key)
@@ -290,10 +266,10 @@ impl Learner for Following {
         let mut series = self.known.series.iter();
         // As many truths as tell what filters gave, or how far the model looks back.
         let needed = |of: &Stepper| of.model().a.len().max(of.model().starts()).max(1);
-        series.all(|followed| followed.told as usize >= needed(&followed.stepper))
+        series.all(|followed| followed.truths as usize >= needed(&followed.stepper))
     }
 
-    fn run(&mut self, regressors: &[f64], of: Instant, told: Instant) {
+    fn run(&mut self, regressors: &[f64], of: Instant, arrived: Instant) {
         let known = &mut self.known;
         if regressors.iter().any(|value| value.is_nan()) {
             return;
@@ -303,13 +279,13 @@ impl Learner for Following {
         }
         if !known.begun {
             known.begin(regressors, of, &self.begins);
-            known.make_room(of - told);
+            known.make_room(of - arrived);
         }
-        // A truth that has not been told by now never will be.
+        // A truth that has not come by now never will.
         for nth in 0..known.series.len() {
             let Followed { at, .. } = known.series[nth];
             let mut next = at + known.step;
-            let overdue = told - part(known.step, 1, 2);
+            let overdue = arrived - part(known.step, 1, 2);
             if next > overdue {
                 continue;
             }
@@ -343,7 +319,7 @@ impl Learner for Following {
 
     fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
         let followed = self.known.nearest(of);
-        let blind = followed.told == 0 && followed.stepper.model().follows();
+        let blind = followed.truths == 0 && followed.stepper.model().follows();
         if !self.known.begun || blind {
             return f64::NAN;
         }
@@ -359,7 +335,7 @@ impl Learner for Following {
         let followed = self.known.nearest(of);
         let known = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
         let last = self.deviations.len().saturating_sub(1);
-        if followed.told == 0 && followed.stepper.model().follows() {
+        if followed.truths == 0 && followed.stepper.model().follows() {
             return known(last);
         }
         let steps = usize::try_from(self.known.steps(followed.at, of)).unwrap_or(usize::MAX);
@@ -387,7 +363,7 @@ impl Learner for Following {
         if at < soonest {
             return;
         }
-        let (from, is_first) = (followed.at, followed.told == 0);
+        let (from, is_first) = (followed.at, followed.truths == 0);
         let (known, stepper) = (&mut self.known, self.scratch.get_mut());
         std::mem::swap(stepper, &mut known.series[nth].stepper);
         for between in known.between(from, at) {
@@ -402,7 +378,7 @@ impl Learner for Following {
         let followed = &mut known.series[nth];
         std::mem::swap(stepper, &mut followed.stepper);
         followed.at = at;
-        followed.told = followed.told.saturating_add(1);
+        followed.truths = followed.truths.saturating_add(1);
     }
 
     fn segment(&mut self, _shift: Duration) {
@@ -414,24 +390,9 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let state = state.into_any();
-        if state.is::<Before>() {
-            return Restored::cold("it was kept without how unsure a gap had left it");
-        }
-        let (known, restored) = match state.downcast::<Sure>().map(|former| *former) {
-            Ok(Sure::Same(known)) if known.filters() == 0 => {
-                let from = "identified/3".to_owned();
-                (known, Restored::Migrated { from })
-            }
-            Ok(_) => {
-                return Restored::cold(
-                    "it was kept without how unsure a start had left its filters",
-                );
-            }
-            Err(state) => match state.downcast::<Known>() {
-                Ok(known) => (*known, Restored::Accepted),
-                Err(_) => return Restored::cold("the state belongs to another kind of node"),
-            },
+        let known = match state.known::<Known>() {
+            Ok(known) => known,
+            Err(cold) => return cold,
         };
         if known.regressors != self.known.regressors {
             return Restored::cold("it was followed with other inputs");
@@ -450,7 +411,7 @@ impl Learner for Following {
             if !own.stepper.resume(&other.stepper) {
                 return Restored::cold("it was followed with other orders");
             }
-            (own.at, own.told) = (other.at, other.told);
+            (own.at, own.truths) = (other.at, other.truths);
         }
         self.known.series = series;
         self.known.begun = known.begun;
@@ -460,7 +421,7 @@ impl Learner for Following {
         let Known { runs, inputs, .. } = &mut self.known;
         runs.reserve(runs.len().max(16));
         inputs.reserve(inputs.len().max(16));
-        restored
+        Restored::Accepted
     }
 }
 

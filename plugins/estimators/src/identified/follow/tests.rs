@@ -3,6 +3,7 @@
 use super::super::model::{MOST_SERIES, identified};
 use super::*;
 use athermal_core::node::Predictor;
+use athermal_numerics::Polynomials;
 
 #[test]
 fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noise_give() {
@@ -215,7 +216,7 @@ fn of_truths_that_come_much_faster_than_a_step_each_series_takes_one_a_step() {
         learner.learn(&[1.0], 0.0, at);
     }
     for followed in &learner.known.series {
-        assert!((10..=11).contains(&followed.told), "{followed:?}");
+        assert!((10..=11).contains(&followed.truths), "{followed:?}");
     }
 }
 
@@ -276,54 +277,5 @@ fn where_truths_are_missing_predictions_and_deviations_are_those_of_a_kalman_fil
             }
         }
         assert!(compared == 380 && missing > 100, "{name}: {missing}");
-    }
-}
-
-#[test]
-fn a_state_that_does_not_tell_how_unsure_a_gap_left_it_is_answered_with_that() {
-    let model = identified(Duration::from_ns(1_000_000_000));
-    let mut written = serde_json::to_value(Following::new(&model).snapshot()).unwrap();
-    assert_eq!(written["state"], "identified/4");
-    let mut learner = Following::new(&model);
-    let read = serde_json::from_value(written.clone()).unwrap();
-    assert_eq!(learner.restore(read), Restored::Accepted);
-    written["state"] = "identified/2".into();
-    written["series"][0]["stepper"]["missed"] = 2.into();
-    let read = serde_json::from_value(written).unwrap();
-    assert_eq!(
-        learner.restore(read),
-        Restored::cold("it was kept without how unsure a gap had left it")
-    );
-}
-
-#[test]
-fn a_state_that_does_not_tell_how_unsure_filters_are_is_read_where_there_are_none() {
-    let step = Duration::from_ns(1_000_000_000);
-    let mut of = identified(step);
-    of.model.c = vec![0.5];
-    let restored = |of: &Identified, spoil: &dyn Fn(&mut serde_json::Value)| {
-        let mut before = Following::new(of);
-        before.run(&[1.0], Instant::from_ns(0), Instant::from_ns(0) - step);
-        before.learn(&[1.0], 3.0, Instant::from_ns(0));
-        let mut written = serde_json::to_value(before.snapshot()).unwrap();
-        written["state"] = "identified/3".into();
-        spoil(&mut written);
-        let mut after = Following::new(of);
-        let restored = after.restore(serde_json::from_value(written).unwrap());
-        let next = Instant::from_ns(0) + step;
-        let same = after.predict(&[1.0], next).to_bits() == before.predict(&[1.0], next).to_bits();
-        (restored, same)
-    };
-    let from = "identified/3".to_owned();
-    assert_eq!(restored(&of, &|_| {}), (Restored::Migrated { from }, true));
-    of.model.a = Vec::new();
-    of.model.inputs[0].f = vec![-0.5];
-    let cold = Restored::cold("it was kept without how unsure a start had left its filters");
-    // It was of innovations alone, and nothing where these were known.
-    for doubt in [&[0.5][..], &[]] {
-        let found = restored(&of, &|written| {
-            written["series"][0]["stepper"]["doubt"] = doubt.into();
-        });
-        assert_eq!(found.0, cold, "{doubt:?}");
     }
 }
