@@ -279,19 +279,22 @@ fn where_truths_are_missing_predictions_and_deviations_are_those_of_a_kalman_fil
     }
 }
 
+fn read(written: &serde_json::Value) -> Box<dyn State> {
+    let written = rmp_serde::to_vec_named(written).unwrap();
+    <dyn State>::read(&written).unwrap()
+}
+
 #[test]
 fn a_state_that_does_not_tell_how_unsure_a_gap_left_it_is_answered_with_that() {
     let model = identified(Duration::from_ns(1_000_000_000));
     let mut written = serde_json::to_value(Following::new(&model).snapshot()).unwrap();
     assert_eq!(written["state"], "identified/4");
     let mut learner = Following::new(&model);
-    let read = serde_json::from_value(written.clone()).unwrap();
-    assert_eq!(learner.restore(read), Restored::Accepted);
+    assert_eq!(learner.restore(read(&written)), Restored::Accepted);
     written["state"] = "identified/2".into();
     written["series"][0]["stepper"]["missed"] = 2.into();
-    let read = serde_json::from_value(written).unwrap();
     assert_eq!(
-        learner.restore(read),
+        learner.restore(read(&written)),
         Restored::cold("it was kept without how unsure a gap had left it")
     );
 }
@@ -309,7 +312,7 @@ fn a_state_that_does_not_tell_how_unsure_filters_are_is_read_where_there_are_non
         written["state"] = "identified/3".into();
         spoil(&mut written);
         let mut after = Following::new(of);
-        let restored = after.restore(serde_json::from_value(written).unwrap());
+        let restored = after.restore(read(&written));
         let next = Instant::from_ns(0) + step;
         let same = after.predict(&[1.0], next).to_bits() == before.predict(&[1.0], next).to_bits();
         (restored, same)
