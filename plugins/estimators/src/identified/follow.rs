@@ -51,24 +51,6 @@ struct Known {
 
 athermal_core::state!(Known, "identified/4");
 
-/// How it was kept while filters were taken to be where the first truth had put them.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(untagged)]
-enum Sure {
-    /// Of a model without filters it is the same.
-    Same(Known),
-    /// Of others it does not tell how unsure they are, and what it says of the rest has other places.
-    Other {},
-}
-
-athermal_core::state!(Sure, "identified/3");
-
-/// How it was kept while what was predicted in a gap was taken for measured.
-#[derive(Debug, Serialize, Deserialize)]
-struct Before {}
-
-athermal_core::state!(Before, "identified/2");
-
 /// Follows a model.
 #[derive(Debug)]
 pub(super) struct Following {
@@ -240,12 +222,6 @@ impl Known {
             .is_some_and(|(&last, longest)| self.steps(last, of) > longest)
     }
 
-    /// Of how many values of filters it is known what they gave.
-    fn filters(&self) -> usize {
-        let models = self.series.iter().map(|followed| followed.stepper.model());
-        models.map(Polynomials::starts).sum()
-    }
-
     /// Forgets where it was.
     fn end(&mut self) {
         self.begun = false;
@@ -414,24 +390,9 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let state = state.into_any();
-        if state.is::<Before>() {
-            return Restored::cold("it was kept without how unsure a gap had left it");
-        }
-        let (known, restored) = match state.downcast::<Sure>().map(|former| *former) {
-            Ok(Sure::Same(known)) if known.filters() == 0 => {
-                let from = "identified/3".to_owned();
-                (known, Restored::Migrated { from })
-            }
-            Ok(_) => {
-                return Restored::cold(
-                    "it was kept without how unsure a start had left its filters",
-                );
-            }
-            Err(state) => match state.downcast::<Known>() {
-                Ok(known) => (*known, Restored::Accepted),
-                Err(_) => return Restored::cold("the state belongs to another kind of node"),
-            },
+        let known: Known = match state.known() {
+            Ok(known) => known,
+            Err(cold) => return cold,
         };
         if known.regressors != self.known.regressors {
             return Restored::cold("it was followed with other inputs");
@@ -460,7 +421,7 @@ impl Learner for Following {
         let Known { runs, inputs, .. } = &mut self.known;
         runs.reserve(runs.len().max(16));
         inputs.reserve(inputs.len().max(16));
-        restored
+        Restored::Accepted
     }
 }
 

@@ -37,16 +37,6 @@ struct Known {
 
 athermal_core::state!(Known, "kalman/2");
 
-/// How it was kept while the mean could not leap.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Before {
-    filter: Filter,
-    scaling: Scaling,
-    last: Option<Instant>,
-}
-
-athermal_core::state!(Before, "kalman/1");
-
 impl Known {
     fn new(filter: &Filter, scaling: &Scaling, last: Option<Instant>) -> Self {
         Self {
@@ -186,25 +176,9 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let state = state.into_any();
-        let (known, restored) = match state.downcast::<Before>() {
-            Ok(before) => {
-                let Before {
-                    filter,
-                    scaling,
-                    last,
-                } = &*before;
-                if filter.is_diffuse() {
-                    return Restored::cold("it knows nothing of a state");
-                }
-                let from = "kalman/1".to_owned();
-                let known = Known::new(filter, scaling, *last);
-                (known, Restored::Migrated { from })
-            }
-            Err(state) => match state.downcast::<Known>() {
-                Ok(known) => (*known, Restored::Accepted),
-                Err(_) => return Restored::cold("the state belongs to another kind of node"),
-            },
+        let known: Known = match state.known() {
+            Ok(known) => known,
+            Err(cold) => return cold,
         };
         if known.scaling != self.known.scaling {
             return Restored::cold("its coefficients are for features on another scale");
@@ -216,7 +190,7 @@ impl Learner for Following {
             return Restored::cold("it has other states: a trend more or less, or other features");
         }
         self.known.last = known.last;
-        restored
+        Restored::Accepted
     }
 }
 
@@ -259,24 +233,6 @@ mod tests {
 
     fn after(secs: i64) -> Instant {
         Instant::from_ns(secs * 1_000_000_000)
-    }
-
-    #[test]
-    fn what_was_kept_while_the_mean_could_not_leap_is_gone_on_from() {
-        let mut following = following();
-        following.segment(Duration::ZERO);
-        let before = Before {
-            filter: filter(),
-            scaling: scaling(),
-            last: Some(after(10)),
-        };
-        let answer = following.restore(Box::new(before));
-        let from = "kalman/1".to_owned();
-        assert_eq!(answer, Restored::Migrated { from });
-        let kept = (-5.0 * filter().model().returning).exp();
-        let expected = 100.0 + kept + 3.0 * (14.0 - 10.0) / 2.0;
-        let found = following.predict(&[14.0], after(15));
-        assert!((found - expected).abs() < 1e-12, "{found}");
     }
 
     #[test]
