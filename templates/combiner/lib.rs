@@ -1,9 +1,6 @@
 //! A combiner of athermal: a mean of votes that weighs each by how close its voter has been.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
-use athermal_core::time::Instant;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use athermal_core::node::prelude::*;
 
 /// The mean of the votes, each weighed by how close its voter has been lately.
 ///
@@ -31,15 +28,6 @@ impl Combiner for MyNode {
                 InputPort::truth("what the voters predict, for their errors"),
             ]
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        // Written so that NaN fails too.
-        if self.pace > 0.0 && self.pace <= 1.0 {
-            return Vec::new();
-        }
-        let message = format!("`pace` is {} and must be above 0 and at most 1", self.pace);
-        vec![Mistake::at("pace", message)]
     }
 
     fn is_endless(&self) -> bool {
@@ -107,14 +95,11 @@ impl Combine for Weighing {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Errors>() {
-            Ok(state) if state.errors.len() == self.errors.len() => {
-                self.errors = state.errors;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of voters differs"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Errors| {
+            let fits = state.errors.len() == self.errors.len();
+            fits.then(|| self.errors = state.errors)
+                .ok_or("the number of voters differs")
+        })
     }
 }
 

@@ -1,12 +1,6 @@
 //! An estimator of athermal: a line through the truths over the first of the features.
 
-use athermal_core::node::{
-    Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
-};
-use athermal_core::time::Duration;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use athermal_core::node::prelude::*;
 
 /// Predicts the truth by a straight line over the first feature, its slope shrunk.
 ///
@@ -38,18 +32,6 @@ impl Estimator for MyNode {
             feature_lags: vec![Duration::ZERO],
             ..Regressors::default()
         }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        // Written so that NaN fails too.
-        if (0.0..=1000.0).contains(&self.shrinkage) {
-            return Vec::new();
-        }
-        let message = format!(
-            "`shrinkage` is {} and must be from 0 to 1000",
-            self.shrinkage
-        );
-        vec![Mistake::at("shrinkage", message)]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -2,11 +2,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
-};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use athermal_core::node::prelude::*;
 
 /// The mean of the last samples of each channel.
 ///
@@ -14,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MyNode {
-    /// How many samples the mean is taken of, 1 to 10,000.
+    /// How many samples the mean is taken of, 1 to 10,000: the compiler checks the range.
     #[schemars(range(min = 1, max = 10_000))]
     pub samples: usize,
 }
@@ -25,10 +21,6 @@ impl Feature for MyNode {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        if !(1..=10_000).contains(&self.samples) {
-            let message = format!("`samples` is {} and must be from 1 to 10,000", self.samples);
-            return Err(vec![Mistake::at("samples", message)]);
-        }
         let channels = inputs.port("signal").to_vec();
         Ok(vec![OutputPort {
             name: "mean",
@@ -83,18 +75,17 @@ impl Operator for Averaging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<LastSamples>() {
-            Ok(state) if state.last.len() == self.last.len() => {
-                for (last, from) in self.last.iter_mut().zip(state.last) {
-                    last.clear();
-                    // Into the room that is there, so that no tick has to make any; of too many the newest.
-                    last.extend(from.iter().skip(from.len().saturating_sub(self.samples)));
-                }
-                Restored::Accepted
+        state.accept(|state: LastSamples| {
+            if state.last.len() != self.last.len() {
+                return Err("the number of channels differs");
             }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+            for (last, from) in self.last.iter_mut().zip(state.last) {
+                last.clear();
+                // Into the room that is there, so that no tick has to make any; of too many the newest.
+                last.extend(from.iter().skip(from.len().saturating_sub(self.samples)));
+            }
+            Ok(())
+        })
     }
 }
 

@@ -228,19 +228,32 @@ impl Serialize for Quantity {
     }
 }
 
+impl Quantity {
+    /// The name by which a deserializer knows the type.
+    pub(crate) const TYPE: &str = "athermal::Quantity";
+    /// What a message says that was expected.
+    pub(crate) const EXPECTED: &str = "a quantity like \"150 nm/min\"";
+}
+
 impl<'de> Deserialize<'de> for Quantity {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
-        impl de::Visitor<'_> for Visitor {
+        impl<'de> de::Visitor<'de> for Visitor {
             type Value = Quantity;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a quantity like \"150 nm/min\"")
+                f.write_str(Quantity::EXPECTED)
+            }
+            fn visit_newtype_struct<D: Deserializer<'de>>(
+                self,
+                of: D,
+            ) -> Result<Quantity, D::Error> {
+                of.deserialize_str(self)
             }
             fn visit_str<E: de::Error>(self, text: &str) -> Result<Quantity, E> {
                 text.parse().map_err(E::custom)
             }
         }
-        deserializer.deserialize_str(Visitor)
+        deserializer.deserialize_newtype_struct(Quantity::TYPE, Visitor)
     }
 }
 

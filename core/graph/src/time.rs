@@ -448,19 +448,32 @@ impl Serialize for Duration {
     }
 }
 
+impl Duration {
+    /// The name by which a deserializer knows the type.
+    pub(crate) const TYPE: &str = "athermal::Duration";
+    /// What a message says that was expected.
+    pub(crate) const EXPECTED: &str = "a duration like \"5min\"";
+}
+
 impl<'de> Deserialize<'de> for Duration {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
-        impl de::Visitor<'_> for Visitor {
+        impl<'de> de::Visitor<'de> for Visitor {
             type Value = Duration;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a duration like \"5min\"")
+                f.write_str(Duration::EXPECTED)
+            }
+            fn visit_newtype_struct<D: Deserializer<'de>>(
+                self,
+                of: D,
+            ) -> Result<Duration, D::Error> {
+                of.deserialize_str(self)
             }
             fn visit_str<E: de::Error>(self, text: &str) -> Result<Duration, E> {
                 text.parse().map_err(E::custom)
             }
         }
-        deserializer.deserialize_str(Visitor)
+        deserializer.deserialize_newtype_struct(Duration::TYPE, Visitor)
     }
 }
 

@@ -486,19 +486,29 @@ impl Serialize for Unit {
     }
 }
 
+impl Unit {
+    /// The name by which a deserializer knows the type.
+    pub(crate) const TYPE: &str = "athermal::Unit";
+    /// What a message says that was expected.
+    pub(crate) const EXPECTED: &str = "a unit like \"nm/min\"";
+}
+
 impl<'de> Deserialize<'de> for Unit {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Visitor;
-        impl de::Visitor<'_> for Visitor {
+        impl<'de> de::Visitor<'de> for Visitor {
             type Value = Unit;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a unit like \"nm/min\"")
+                f.write_str(Unit::EXPECTED)
+            }
+            fn visit_newtype_struct<D: Deserializer<'de>>(self, of: D) -> Result<Unit, D::Error> {
+                of.deserialize_str(self)
             }
             fn visit_str<E: de::Error>(self, text: &str) -> Result<Unit, E> {
                 Unit::parse(text).map_err(E::custom)
             }
         }
-        deserializer.deserialize_str(Visitor)
+        deserializer.deserialize_newtype_struct(Unit::TYPE, Visitor)
     }
 }
 

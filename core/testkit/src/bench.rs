@@ -11,9 +11,9 @@ use crate::time::Instant;
 /// A node in a graph of its own, fed by hand and stepped by the real engine.
 ///
 /// ```
-/// # use athermal_core::node::{Combine, Combiner, InputPort, Votes};
+/// # use athermal_core::node::prelude::*;
 /// # /// The largest of the votes, as an example of a node.
-/// # #[derive(Debug, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+/// # #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 /// # pub struct Largest {}
 /// # impl Combiner for Largest {
 /// #     fn inputs() -> &'static [InputPort] {

@@ -4,9 +4,9 @@
 //! `tests/conformance.rs` then has a line for each kind:
 //!
 //! ```
-//! # use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+//! # use athermal_core::node::prelude::*;
 //! # /// Twice its input, as an example of a node.
-//! # #[derive(Debug, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+//! # #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 //! # #[serde(deny_unknown_fields)]
 //! # pub struct Twice {}
 //! # impl Feature for Twice {

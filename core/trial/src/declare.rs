@@ -14,7 +14,7 @@ use super::table::SimulationTable;
 use crate::compile::{Part, Plan, Reference, SourceChannel};
 use crate::diagnostic::{Diagnostics, Place, Problem, Sources};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode_part, is_misspelt,
+    Data, DocumentProblem, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt,
     known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
@@ -229,8 +229,8 @@ impl Declaring<'_> {
     ) -> Option<Vec<T>> {
         let Some(list) = value.as_list() else {
             let mut problem = wrong_type(key, "a list of tables", value);
-            if let DocumentProblem::WrongType { lacks, .. } = &mut problem {
-                *lacks = Lacks::for_tables(&value.data);
+            if let DocumentProblem::WrongType { hint, .. } = &mut problem {
+                *hint = Hint::for_tables(&value.data);
             }
             self.diagnostics.report(value.place, problem);
             return None;
@@ -268,15 +268,11 @@ impl Declaring<'_> {
 
     fn simulation(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
         let what = format!("\"{key}\"");
-        let read = decode_part::<SimulationTable>(value, &what, self.diagnostics)?;
-        let (table, is_sure) = read.sure();
+        let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
         let place = value.place_of("simulate");
-        if is_sure("days") && !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
+        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
             let found = table.days.to_string();
             self.range(value, "days", found, "above 0 and at most 3653");
-        }
-        if !is_sure("simulate") {
-            return None;
         }
         let known = match machine(&table.simulate) {
             Ok(known) => known,
@@ -295,7 +291,6 @@ impl Declaring<'_> {
             Some(path) => Some(self.schedule(path, value.place_of("schedule"), known.machine)?),
             None => None,
         };
-        read.as_whole()?;
         Some(DataSet::Simulated(Simulation {
             machine: known.machine.name(),
             days: table.days,
@@ -420,15 +415,14 @@ impl Declaring<'_> {
     }
 
     fn fault(&mut self, value: &Value) -> Option<Vec<FaultSpec>> {
-        let read = decode_part::<FaultSpec>(value, "the fault", self.diagnostics)?;
-        let (spec, is_sure) = read.sure();
+        let spec = decode::<FaultSpec>(value, "the fault", self.diagnostics)?;
         if spec.from < Duration::ZERO {
             self.range(value, "from", spec.from.to_string(), "0 or later");
         }
         if let Some(lasting) = spec.lasting.filter(|lasting| *lasting <= Duration::ZERO) {
             self.range(value, "for", lasting.to_string(), "longer than 0");
         }
-        if is_sure("kind") && spec.size.is_some() && !spec.kind.has_size() {
+        if spec.size.is_some() && !spec.kind.has_size() {
             let problem = problem::ExcludedKeys {
                 key: "size",
                 with: "kind",
@@ -436,11 +430,7 @@ impl Declaring<'_> {
             self.diagnostics.report(value.place_of("size"), problem);
         }
         let plan = self.plan;
-        if !is_sure("channel") {
-            return None;
-        }
         let slots = self.measured(&spec.channel, value.place_of("channel"))?;
-        let spec = read.as_whole()?;
         let one = |slot: usize| {
             let name = plan.sources[slot].name.as_str();
             let unit = &plan.channels[slot].channel.unit;
@@ -556,6 +546,6 @@ fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
-        lacks: None,
+        hint: None,
     }
 }

@@ -6,31 +6,25 @@ use super::problem;
 use super::table::{ExpectTable, Within};
 use crate::compile::Plan;
 use crate::diagnostic::Place;
-use crate::document::{Value, decode_part};
+use crate::document::{Value, decode};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
 
 impl Declaring<'_> {
     pub(super) fn expectation(&mut self, value: &Value) -> Option<Expectation> {
-        let read = decode_part::<ExpectTable>(value, "the expectation", self.diagnostics)?;
-        let (table, is_sure) = read.sure();
-        if read.as_whole().is_some() {
-            self.check_keys(value, table);
-        }
-        self.check_ranges(value, table);
-        let slots = is_sure("of")
-            .then(|| self.channels(&table.of, value.place_of("of")))
-            .flatten();
-        let checks = self.checks(value, table, is_sure("beats"));
+        let table = decode::<ExpectTable>(value, "the expectation", self.diagnostics)?;
+        self.check_keys(value, &table);
+        self.check_ranges(value, &table);
+        let slots = self.channels(&table.of, value.place_of("of"));
+        let checks = self.checks(value, &table);
         let (plan, slots) = (self.plan, slots?);
         for &slot in &slots {
-            self.check_channel(value, table, &checks, (plan, slot));
+            self.check_channel(value, &table, &checks, (plan, slot));
         }
-        let table = read.as_whole()?;
         Some(Expectation {
             slots,
-            abs_truth_below: table.abs_truth_below.clone(),
+            abs_truth_below: table.abs_truth_below,
             period: Period {
                 from: table.from.unwrap_or(Duration::ZERO),
                 to: table.to.unwrap_or(Duration::MAX),
@@ -40,11 +34,11 @@ impl Declaring<'_> {
         })
     }
 
-    fn checks(&mut self, value: &Value, table: &ExpectTable, beats: bool) -> Vec<Check> {
+    fn checks(&mut self, value: &Value, table: &ExpectTable) -> Vec<Check> {
         let mut checks = Vec::new();
         checks.extend(table.rmse_below.clone().map(Check::RmseBelow));
         checks.extend(table.r2_above.map(Check::R2Above));
-        if let Some(beats) = table.beats.as_ref().filter(|_| beats) {
+        if let Some(beats) = &table.beats {
             let places = place_list(value, "beats");
             let rivals = beats.iter().zip(places).filter_map(|(name, place)| {
                 Some(match name.as_str() {

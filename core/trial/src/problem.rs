@@ -18,7 +18,6 @@ problem! {
     message: "the test has nothing to run over",
     label: "neither `on` nor `inputs`",
     help: "name data with `on = \"FILE\"` or `on = { simulate = \"MACHINE\" }`, or make some up with `inputs`",
-    alone: true,
 }
 
 problem! {
@@ -28,7 +27,6 @@ problem! {
     label: "one of them is too much",
     help: "run over data (`on`) in one test and over `inputs` in another",
     related: vec![(*inputs, "and here".to_owned())],
-    certain: true,
 }
 
 code!(
@@ -44,7 +42,6 @@ problem! {
     message: format!("{what} checks nothing"),
     label: "nothing is expected",
     help: "add what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals`, `between` or `absent`",
-    alone: true,
 }
 
 code!(
@@ -61,7 +58,6 @@ problem! {
     label: "the name is taken",
     help: "give each test a name of its own",
     related: vec![(*first, "the other is here".to_owned())],
-    certain: true,
 }
 
 code!(
@@ -80,7 +76,6 @@ problem! {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("there are {}", names(known)),
     },
-    certain: true,
 }
 
 problem! {
@@ -89,7 +84,6 @@ problem! {
     message: format!("the machine `{machine}` is in {}", packages.join(" and in ")),
     label: "which of them?",
     help: "leave one of these crates out of the program, or rename its machine",
-    certain: true,
 }
 
 code!(
@@ -177,7 +171,6 @@ problem! {
     message: format!("`{key}` has no meaning together with `{with}`"),
     label: "too much",
     help: format!("leave out `{key}` or `{with}`"),
-    certain: true,
 }
 
 problem! {
@@ -186,7 +179,6 @@ problem! {
     message: format!("`{key}` has no meaning without `{with}`"),
     label: "stands alone",
     help: format!("add `{with}` or leave out `{key}`"),
-    alone: true,
 }
 
 /// A key that excludes another, or needs it.
@@ -203,7 +195,6 @@ problem! {
     message: "the input has no value",
     label: "no shape",
     help: "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`",
-    alone: true,
 }
 
 code!(
@@ -219,7 +210,6 @@ problem! {
     message: format!("`{key}` is {found} and must be {allowed}"),
     label: "out of range",
     help: None,
-    certain: true,
 }
 
 code!(
@@ -296,7 +286,6 @@ problem! {
     message: format!("the schedule {path} cannot be read: {reason}"),
     label: "named here",
     help: "give the path of a schedule, which starts at the file in which it stands",
-    certain: true,
 }
 
 problem! {
@@ -305,7 +294,6 @@ problem! {
     message: reason.to_string(),
     label: "in this line",
     help: None,
-    certain: true,
 }
 
 /// A reference of a test that names nothing in the graph.
@@ -321,10 +309,6 @@ pub(super) struct NotFound {
 impl Problem for NotFound {
     fn code(&self) -> &'static Code {
         self.problem.code()
-    }
-
-    fn may_follow_from_a_gap(&self) -> bool {
-        self.problem.may_follow_from_a_gap()
     }
 
     fn message(&self) -> String {

@@ -4,7 +4,7 @@ use super::problem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
 use crate::diagnostic::Diagnostics;
-use crate::document::{DocumentProblem, Value, decode_part};
+use crate::document::{DocumentProblem, Value, decode};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -20,8 +20,7 @@ pub(super) fn read(
     diagnostics: &mut Diagnostics,
 ) -> Option<Series> {
     let before = diagnostics.error_count();
-    let read = decode_part::<InputTable>(value, "the input", diagnostics)?;
-    let (table, is_sure) = read.sure();
+    let table = decode::<InputTable>(value, "the input", diagnostics)?;
     let mut shaping = Shaping {
         value,
         channel,
@@ -29,14 +28,11 @@ pub(super) fn read(
         diagnostics,
     };
     let noise = shaping.difference("noise", table.noise.as_ref(), &unit.difference());
-    let shape = match read.as_whole() {
-        Some(table) => shaping.shape(table),
-        None => Shape::Curve(shaping.curve(table)),
-    };
+    let shape = shaping.shape(&table);
     if noise < 0.0 || noise.is_nan() {
         shaping.range("noise", noise.to_string(), "0 or more");
     }
-    if is_sure("every") && table.every <= Duration::ZERO {
+    if table.every <= Duration::ZERO {
         shaping.range("every", table.every.to_string(), "longer than 0");
     }
     (diagnostics.error_count() == before).then_some(Series {

@@ -230,19 +230,16 @@ impl Combine for Hedging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Losses>() {
-            Ok(losses) if losses.sums.len() != self.losses.sums.len() => {
-                Restored::cold("the number of voters differs")
+        state.accept(|losses: Losses| {
+            if losses.sums.len() != self.losses.sums.len() {
+                return Err("the number of voters differs");
             }
-            Ok(losses) if !losses.is_sound() => {
-                Restored::cold("its losses are not all numbers from 0 on")
+            if !losses.is_sound() {
+                return Err("its losses are not all numbers from 0 on");
             }
-            Ok(losses) => {
-                self.losses = losses;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+            self.losses = losses;
+            Ok(())
+        })
     }
 }
 

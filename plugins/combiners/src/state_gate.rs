@@ -142,13 +142,7 @@ impl Combine for Gate {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Seen>() {
-            Ok(seen) => {
-                self.seen = seen;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.seen)
     }
 }
 

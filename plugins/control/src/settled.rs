@@ -235,13 +235,7 @@ impl Operator for Settling {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Known>() {
-            Ok(known) => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.known)
     }
 }
 

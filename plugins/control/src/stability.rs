@@ -270,14 +270,11 @@ impl Operator for Judging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Judged>() {
-            Ok(state) if state.axes.len() == self.axes.len() => {
-                self.axes = state.axes;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of axes differs"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Judged| {
+            let fits = state.axes.len() == self.axes.len();
+            fits.then(|| self.axes = state.axes)
+                .ok_or("the number of axes differs")
+        })
     }
 }
 

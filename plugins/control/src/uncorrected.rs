@@ -141,14 +141,11 @@ impl Operator for Uncorrecting {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Reported>() {
-            Ok(state) if state.seen.len() == self.seen.len() => {
-                self.seen = state.seen;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Reported| {
+            let fits = state.seen.len() == self.seen.len();
+            fits.then(|| self.seen = state.seen)
+                .ok_or("the number of channels differs")
+        })
     }
 }
 

@@ -251,18 +251,17 @@ impl Operator for Delaying {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<OnTheWay>() {
-            Ok(state) if state.queues.len() == self.queues.len() => {
-                (self.queues, self.tick) = (state.queues, state.tick);
-                for queue in &mut self.queues {
-                    // The engine thread must not have to make room.
-                    queue.reserve(queue.len().max(16));
-                }
-                Restored::Accepted
+        state.accept(|state: OnTheWay| {
+            if state.queues.len() != self.queues.len() {
+                return Err("the number of channels differs");
             }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+            (self.queues, self.tick) = (state.queues, state.tick);
+            for queue in &mut self.queues {
+                // The engine thread must not have to make room.
+                queue.reserve(queue.len().max(16));
+            }
+            Ok(())
+        })
     }
 }
 

@@ -239,14 +239,11 @@ impl Operator for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Lagged>() {
-            Ok(lagged) if lagged.rates == self.rates && lagged.last.len() == self.last.len() => {
-                (self.last, self.values) = (lagged.last, lagged.values);
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the time constants or channels differ"),
-            Err(cold) => cold,
-        }
+        state.accept(|lagged: Lagged| {
+            let fits = lagged.rates == self.rates && lagged.last.len() == self.last.len();
+            fits.then(|| (self.last, self.values) = (lagged.last, lagged.values))
+                .ok_or("the time constants or channels differ")
+        })
     }
 }
 

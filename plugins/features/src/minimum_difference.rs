@@ -126,14 +126,11 @@ impl Operator for Keeping {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Kept>() {
-            Ok(state) if state.kept.len() == self.kept.len() => {
-                self.kept = state.kept;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the channels differ"),
-            Err(cold) => cold,
-        }
+        state.accept(|state: Kept| {
+            let fits = state.kept.len() == self.kept.len();
+            fits.then(|| self.kept = state.kept)
+                .ok_or("the channels differ")
+        })
     }
 }
 

@@ -205,19 +205,16 @@ impl Operator for Resampling {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Periods>() {
-            Ok(state) if state.channels.len() != self.known.channels.len() => {
-                Restored::cold("the number of channels differs")
+        state.accept(|state: Periods| {
+            if state.channels.len() != self.known.channels.len() {
+                return Err("the number of channels differs");
             }
-            Ok(state) if state.every != self.known.every => {
-                Restored::cold("the length of the periods differs")
+            if state.every != self.known.every {
+                return Err("the length of the periods differs");
             }
-            Ok(state) => {
-                self.known = state;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+            self.known = state;
+            Ok(())
+        })
     }
 }
 

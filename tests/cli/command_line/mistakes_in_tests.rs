@@ -41,7 +41,8 @@ fn rivals_that_are_no_nodes_are_known_and_so_are_the_forms_of_a_sample() {
     let test = r#"[[tests]]
 name = "a"
 inputs = { "temperature.a" = { every = "1s", samples = [["0s", "1 Cel"]] } }
-expect = [{ of = "drift", equals = "1 nm/min", within = [1], beats = ["zeros", "persistance"] }]
+expect = [{ of = "drift", equals = "1 nm/min", within = [1] },
+    { of = "drift", beats = ["zeros", "persistance"] }]
 "#;
     let scratch = Scratch::new("command-line-rivals");
     let graph = scratch.file("graph.toml", SOUND.to_owned() + test);

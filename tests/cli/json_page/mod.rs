@@ -311,7 +311,7 @@ wait = "wait"
         json(&arguments)
     };
     let told = messages::by_runs(scratch, &model, [&one, &two]);
-    let told = told.into_iter().map(|told| ("what-a-run-tells", told));
+    let told = told.into_iter().map(|told| ("what-a-run-reports", told));
     let printed = vec![
         ("evaluate", with("evaluate", &[])),
         (

@@ -1,6 +1,5 @@
 //! Decides what each node of a file says: its kind looked up, its parameters read, and where in the file each of them stands.
 
-use std::collections::HashSet;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -10,8 +9,7 @@ use super::misplaced::{INPUTS, misplaced};
 use super::problem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
-    Data, Decoded, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value,
-    decode_rest,
+    Data, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode,
 };
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
@@ -21,13 +19,13 @@ pub(crate) struct ReadNode {
     pub(super) instances: Vec<ReadParts>,
 }
 
-/// What could be read of one instance; nothing where a mistake has been told.
+/// What could be read of one instance.
 #[derive(Clone, Default)]
 pub(crate) struct ReadParts {
     /// The specification.
-    pub(super) spec: Option<Decoded<Arc<dyn NodeSpec>>>,
+    pub(super) spec: Option<Arc<dyn NodeSpec>>,
     /// The keys that the framework reads itself.
-    pub(super) estimator: Option<Decoded<EstimatorKeys>>,
+    pub(super) estimator: Option<EstimatorKeys>,
     /// Whether it takes its inputs for later ticks only.
     closes_loops: bool,
 }
@@ -40,21 +38,13 @@ pub(crate) struct ReadInstance {
 
 impl ReadParts {
     fn is_whole(&self) -> bool {
-        self.spec().is_some() && self.estimator().is_some()
-    }
-
-    fn spec(&self) -> Option<&Arc<dyn NodeSpec>> {
-        self.spec.as_ref()?.as_whole()
-    }
-
-    fn estimator(&self) -> Option<&EstimatorKeys> {
-        self.estimator.as_ref()?.as_whole()
+        self.spec.is_some() && self.estimator.is_some()
     }
 
     pub(super) fn whole(&self) -> Option<ReadInstance> {
         Some(ReadInstance {
-            spec: self.spec()?.clone(),
-            estimator: self.estimator()?.clone(),
+            spec: self.spec.clone()?,
+            estimator: self.estimator.clone()?,
         })
     }
 }
@@ -67,7 +57,7 @@ impl ReadNode {
 
     /// Whether it is known of all instances what they are.
     pub(crate) fn is_known(&self) -> bool {
-        self.kind.is_some() && self.instances.iter().all(|read| read.spec().is_some())
+        self.kind.is_some() && self.instances.iter().all(|read| read.spec.is_some())
     }
 }
 
@@ -86,13 +76,6 @@ pub(super) fn read_kinds(
 
 fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> ReadNode {
     let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
-    let mut own = diagnostics.aside();
-    // Instances of a module share places: a mistake in all of them is told once only where it is told beside the others.
-    let told = if node.faulty.is_some() {
-        &mut own
-    } else {
-        &mut *diagnostics
-    };
     let mut instances: Vec<ReadParts> = Vec::with_capacity(node.instances.len());
     for (nth, instance) in node.instances.iter().enumerate() {
         // Members whose parameters do not name them share one table, and so one specification.
@@ -101,23 +84,12 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
             (Some(before), Some(read), _) if read.is_whole() && is_shared(before, instance) => {
                 read.clone()
             }
-            (.., Some(kind)) => read_instance(kind, node, instance, panics, told),
-            (.., None) => ReadParts::default(),
+            (.., Some(kind)) if !node.open => {
+                read_instance(kind, node, instance, panics, diagnostics)
+            }
+            _ => ReadParts::default(),
         };
         instances.push(read);
-    }
-    if let Some(faulty) = &node.faulty {
-        let follows: HashSet<_> = own
-            .iter()
-            .filter_map(|mistake| Some((mistake.code, mistake.place?)))
-            .filter(|(code, place)| {
-                faulty.open.contains(place) || diagnostics.is_known(code, *place)
-            })
-            .collect();
-        diagnostics.extend_where(own, |mistake| {
-            let place = mistake.place;
-            place.is_none_or(|place| !follows.contains(&(mistake.code, place)))
-        });
     }
     ReadNode { kind, instances }
 }
@@ -183,30 +155,26 @@ fn read_instance(
             }
         }
     }
-    let context = context(node, instance);
-    diagnostics.within(context.clone(), |diagnostics| {
+    diagnostics.within(context(node, instance), |diagnostics| {
         let is_whole = take_inputs(kind, &mut parameters, diagnostics);
-        let estimator =
-            decode_rest::<EstimatorKeys>(&framework, "the node", &[], &|_| None, diagnostics);
+        let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
         let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
-        let read = panics.caught(kind, &context, || {
+        let read = panics.caught(kind, (node, instance), || {
             let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
-            if spec.as_whole().is_some() {
-                let wrong = out_of_range((kind.schema)(), &parameters);
-                let sound = wrong.is_empty();
-                for (place, message) in wrong {
-                    let help = None;
-                    diagnostics.report(place, problem::Parameter { message, help });
-                }
-                if !sound {
-                    return None;
-                }
+            let wrong = out_of_range((kind.schema)(), &parameters);
+            let is_sound = wrong.is_empty();
+            for (place, message) in wrong {
+                let help = None;
+                diagnostics.report(place, problem::Parameter { message, help });
             }
-            let spec = spec.map(Arc::<dyn NodeSpec>::from);
-            let closes_loops = spec.as_whole().is_some_and(|spec| match spec.role() {
+            if !is_sound {
+                return None;
+            }
+            let closes_loops = match spec.role() {
                 Role::Feature(feature) => feature.closes_loops(),
                 _ => false,
-            });
+            };
+            let spec = Arc::<dyn NodeSpec>::from(spec);
             Some((spec, closes_loops))
         });
         let read = read.unwrap_or_else(|fault| {
@@ -220,6 +188,14 @@ fn read_instance(
             closes_loops: closes_loops.unwrap_or_default(),
         }
     })
+}
+
+/// The name of an instance: `thermal.Z1`.
+pub(super) fn instance_name(node: &str, member: Option<&str>) -> String {
+    match member {
+        Some(member) => format!("{node}.{member}"),
+        None => node.to_owned(),
+    }
 }
 
 /// Takes inputs out of the parameters among which they stand, and reports them; false if there are any.
@@ -328,14 +304,6 @@ impl Declared<'_> {
                 !(self.kind.schema)()["properties"][first].is_null()
                     || self.kind.framework_keys().contains(&first)
             }
-        }
-    }
-
-    /// Whether an input such as `inputs.signal` or a parameter such as `selection.folds` is given.
-    pub(super) fn states(&self, way: &str) -> bool {
-        match way.strip_prefix("inputs.") {
-            Some(port) => self.input(port).is_some(),
-            None => self.parameter(way).all(|inner| inner.is_some()),
         }
     }
 

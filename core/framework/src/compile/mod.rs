@@ -1,5 +1,7 @@
-//! Decides what a graph file means: references resolved, units, spans and horizons checked, an order, slots, a [`Plan`];
-//! not when it runs.
+//! Turns a graph file into a [`Plan`]: kinds read, an order found, references resolved, units, spans and horizons checked,
+//! leaks found, steps laid out.
+//!
+//! The planner ([`order`]) only orders, one [`gate`] checks any order, and [`steps`] makes steps of it.
 
 mod agreement;
 mod column_unit;
@@ -8,6 +10,7 @@ mod conversion;
 mod diff;
 mod estimator;
 mod feature;
+mod gate;
 mod guard;
 mod inputs;
 mod instance;
@@ -32,6 +35,7 @@ mod survey;
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
+pub use gate::Misordered;
 pub use keys::EstimatorKeys;
 pub use kind_fault::KindFault;
 pub use plan::{
@@ -49,6 +53,7 @@ use std::collections::BTreeSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 use guard::Panics;
+use resolver::Resolver;
 
 /// What a plan must offer beyond what its graph itself reads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -81,47 +86,56 @@ impl Part {
         &self.plan
     }
 
-    /// Whether something of a name may be missing, since a mistake in it, or in the module around it, has been told.
+    /// Whether something of a name may be missing, since a mistake in it, or in the module around it, has been reported.
     pub fn is_broken(&self, name: &str) -> bool {
         let outer = name.split('/').next().unwrap_or_default();
         self.broken.contains(name) || self.broken.contains(outer)
     }
 }
 
-/// Compiles a graph. All mistakes are told; without one there is a plan.
+/// Compiles a graph. All mistakes are reported; without one there is a plan.
 ///
 /// # Panics
-/// Where the code of a kind does, after a line on standard error that names the node: with [`compile_part`] that is a mistake too.
+/// Where the code of a kind does, as a [`NodePanic`](crate::diagnostic::NodePanic): with [`compile_part`] that is a mistake too.
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
-    made(graph, wanted, Panics::GoOn, diagnostics).ok()
+    planned(graph, wanted, Panics::Propagate, diagnostics).ok()
 }
 
 /// As [`compile`], with what could be made of a graph that has mistakes. A kind whose code panics is one of them.
 ///
 /// # Errors
-///
-/// There are mistakes, all of which are told.
+/// There are mistakes, all of which are reported.
 pub fn compile_part(
     graph: &GraphFile,
     wanted: Wanted,
     diagnostics: &mut Diagnostics,
 ) -> Result<Plan, Box<Part>> {
-    made(graph, wanted, Panics::AreTold, diagnostics)
+    planned(graph, wanted, Panics::Report, diagnostics)
 }
 
-fn made(
+fn planned(
     graph: &GraphFile,
     wanted: Wanted,
     panics: Panics,
     diagnostics: &mut Diagnostics,
 ) -> Result<Plan, Box<Part>> {
+    // Kinds and their parameters, then an order in which each node follows what it reads.
     let nodes = instance::read_kinds(graph, panics, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
-    let resolver = resolver::Resolver::new(graph, panics, diagnostics);
-    let (plan, mut broken) = resolver.resolve(&nodes, &order, wanted);
-    if !diagnostics.has_errors() {
-        return Ok(plan);
+    let mut resolver = Resolver::new(graph, panics, diagnostics);
+    // Names, then of each node in that order: references, shapes, units and spans.
+    resolver.name_all(&order);
+    let closing = resolver.resolve_nodes(&nodes, &order);
+    // What loops bring back, and so what each value is made of; then who sees the future.
+    resolver.close_loops(closing);
+    resolver.name_sensors();
+    resolver.find_leaks();
+    let outputs = resolver.outputs();
+    let (plan, broken) = resolver.finish(outputs, wanted);
+    if diagnostics.has_errors() {
+        return Err(Box::new(Part { plan, broken }));
     }
-    broken.extend(graph.outputs.iter().map(|output| output.name.clone()));
-    Err(Box::new(Part { plan, broken }))
+    debug_assert_eq!(plan.check_order(), Ok(()));
+    steps::warn(graph, &plan, diagnostics);
+    Ok(plan)
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::instance::instance_name;
 use super::persistence_lag;
 use super::provenance::smallest_lag;
 use super::slot_set::SlotSet;
@@ -154,10 +155,7 @@ impl PlannedNode {
     /// The name of this instance: `thermal.Z1`.
     #[must_use]
     pub fn instance(&self) -> String {
-        match &self.member {
-            Some(member) => format!("{}.{member}", self.name),
-            None => self.name.clone(),
-        }
+        instance_name(&self.name, self.member.as_deref())
     }
 
     /// The slots of an output port; none where it has no port of that name.

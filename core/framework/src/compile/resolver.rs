@@ -20,7 +20,7 @@ use super::slot_set::SlotSet;
 use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
-use crate::document::GraphFile;
+use crate::document::{GraphFile, InstanceDecl, NodeDecl};
 use crate::node::{Kind, Mistake, OutputPort, Role, RoleName};
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -73,7 +73,7 @@ impl<'g> Resolver<'g> {
         panics: Panics,
         diagnostics: &'g mut Diagnostics,
     ) -> Self {
-        let mut resolver = Self {
+        Self {
             graph,
             panics,
             diagnostics,
@@ -85,18 +85,12 @@ impl<'g> Resolver<'g> {
             nodes: Vec::new(),
             suspects: Vec::new(),
             read: SlotSet::default(),
-        };
-        resolver.take_signals();
-        resolver
+        }
     }
 
-    /// The plan, and the names of which something is missing in it.
-    pub(crate) fn resolve(
-        mut self,
-        read: &[ReadNode],
-        order: &Order,
-        wanted: Wanted,
-    ) -> (Plan, BTreeSet<String>) {
+    /// Makes every name known that a reference may name, and hides those of which a mistake has been reported.
+    pub(super) fn name_all(&mut self, order: &Order) {
+        self.take_signals();
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
@@ -104,46 +98,54 @@ impl<'g> Resolver<'g> {
         for name in &self.graph.broken {
             self.scopes.get_mut(name).broken = true;
         }
-        for name in &self.graph.elsewhere {
-            self.scopes.hide(name);
-        }
         for &node in &order.looping {
             self.scopes.get_mut(&self.graph.nodes[node].name).broken = true;
         }
+    }
+
+    /// Resolves every node in order; gives those that close a loop, which are given their inputs [later](Self::close_loops).
+    pub(super) fn resolve_nodes(
+        &mut self,
+        read: &[ReadNode],
+        order: &Order,
+    ) -> Vec<(usize, Instance<'g>)> {
         let mut closing = Vec::new();
         for &position in order.nodes.iter().chain(&order.looping) {
             let node = &self.graph.nodes[position];
             let closes = order.closing.contains(&position);
-            let sound = node.faulty.is_none() && !order.looping.contains(&position);
+            let sound = !node.faulty && !order.looping.contains(&position);
             for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
                 let outer = self.diagnostics.scope(Some(context(node, decl)));
                 let kind = read[position].kind;
                 let whole = parts.whole().filter(|_| sound);
-                let Some((kind, read)) = kind.zip(whole) else {
+                if let Some((kind, read)) = kind.zip(whole) {
+                    let declared = Declared { node, decl, kind };
+                    let instance = Instance { declared, read };
+                    let before = self.nodes.len();
+                    let resolved = self.guarded(Some(kind), (node, decl), |resolver| {
+                        resolver.instance(&instance, closes)
+                    });
+                    if resolved.is_none() {
+                        self.scopes.get_mut(&node.name).broken = true;
+                    }
+                    if closes && self.nodes.len() > before {
+                        closing.push((before, instance));
+                    }
+                } else {
                     self.scopes.get_mut(&node.name).broken = true;
-                    self.guarded(kind, &context(node, decl), node.place, |resolver| {
+                    self.guarded(kind, (node, decl), |resolver| {
                         resolver.survey(node, decl, kind, parts);
                         Some(())
                     });
-                    self.diagnostics.scope(outer);
-                    continue;
-                };
-                let declared = Declared { node, decl, kind };
-                let instance = Instance { declared, read };
-                let before = self.nodes.len();
-                let resolved =
-                    self.guarded(Some(kind), &instance.context(), node.place, |resolver| {
-                        resolver.instance(&instance, closes)
-                    });
-                if resolved.is_none() {
-                    self.scopes.get_mut(&node.name).broken = true;
                 }
                 self.diagnostics.scope(outer);
-                if closes && self.nodes.len() > before {
-                    closing.push((before, instance));
-                }
             }
         }
+        closing
+    }
+
+    /// Gives the nodes that close a loop their inputs, and takes into account what these bring back.
+    pub(super) fn close_loops(&mut self, closing: Vec<(usize, Instance<'_>)>) {
         let has_loops = !closing.is_empty();
         for (index, instance) in closing {
             self.close(index, &instance);
@@ -151,11 +153,6 @@ impl<'g> Resolver<'g> {
         if has_loops {
             self.follow_loops();
         }
-        self.name_sensors();
-        self.find_leaks();
-        let outputs = self.outputs();
-        let broken = self.scopes.broken();
-        (self.finish(outputs, wanted), broken)
     }
 
     fn take_signals(&mut self) {
@@ -206,21 +203,20 @@ impl<'g> Resolver<'g> {
         }
     }
 
-    /// Does what takes code of a kind, for a node; nothing comes of it where that panics, which is told.
+    /// Does what takes code of a kind, for an instance of a node; nothing comes of it where that panics, which is reported.
     fn guarded(
         &mut self,
         kind: Option<&'static Kind>,
-        context: &str,
-        place: Place,
+        (node, decl): (&NodeDecl, &InstanceDecl),
         work: impl FnOnce(&mut Self) -> Option<()>,
     ) -> Option<()> {
         let Some(kind) = kind else {
             return work(self);
         };
-        let done = self.panics.caught(kind, context, || work(self));
+        let done = self.panics.caught(kind, (node, decl), || work(self));
         done.unwrap_or_else(|fault| {
             self.diagnostics
-                .report(place, problem::FaultyKind::new(kind, fault));
+                .report(node.place, problem::FaultyKind::new(kind, fault));
             None
         })
     }
@@ -389,7 +385,7 @@ impl<'g> Resolver<'g> {
         }
     }
 
-    fn outputs(&mut self) -> Vec<PlannedOutput> {
+    pub(super) fn outputs(&mut self) -> Vec<PlannedOutput> {
         let graph = self.graph;
         let mut outputs = Vec::new();
         let mut names = HashSet::new();
@@ -440,7 +436,14 @@ impl<'g> Resolver<'g> {
         outputs
     }
 
-    fn finish(self, outputs: Vec<PlannedOutput>, wanted: Wanted) -> Plan {
+    /// The plan, and the names of which something is missing in it.
+    pub(super) fn finish(
+        self,
+        outputs: Vec<PlannedOutput>,
+        wanted: Wanted,
+    ) -> (Plan, BTreeSet<String>) {
+        let mut broken = self.scopes.broken();
+        broken.extend(self.graph.outputs.iter().map(|output| output.name.clone()));
         let mut plan = Plan {
             name: self.graph.name.clone(),
             time: self.graph.time.clone(),
@@ -453,18 +456,7 @@ impl<'g> Resolver<'g> {
             outputs,
             warm_up: Duration::ZERO,
         };
-        steps::mark_read(&mut plan, self.read, wanted);
-        plan.steps = steps::steps(&plan);
-        plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
-        if !self.diagnostics.has_errors() {
-            let declared = self.graph.nodes.iter().map(|node| node.instances.len());
-            debug_assert_eq!(
-                plan.nodes.len(),
-                declared.sum::<usize>(),
-                "what is left out has been told"
-            );
-            steps::warn(self.graph, &plan, self.diagnostics);
-        }
-        plan
+        steps::lay_out(&mut plan, self.read, wanted);
+        (plan, broken)
     }
 }

@@ -28,8 +28,6 @@ pub(crate) struct Scope {
     pub(crate) ports: IndexMap<&'static str, PortChannels>,
     /// Set when an error has been told of it, so that references to it say nothing more.
     pub(crate) broken: bool,
-    /// Set when it is no node or signal, so that nobody is told to refer to it.
-    hidden: bool,
 }
 
 /// The outcome of looking a reference up.
@@ -66,28 +64,16 @@ impl Scopes {
         &mut self.scopes[name]
     }
 
-    /// Lets references to a name say nothing, where nothing else has it.
-    pub(crate) fn hide(&mut self, name: &str) {
-        if !self.scopes.contains_key(name) {
-            let scope = self.get_mut(name);
-            (scope.broken, scope.hidden) = (true, true);
-        }
-    }
-
     /// The names of which something is missing.
     pub(crate) fn broken(&self) -> BTreeSet<String> {
         let broken = self.scopes.iter().filter(|(_, scope)| scope.broken);
         broken.map(|(name, _)| name.clone()).collect()
     }
 
-    fn shown(&self) -> impl Iterator<Item = &str> {
-        let shown = self.scopes.iter().filter(|(_, scope)| !scope.hidden);
-        shown.map(|(name, _)| name.as_str())
-    }
-
     /// What there is to refer to. It is listed once: a graph may refer to thousands of names that it does not have.
     fn known(&self) -> &Arc<Names> {
-        self.known.get_or_init(|| outermost(self.shown()))
+        self.known
+            .get_or_init(|| outermost(self.scopes.keys().map(String::as_str)))
     }
 
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<dyn Problem>> {

@@ -12,44 +12,32 @@ use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 use crate::time::Duration;
 
+/// Makes a plan that can be stepped of nodes that stand in an order in which they can run. `read` are the slots that somebody
+/// reads.
+pub(super) fn lay_out(plan: &mut Plan, read: SlotSet, wanted: Wanted) {
+    mark_read(plan, read, wanted);
+    plan.steps = steps(plan);
+    plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
+}
+
 /// The steps: each gather right before its first reader, each node after those that it reads, captures last.
-///
-/// Nodes stand in the plan in the order in which they were resolved, which is one in which they can run.
-pub(super) fn steps(plan: &Plan) -> Vec<Step> {
+fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::with_capacity(plan.nodes.len() + plan.gathers.len());
-    let mut gathered = HashSet::new();
-    let mut late = Vec::new();
-    for (index, node) in plan.nodes.iter().enumerate() {
-        let closes_loops = matches!(
-            node.role,
-            PlannedRole::Feature {
-                closes_loops: true,
-                ..
-            }
-        );
-        let gathers: Vec<usize> = node.role.gathers().collect();
-        if closes_loops {
-            late.push((index, gathers));
-        } else {
-            steps.extend(
-                gathers
-                    .iter()
-                    .copied()
-                    .filter(|&gather| gathered.insert(gather))
-                    .map(Step::Gather),
-            );
+    let mut read = vec![false; plan.gathers.len()];
+    let mut gather = |steps: &mut Vec<Step>, node: usize| {
+        let gathers = plan.nodes[node].role.gathers();
+        let first = gathers.filter(|&gather| !std::mem::replace(&mut read[gather], true));
+        steps.extend(first.map(Step::Gather));
+    };
+    for node in 0..plan.nodes.len() {
+        if !plan.closes_loops(node) {
+            gather(&mut steps, node);
         }
-        steps.push(Step::Run(index));
+        steps.push(Step::Run(node));
     }
-    for (index, gathers) in late {
-        steps.extend(
-            gathers
-                .iter()
-                .copied()
-                .filter(|&gather| gathered.insert(gather))
-                .map(Step::Gather),
-        );
-        steps.push(Step::Capture(index));
+    for node in (0..plan.nodes.len()).filter(|&node| plan.closes_loops(node)) {
+        gather(&mut steps, node);
+        steps.push(Step::Capture(node));
     }
     steps
 }
@@ -88,15 +76,13 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
 impl Plan {
     /// Computes these slots too, and what they are made of, whether anything reads them or not.
     pub fn observe(&mut self, slots: impl IntoIterator<Item = usize>) {
-        mark_read(self, slots.into_iter().collect(), Wanted::default());
-        self.steps = steps(self);
-        self.warm_up = self.warm_ups().into_iter().max().unwrap_or_default();
+        lay_out(self, slots.into_iter().collect(), Wanted::default());
     }
 }
 
 /// Notes what is computed only where somebody reads it, beside what has been noted: all ports of features but the first, weights
 /// and standard deviations.
-pub(super) fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
+fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
     let truths: SlotSet = plan
         .nodes
         .iter()

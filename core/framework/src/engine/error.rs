@@ -1,4 +1,4 @@
-//! Decides what can go wrong with an engine and how it is said.
+//! What can go wrong with an engine.
 
 use std::fmt;
 
@@ -97,12 +97,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_that_are_a_nanosecond_apart_are_told_apart() {
+    fn times_that_are_a_nanosecond_apart_have_different_texts() {
         let now = Instant::from_ns(1_700_000_000_123_456_789);
         let (time, last) = (now, Instant::from_ns(now.as_ns() + 1));
-        let told = EngineError::NotAfter { time, last }.to_string();
+        let text = EngineError::NotAfter { time, last }.to_string();
         let at =
             "the tick at 1700000000.123456789 s is not after the last one at 1700000000.12345679 s";
-        assert!(told.starts_with(at), "{told}");
+        assert!(text.starts_with(at), "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! Decides how a node is asked for answers that nobody wants, to find out what they are and whether asking changes it.
+//! Asks nodes for answers that nobody uses, to find out what they are and whether asking changes the node.
 
 use super::Engine;
 use super::tick::NodeRunner;

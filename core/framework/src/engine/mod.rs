@@ -28,7 +28,7 @@ pub use tick::{Cursor, History};
 pub use idle::Answer;
 
 pub(crate) use at_work::naming;
-pub(crate) use tick::{Gathered, Given};
+use tick::Gathered;
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
@@ -53,8 +53,8 @@ pub struct Engine {
     histories: Vec<Option<History>>,
     /// The slots that have a history.
     recorded: Vec<usize>,
-    /// The nodes that are told truths after all outputs, and the slots of these.
-    told: Vec<(usize, usize)>,
+    /// The nodes that are given truths after all outputs, and the slots of these.
+    truths: Vec<(usize, usize)>,
     nodes: Vec<NodeRunner>,
     work: Box<[Work]>,
     last: Instant,
@@ -85,7 +85,7 @@ impl Engine {
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
-            told: nodes
+            truths: nodes
                 .iter()
                 .enumerate()
                 .filter_map(|(node, running)| Some((node, running.truth()?)))
@@ -392,7 +392,7 @@ impl Engine {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 
-    /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
+    /// How many truths a combiner has seen, and how many of them it goes by; none for other nodes.
     pub fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
         let NodeRunner::Vote(vote) = &self.nodes[node] else {
             return None;
@@ -415,7 +415,7 @@ impl Engine {
         }
     }
 
-    /// Writes down what later ticks will ask for, and tells truths, now that all outputs of the tick are there.
+    /// Writes down what later ticks will ask for, and hands truths over, now that all outputs of the tick are there.
     fn remember(&mut self, now: Instant) {
         for &slot in &self.recorded {
             if let Some(history) = &mut self.histories[slot]
@@ -432,7 +432,7 @@ impl Engine {
                 feedback.observe(self.slots.values[slot], self.slots.given[slot].stamp, now);
             }
         }
-        for &(node, slot) in &self.told {
+        for &(node, slot) in &self.truths {
             if !self.slots.fresh(slot) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Decides between which values samples have lain, and when others lie far outside; not what follows from it.
+//! Between which values samples have lain, and when others lie far outside.
 
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_changed_tells_nothing_of_what_is_usual() {
+    fn what_never_changed_has_no_usual_range() {
         assert_eq!(range(20.0, 20.0).exceeded_by(300.0, 301.0), 0.0);
     }
 }

@@ -11,9 +11,7 @@ use crate::time::{Duration, Instant};
 /// `voters`, `truth` where the combiner learns from errors, and `state` where it goes by one. A whole combiner, the median of the votes at hand:
 ///
 /// ```
-/// use athermal_core::node::{Combine, Combiner, InputPort, Votes};
-/// use schemars::JsonSchema;
-/// use serde::{Deserialize, Serialize};
+/// use athermal_core::node::prelude::*;
 ///
 /// /// The median of the votes.
 /// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -54,7 +52,7 @@ pub trait Combiner: Debug + Send + Sync {
     where
         Self: Sized;
 
-    /// Mistakes in the parameters that their types do not exclude.
+    /// Mistakes between parameters. The compiler has checked the ranges of the schema.
     fn mistakes(&self) -> Vec<Mistake> {
         Vec::new()
     }

@@ -20,11 +20,7 @@ use crate::unit::Unit;
 /// A whole estimator, which predicts the mean of the truths that it was fitted on:
 ///
 /// ```
-/// use athermal_core::node::{
-///     Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
-/// };
-/// use schemars::JsonSchema;
-/// use serde::{Deserialize, Serialize};
+/// use athermal_core::node::prelude::*;
 ///
 /// /// Predicts the mean of the truths of the fit.
 /// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -94,7 +90,7 @@ pub trait Estimator: Debug + Send + Sync {
     /// Which regressors make up a row.
     fn regressors(&self) -> Regressors;
 
-    /// Mistakes in the parameters that their types do not exclude.
+    /// Mistakes between parameters. The compiler has checked the ranges of the schema.
     fn mistakes(&self) -> Vec<Mistake> {
         Vec::new()
     }

@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, PortSummary, Reach, Restored, State};
 use crate::channel::unless_infinite;
-use crate::engine::{Gathered, Given};
 use crate::time::{Duration, Instant};
 
 /// A node that computes channels from channels: slopes, filters, delays.
@@ -16,9 +15,7 @@ use crate::time::{Duration, Instant};
 /// A whole node, which gives the difference of each channel to its previous value:
 ///
 /// ```
-/// use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick};
-/// use schemars::JsonSchema;
-/// use serde::{Deserialize, Serialize};
+/// use athermal_core::node::prelude::*;
 ///
 /// /// The difference of each channel to its value before.
 /// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -92,7 +89,7 @@ pub trait Feature: Debug + Send + Sync {
         &[]
     }
 
-    /// Mistakes in the parameters that their types do not exclude, whatever the inputs are: they are told though an input is wrong.
+    /// Mistakes between parameters, whatever the inputs are. The compiler has checked the ranges of the schema.
     fn mistakes(&self) -> Vec<Mistake> {
         Vec::new()
     }
@@ -174,12 +171,30 @@ pub trait Operator: Send {
     }
 }
 
+/// The values that ports read at a tick, by the number of the bundle; those side by side are in the order of the port.
+pub(crate) trait PortValues: Debug {
+    /// The values; NaN where there is none.
+    fn values(&self, bundle: usize) -> &[f64];
+
+    /// Their stamps; of no meaning where there is no value.
+    fn stamps(&self, bundle: usize) -> &[Instant];
+}
+
+/// When a slot was given its value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlotTime {
+    /// The stamp of the value.
+    pub(crate) stamp: Instant,
+    /// The number of the tick at which the slot was last given something, be it nothing.
+    pub(crate) tick: u64,
+}
+
 /// What an operator sees of the present tick.
 #[derive(Debug)]
 pub struct Tick<'a> {
     /// The instant of the tick.
     pub now: Instant,
-    pub(crate) gathered: &'a [Gathered],
+    pub(crate) gathered: &'a dyn PortValues,
     pub(crate) ports: &'a [usize],
 }
 
@@ -191,7 +206,7 @@ impl<'a> Tick<'a> {
     /// Where the kind declares no such port.
     #[must_use]
     pub fn port(&self, index: usize) -> &'a [f64] {
-        &self.gathered[self.ports[index]].values
+        self.gathered.values(self.ports[index])
     }
 
     /// The stamps of the values of an input port; of no meaning where there is no value.
@@ -200,7 +215,7 @@ impl<'a> Tick<'a> {
     /// Where the kind declares no such port.
     #[must_use]
     pub fn stamps(&self, index: usize) -> &'a [Instant] {
-        &self.gathered[self.ports[index]].stamps
+        self.gathered.stamps(self.ports[index])
     }
 }
 
@@ -208,7 +223,7 @@ impl<'a> Tick<'a> {
 #[derive(Debug)]
 pub struct Outputs<'a> {
     pub(crate) values: &'a mut [f64],
-    pub(crate) given: &'a mut [Given],
+    pub(crate) given: &'a mut [SlotTime],
     pub(crate) tick: u64,
     pub(crate) default_stamp: Instant,
 }
@@ -241,9 +256,9 @@ impl Outputs<'_> {
         &mut self.values[range]
     }
 
-    fn given_now(&self, stamp: Instant) -> Given {
+    fn given_now(&self, stamp: Instant) -> SlotTime {
         let tick = self.tick;
-        Given { stamp, tick }
+        SlotTime { stamp, tick }
     }
 
     /// The number of output channels, over all ports.

@@ -31,9 +31,7 @@ pub enum Learns {
 /// last truth that it was told:
 ///
 /// ```
-/// use athermal_core::node::{Learner, Predictor, Restored, State};
-/// use athermal_core::time::Instant;
-/// use serde::{Deserialize, Serialize};
+/// use athermal_core::node::prelude::*;
 ///
 /// #[derive(Debug, Clone, Serialize, Deserialize)]
 /// struct Start {
@@ -79,13 +77,7 @@ pub enum Learns {
 ///     }
 ///
 ///     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-///         match state.known() {
-///             Ok(known) => {
-///                 *self = known;
-///                 Restored::Accepted
-///             }
-///             Err(cold) => cold,
-///         }
+///         state.replace(self)
 ///     }
 /// }
 ///

@@ -24,6 +24,7 @@ pub mod number_or_none;
 pub mod numbers;
 mod port;
 mod predictor;
+pub mod prelude;
 mod range;
 mod reach;
 mod recent_error;
@@ -41,6 +42,7 @@ pub use estimator::{
     Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
+pub(crate) use feature::{PortValues, SlotTime};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};

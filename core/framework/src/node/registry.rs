@@ -10,8 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
-use crate::document::{Decoded, Value, Wanted, decode_rest};
-use crate::quantity::Quantity;
+use crate::document::{Value, decode_beside};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -64,8 +63,8 @@ impl std::fmt::Display for RoleName {
     }
 }
 
-/// The parameters of a node, as far as they could be read; nothing where they are past all reading.
-pub type ReadSpec = Option<Decoded<Box<dyn NodeSpec>>>;
+/// The parameters of a node; nothing where they have mistakes.
+pub type ReadSpec = Option<Box<dyn NodeSpec>>;
 
 /// A kind of node, as registered.
 #[derive(Debug)]
@@ -82,7 +81,7 @@ pub struct Kind {
     pub inputs: fn() -> &'static [InputPort],
     /// Of a feature, the output ports as it tells them: see [`Feature::ports`].
     pub ports: fn() -> &'static [PortSummary],
-    /// Reads its parameters, telling every mistake in them; after one, what could be read beside it. The keys are those of the node
+    /// Reads its parameters, or reports their mistakes. The keys are those of the node
     /// that are read elsewhere.
     pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
     /// The JSON Schema of its parameters, with the documentation and the ranges that the compiler checks.
@@ -94,7 +93,7 @@ impl Kind {
     #[must_use]
     pub fn given(&self, parameters: &serde_json::Value) -> Option<Box<dyn NodeSpec>> {
         let parameters = Value::from_json(parameters, Place::new(SourceId(0), 0, 0)).ok()?;
-        (self.read)(&parameters, &[], &mut Diagnostics::new())?.whole()
+        (self.read)(&parameters, &[], &mut Diagnostics::new())
     }
 
     /// The keys of a node's table that the framework reads itself.
@@ -157,54 +156,13 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
 ) -> ReadSpec {
-    let advice = |wanted: Wanted<'_>| {
+    let advice = |key: &str| {
         let schema = serde_json::Value::from(schemars::schema_for!(T));
-        match wanted {
-            Wanted::Key(key) => {
-                let description = schema["properties"][key]["description"].as_str()?;
-                Some(format!("add `{key}`: {}", first_paragraph(description)))
-            }
-            Wanted::TableOf(key) => {
-                let default = &schema["properties"][key]["default"];
-                default.is_object().then(|| inline_toml(default))
-            }
-            Wanted::Quantity(way) => example(&schema, way),
-        }
+        let description = schema["properties"][key]["description"].as_str()?;
+        Some(format!("add `{key}`: {}", first_paragraph(description)))
     };
-    let read = decode_rest::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
-    Some(read.map(|spec| Box::new(spec) as Box<dyn NodeSpec>))
-}
-
-/// The first quantity that the documentation of a parameter gives as an example: `"20 um"`.
-fn example(schema: &serde_json::Value, way: &[&str]) -> Option<String> {
-    let mut parameter = schema;
-    for key in way {
-        parameter = forms(schema, parameter)
-            .into_iter()
-            .find_map(|form| form["properties"].get(key))?;
-    }
-    let documentation = parameter["description"].as_str()?;
-    let mut quoted = documentation.split('"').skip(1).step_by(2);
-    let example = quoted.find(|quoted| quoted.parse::<Quantity>().is_ok())?;
-    Some(example.to_owned())
-}
-
-/// The schemas of the forms that a parameter may have.
-fn forms<'a>(
-    schema: &'a serde_json::Value,
-    parameter: &'a serde_json::Value,
-) -> Vec<&'a serde_json::Value> {
-    if let Some(path) = parameter["$ref"].as_str() {
-        let name = path.strip_prefix("#/$defs/").unwrap_or(path);
-        return forms(schema, &schema["$defs"][name]);
-    }
-    let several = ["anyOf", "oneOf"].map(|key| parameter[key].as_array());
-    let several: Vec<_> = several.into_iter().flatten().flatten().collect();
-    if several.is_empty() {
-        return vec![parameter];
-    }
-    let inner = several.into_iter().flat_map(|form| forms(schema, form));
-    inner.collect()
+    let read = decode_beside::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
+    Some(Box::new(read))
 }
 
 /// A value as a graph file has it.

@@ -60,6 +60,28 @@ impl dyn State {
     }
 }
 
+impl dyn State {
+    /// Goes on from a state of type `T`: `take` makes use of it, or says why it cannot.
+    pub fn accept<T: State + 'static>(
+        self: Box<Self>,
+        take: impl FnOnce(T) -> Result<(), &'static str>,
+    ) -> Restored {
+        match self.known().map(take) {
+            Ok(Ok(())) => Restored::Accepted,
+            Ok(Err(reason)) => Restored::cold(reason),
+            Err(cold) => cold,
+        }
+    }
+
+    /// Goes on from a state that takes the place of the present one, of the same type.
+    pub fn replace<T: State + 'static>(self: Box<Self>, present: &mut T) -> Restored {
+        self.accept(|state| {
+            *present = state;
+            Ok(())
+        })
+    }
+}
+
 /// What a node answers when it is given a state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Restored {

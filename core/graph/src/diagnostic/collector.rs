@@ -2,9 +2,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Debug;
-use std::sync::Arc;
 
-use super::gaps::Gaps;
 use super::{Code, Place, Sources, render};
 
 /// How bad a problem is.
@@ -47,17 +45,6 @@ pub trait Problem: Debug {
     /// Other places that matter, each with a few words.
     fn related(&self) -> Vec<(Place, String)> {
         Vec::new()
-    }
-
-    /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
-    fn may_follow_from_a_gap(&self) -> bool {
-        true
-    }
-
-    /// Whether that is so only of what could not be read beside it, since nothing of another file would be laid under what stands
-    /// there.
-    fn inherits_nothing(&self) -> bool {
-        false
     }
 }
 
@@ -116,10 +103,6 @@ pub struct Diagnostics {
     scope: Option<String>,
     errors: usize,
     reported: usize,
-    /// Where something is missing that could not be read.
-    gaps: Arc<Gaps>,
-    /// Something may be missing anywhere.
-    open: bool,
 }
 
 /// What is known of one code at one place.
@@ -203,23 +186,9 @@ impl Diagnostics {
         std::mem::replace(&mut self.scope, context)
     }
 
-    /// An empty collector for the same files.
-    pub fn aside(&self) -> Self {
-        Self {
-            open: self.open,
-            gaps: Arc::clone(&self.gaps),
-            ..Self::default()
-        }
-    }
-
-    /// Takes over what another collector found.
+    /// Takes over what another collector found; what is known here already is counted with it.
     pub fn extend(&mut self, other: Self) {
-        self.extend_where(other, |_| true);
-    }
-
-    /// Takes over those that are wanted of what another collector found; what is known here already is counted with it.
-    pub fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
-        for diagnostic in other.found.into_iter().filter(wanted) {
+        for diagnostic in other.found {
             self.take(diagnostic);
         }
     }
@@ -229,28 +198,7 @@ impl Diagnostics {
         self.reported
     }
 
-    /// Notes where parts of files could not be read: at `places`, or anywhere. What may only follow from that is not told.
-    pub fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
-        self.open |= anywhere;
-        if !places.is_empty() {
-            let gaps = Arc::make_mut(&mut self.gaps);
-            places.iter().for_each(|gap| gaps.add(*gap));
-        }
-    }
-
-    /// Whether something that could not be read may be missing at a place.
-    pub fn is_open(&self, place: Place) -> bool {
-        self.open || self.gaps.hold(place)
-    }
-
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
-        let open = self.open && !problem.inherits_nothing();
-        let is_open = open || place.is_some_and(|place| self.gaps.hold(place));
-        if problem.may_follow_from_a_gap() && is_open {
-            // Whoever counts learns that something is wrong here.
-            self.reported += usize::from(problem.code().severity == Severity::Error);
-            return;
-        }
         let new = self.take(Diagnostic {
             code: problem.code().code,
             severity: problem.code().severity,

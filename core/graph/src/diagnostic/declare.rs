@@ -39,8 +39,6 @@ macro_rules! problem {
         label: $label:expr,
         help: $help:expr,
         $(related: $related:expr,)?
-        $(certain: $certain:expr,)?
-        $(alone: $alone:expr,)?
     ) => {
         $(#[$about])*
         #[derive(Debug, Clone, PartialEq)]
@@ -74,14 +72,6 @@ macro_rules! problem {
                 let Self { $($field),* } = self;
                 $crate::problem!(@or $($related)?, Vec::new())
             }
-
-            $(fn may_follow_from_a_gap(&self) -> bool {
-                !$certain
-            })?
-
-            $(fn inherits_nothing(&self) -> bool {
-                $alone
-            })?
         }
     };
 }

@@ -5,7 +5,6 @@ mod collector;
 mod counted;
 mod declare;
 mod digits;
-mod gaps;
 mod names;
 mod nearest;
 mod panicked;

@@ -34,9 +34,6 @@ impl Problem for Colour {
     fn help(&self) -> Option<String> {
         Some("did you mean \"red\"?".to_owned())
     }
-    fn may_follow_from_a_gap(&self) -> bool {
-        false
-    }
 }
 
 const RAD: Colour = Colour {

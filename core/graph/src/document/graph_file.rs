@@ -28,10 +28,8 @@ pub struct GraphFile {
     pub signals: Vec<SignalDecl>,
     /// The nodes, in the order of the file.
     pub nodes: Vec<NodeDecl>,
-    /// Names that stand for nothing because of mistakes that have been told, so that references to them say no more.
+    /// Names that stand for nothing because of reported mistakes, so that references to them are no further mistakes.
     pub broken: Vec<String>,
-    /// The same of what stands in a section that there is not.
-    pub elsewhere: Vec<String>,
     /// Inherited nodes that were removed.
     pub removed: Vec<String>,
     /// What comes out, in the order of the file.
@@ -138,15 +136,10 @@ pub struct NodeDecl {
     pub each: Vec<String>,
     /// One per member, or one without `each`.
     pub instances: Vec<InstanceDecl>,
-    /// What is left open by mistakes that have been told; none where there are none.
-    pub faulty: Option<Faulty>,
-}
-
-/// A node with mistakes, of which others can be looked for in what is sure.
-#[derive(Debug, Clone, Default)]
-pub struct Faulty {
-    /// Where texts stand that say nothing yet: their members or samples are not known.
-    pub open: Vec<Place>,
+    /// Whether it has mistakes, which have been reported.
+    pub faulty: bool,
+    /// Whether its parameters cannot be read, since their members or samples are not known.
+    pub open: bool,
 }
 
 /// One instance of a node.

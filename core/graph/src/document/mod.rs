@@ -5,16 +5,14 @@
 
 mod declare;
 mod decode;
-mod gaps;
+mod foreign_syntax;
 mod graph_file;
+mod hint;
 mod json;
-mod lacks;
 mod merge;
 mod pattern;
 pub mod problem;
 mod read;
-mod salvage;
-mod slip;
 mod toml_text;
 mod tree;
 
@@ -23,18 +21,18 @@ pub use declare::declare;
 pub use declare::is_name;
 pub use declare::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use declare::{TIME_UNITS, is_misspelt, known_keys};
-pub use decode::{Decoded, decode};
-pub use decode::{LeftOut, Wanted, decode_part, decode_rest};
+pub use decode::decode;
+pub use decode::decode_beside;
+pub use foreign_syntax::ForeignSyntax;
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
 };
+pub use hint::Hint;
 pub use json::JsonError;
-pub use lacks::Lacks;
 pub use pattern::Pattern;
 pub use problem::DocumentProblem;
 pub use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};
-pub use slip::Slip;
 pub use tree::{Data, Entry, Table, Value};
 
 #[cfg(test)]

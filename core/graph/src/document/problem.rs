@@ -1,13 +1,12 @@
 //! Every mistake that reading a graph file can find, with the data of its text; where it stands is told by who reports it.
 
 mod codes;
-pub use codes::A043;
 mod told;
 
 use std::sync::Arc;
 
-use super::lacks::Lacks;
-use super::slip::Slip;
+use super::foreign_syntax::ForeignSyntax;
+use super::hint::Hint;
 use crate::diagnostic::{Names, Place};
 use crate::quantity::{Quantity, QuantityError};
 use crate::time::DurationError;
@@ -23,7 +22,7 @@ pub enum DocumentProblem {
         /// The value without quotes that it stumbled over, where it is one.
         bare: Option<String>,
         /// What is usual elsewhere and stands there instead of TOML.
-        slip: Option<Slip>,
+        foreign: Option<ForeignSyntax>,
     },
     /// A file cannot be read.
     Unreadable {
@@ -104,7 +103,7 @@ pub enum DocumentProblem {
         /// What was found.
         found: String,
         /// What is near what was found, and right.
-        lacks: Option<Lacks>,
+        hint: Option<Hint>,
     },
     /// A text that is none of the choices.
     UnknownChoice {

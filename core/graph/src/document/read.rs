@@ -5,10 +5,8 @@ use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use super::gaps::Gaps;
 use super::merge::merge;
 use super::problem::DocumentProblem;
-use super::salvage::Lost;
 use super::toml_text;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Names, Place, SourceId, Sources};
@@ -128,8 +126,6 @@ pub struct Document {
     pub root: SourceId,
     /// The merged tree: a table without `extends`.
     pub tree: Value,
-    /// What mistakes in reading have left open.
-    pub(super) gaps: Gaps,
     /// Inherited nodes that were removed.
     pub(super) removed: Vec<String>,
 }
@@ -140,7 +136,6 @@ impl Document {
         Document {
             root,
             tree,
-            gaps: Gaps::default(),
             removed: Vec::new(),
         }
     }
@@ -148,9 +143,7 @@ impl Document {
 
 /// Reads the file at `path` and all that it extends.
 ///
-/// `None` if it is missing, or nothing of it can be read for sure; the diagnostics say why. Where a file that it extends is
-/// missing, or the syntax of one is wrong, that is told, and the document is what could be read: diagnostics then keep to themselves
-/// what may only follow. Every file read is added to `sources`.
+/// `None` where one of them is missing or has syntax errors, all of which are reported. Every file read is added to `sources`.
 pub fn load(
     path: &Path,
     reader: &dyn FileReader,
@@ -180,25 +173,17 @@ pub fn load_text(
         diagnostics,
         paths: Vec::new(),
         lent: HashMap::new(),
-        hopeless: false,
-        gaps: Gaps::default(),
+        failed: false,
         removed: Vec::new(),
     };
     let root = SourceId(chain.sources.count());
     let table = chain.read(name.as_ref(), text.into());
-    let (mut gaps, hopeless, removed) = (chain.gaps, chain.hopeless, chain.removed);
-    let mut table = table.filter(|_| !hopeless)?;
-    gaps.spread(&table);
-    if gaps.anywhere {
-        // A module of which something is missing says nothing sure of those that use it.
-        table.remove("modules");
-    }
-    diagnostics.leave_open(gaps.anywhere, &gaps.places);
+    let (failed, removed) = (chain.failed, chain.removed);
+    let table = table.filter(|_| !failed)?;
     let tree = Value::new(Place::new(root, 0, 0), Data::Table(table));
     Some(Document {
         root,
         tree,
-        gaps,
         removed,
     })
 }
@@ -210,9 +195,8 @@ struct Chain<'a> {
     paths: Vec<PathBuf>,
     /// Files that modules come from, read once.
     lent: HashMap<PathBuf, Option<Table>>,
-    /// A file says of itself that it may mean anything.
-    hopeless: bool,
-    gaps: Gaps,
+    /// A file cannot be read, which has been reported.
+    failed: bool,
     removed: Vec<String>,
 }
 
@@ -221,7 +205,7 @@ impl Chain<'_> {
         self.paths.push(normal(path));
         let table = self.read_and_merge(path, text);
         self.paths.pop();
-        self.gaps.anywhere |= table.is_none();
+        self.failed |= table.is_none();
         table
     }
 
@@ -237,29 +221,15 @@ impl Chain<'_> {
         }
         let text: Arc<str> = text.into();
         let source = self.sources.add(shown, text.clone());
-        let parsed = toml_text::parse(source, &text, self.diagnostics)?;
-        let mut table = parsed.table;
-        for lost in &parsed.lost {
-            self.gaps.add(source, lost);
-        }
-        let schema = table
-            .get("schema")
-            .map(|value| (value.place, value.as_integer(), value.found()));
-        match schema {
-            Some((_, Some(1), _)) => {}
-            // It may be what a syntax error cost.
-            None if parsed.lost.iter().any(Lost::may_be_schema) => {}
+        let mut table = toml_text::parse(source, &text, self.diagnostics)?;
+        match table.get("schema") {
+            Some(value) if value.as_integer() == Some(1) => {}
             None => self
                 .diagnostics
                 .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
-            // Another schema may mean anything; 1 in another dress means 1.
-            Some((place, None, found)) => self
-                .diagnostics
-                .report(place, DocumentProblem::SchemaUnknown { found }),
-            Some((place, _, found)) => {
-                self.hopeless = true;
-                self.diagnostics
-                    .report(place, DocumentProblem::SchemaUnknown { found });
+            Some(value) => {
+                let found = value.found();
+                self.fail(value.place, DocumentProblem::SchemaUnknown { found });
             }
         }
         let mut base = match table.remove("extends") {
@@ -274,7 +244,6 @@ impl Chain<'_> {
                 inherited.remove(name);
             }
         }
-        self.diagnostics.leave_open(self.gaps.anywhere, &[]);
         Some(merge(base, table, &mut self.removed, self.diagnostics))
     }
 
@@ -366,7 +335,7 @@ impl Chain<'_> {
                     key,
                     expected,
                     found: extends.found(),
-                    lacks: None,
+                    hint: None,
                 },
             );
             return None;
@@ -401,7 +370,7 @@ impl Chain<'_> {
     }
 
     fn fail(&mut self, place: Place, problem: DocumentProblem) {
-        self.gaps.anywhere = true;
+        self.failed = true;
         self.diagnostics.report(place, problem);
     }
 }

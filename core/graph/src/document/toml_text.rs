@@ -1,11 +1,12 @@
-//! TOML text into a tree with places, every syntax error reported; what the keys mean is decided by others.
+//! TOML text into a tree with places, or all syntax errors.
+
+use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeTable, DeValue, Error};
 
+use super::foreign_syntax;
 use super::problem::DocumentProblem;
-use super::salvage::{self, Lost, SyntaxError, salvage};
-use super::slip;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 
@@ -16,140 +17,108 @@ const DEEPEST: usize = 64;
 /// a hundred bytes for each before anybody could refuse them.
 const LONGEST_LIST: usize = 200_000;
 
-/// What could be read of a text.
-pub(super) struct Parsed {
-    pub(super) table: Table,
-    /// What syntax errors cost, of which has been told.
-    pub(super) lost: Vec<Lost>,
-}
+/// What the parser says of a key that stands twice.
+pub(super) const DUPLICATE_KEY: &str = "duplicate key";
 
-/// Reads `text`. After a syntax error the tree holds what the error does not touch; `None` where that cannot be told.
-pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics) -> Option<Parsed> {
+/// Reads `text`; `None` where there are syntax errors or numbers that nothing holds, all of which are reported.
+pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics) -> Option<Table> {
     if let Some((byte, problem)) = too_much(text) {
         diagnostics.report(at(source, &(byte..byte + 1)), problem);
         return None;
     }
     let (root, errors) = DeTable::parse_recoverable(text);
     if errors.is_empty() {
-        return Some(Reader::new(source, diagnostics).parsed(root.into_inner(), Vec::new()));
+        return table(source, root.into_inner(), diagnostics);
     }
-    let mut left = salvage(text);
-    let told = left.as_mut().map(|left| std::mem::take(&mut left.errors));
-    let told = told.filter(|told| !told.is_empty());
-    for error in told.unwrap_or_else(|| salvage::errors(text, 0)) {
-        let SyntaxError {
-            bytes,
+    let place = |error: &Error| error.span().unwrap_or(text.len()..text.len());
+    let mut errors: Vec<_> = errors.iter().map(|error| (place(error), error)).collect();
+    errors.sort_by_key(|(bytes, _)| bytes.start);
+    // Behind the first error of a line the parser takes the rest of it for what it is not.
+    errors.dedup_by(|(next, _), (first, _)| {
+        let between = text.get(first.start..next.start).unwrap_or_default();
+        !between.contains('\n')
+    });
+    for (bytes, error) in errors {
+        let reason = error.message().to_owned();
+        let problem = DocumentProblem::Syntax {
+            bare: bare(text, &bytes).filter(|_| reason != DUPLICATE_KEY),
+            foreign: foreign_syntax::of(text, &bytes),
             reason,
-            bare,
-        } = error;
-        let slip = slip::of(text, &bytes);
-        let problem = DocumentProblem::Syntax { reason, bare, slip };
+        };
         diagnostics.report(at(source, &bytes), problem);
     }
-    let left = left?;
-    let (root, _) = DeTable::parse_recoverable(&left.text);
-    Some(Reader::new(source, diagnostics).parsed(root.into_inner(), left.lost))
+    None
 }
 
-fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {
+/// The text of a value that has no quotes, where it should have.
+fn bare(text: &str, span: &Range<usize>) -> Option<String> {
+    let found = text.get(span.clone())?;
+    let is_value = text[..span.start].trim_end().ends_with(['=', '[', ',']);
+    let is_key = text[span.end..].trim_start().starts_with(['=', '.']);
+    let is_word = found.starts_with(char::is_alphanumeric)
+        && found.contains(char::is_alphabetic)
+        && !found.contains(['"', '\'', '\n']);
+    (is_value && !is_key && is_word).then(|| found.to_owned())
+}
+
+fn at(source: SourceId, span: &Range<usize>) -> Place {
     let byte = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
     Place::new(source, byte(span.start), byte(span.end))
 }
 
-/// Sections of which it does no harm to leave a key out: of the named things in them something may be missing.
-const NAMED: [&str; 3] = ["sets", "signals", "nodes"];
-
-/// What the parser gives, on its way into a tree.
-struct Reader<'a> {
-    source: SourceId,
-    diagnostics: &'a mut Diagnostics,
-    /// The keys down to what is read.
-    way: Vec<String>,
-    lost: Vec<Lost>,
+fn table(source: SourceId, table: DeTable<'_>, diagnostics: &mut Diagnostics) -> Option<Table> {
+    // All values are read before any is given up, so that each number that is too large is reported.
+    let entries = table.into_iter().map(|(key, spanned)| {
+        let key_place = at(source, &key.span());
+        let mut value = value(source, spanned, diagnostics)?;
+        // A dotted key or an implied header has no text of its own.
+        if value.place.start == value.place.end {
+            value.place = key_place;
+        }
+        let entry = Entry {
+            key: key_place,
+            value,
+        };
+        Some((key.into_inner().into_owned(), entry))
+    });
+    let entries: Vec<_> = entries.collect();
+    entries.into_iter().collect()
 }
 
-impl<'a> Reader<'a> {
-    fn new(source: SourceId, diagnostics: &'a mut Diagnostics) -> Self {
-        Self {
-            source,
-            diagnostics,
-            way: Vec::new(),
-            lost: Vec::new(),
-        }
-    }
-
-    fn parsed(mut self, root: DeTable<'_>, mut lost: Vec<Lost>) -> Parsed {
-        let table = self.table(root);
-        lost.append(&mut self.lost);
-        Parsed { table, lost }
-    }
-
-    fn table(&mut self, table: DeTable<'_>) -> Table {
-        let mut entries = Vec::with_capacity(table.len());
-        for (key, spanned) in table {
-            let key_place = at(self.source, &key.span());
-            self.way.push(key.into_inner().into_owned());
-            let value = self.value(spanned);
-            let (Some(key), Some(mut value)) = (self.way.pop(), value) else {
-                continue;
-            };
-            // A dotted key or an implied header has no text of its own.
-            if value.place.start == value.place.end {
-                value.place = key_place;
-            }
-            let entry = Entry {
-                key: key_place,
-                value,
-            };
-            entries.push((key, entry));
-        }
-        entries.into_iter().collect()
-    }
-
-    /// A number that nothing can hold is told. Whoever reads it would take what stands for it for what was meant, so it is left out
-    /// where that can be known; none then.
-    fn too_large(&mut self, place: Place, number: String, instead: Data) -> Option<Data> {
-        let problem = DocumentProblem::NumberTooLarge { number };
-        self.diagnostics.report(place, problem);
-        let first = self.way.first().map_or("", String::as_str);
-        if self.way.len() < 3 || !NAMED.contains(&first) {
-            return Some(instead);
-        }
-        self.lost.push(Lost {
-            way: Some(self.way.clone()),
-            around: Vec::new(),
-        });
+fn value(
+    source: SourceId,
+    spanned: Spanned<DeValue<'_>>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Value> {
+    let place = at(source, &spanned.span());
+    let mut too_large = |number: String| {
+        diagnostics.report(place, DocumentProblem::NumberTooLarge { number });
         None
-    }
-
-    fn value(&mut self, spanned: Spanned<DeValue<'_>>) -> Option<Value> {
-        let place = at(self.source, &spanned.span());
-        let data = match spanned.into_inner() {
-            DeValue::String(text) => Data::Text(text.into_owned()),
-            DeValue::Integer(number) => {
-                match i64::from_str_radix(number.as_str(), number.radix()) {
-                    Ok(number) => Data::Integer(number),
-                    Err(_) => self.too_large(place, number.to_string(), Data::Integer(0))?,
-                }
+    };
+    let data = match spanned.into_inner() {
+        DeValue::String(text) => Data::Text(text.into_owned()),
+        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+            Ok(number) => Data::Integer(number),
+            Err(_) => return too_large(number.to_string()),
+        },
+        DeValue::Float(number) => match number.as_str().parse::<f64>() {
+            Ok(read) if read.is_finite() || !number.as_str().contains(char::is_numeric) => {
+                Data::Float(read)
             }
-            DeValue::Float(number) => match number.as_str().parse::<f64>() {
-                Ok(read) if read.is_infinite() && !number.as_str().contains("inf") => {
-                    self.too_large(place, number.to_string(), Data::Float(0.0))?
-                }
-                Ok(read) => Data::Float(read),
-                // After a syntax error the parser leaves what it could not read; that error is reported already.
-                Err(_) => Data::Float(0.0),
-            },
-            DeValue::Boolean(truth) => Data::Bool(truth),
-            DeValue::Datetime(time) => Data::Time(time.to_string()),
-            DeValue::Array(values) => {
-                let values = values.into_iter();
-                Data::List(values.filter_map(|element| self.value(element)).collect())
-            }
-            DeValue::Table(entries) => Data::Table(self.table(entries)),
-        };
-        Some(Value::new(place, data))
-    }
+            _ => return too_large(number.to_string()),
+        },
+        DeValue::Boolean(truth) => Data::Bool(truth),
+        DeValue::Datetime(time) => Data::Time(time.to_string()),
+        DeValue::Array(values) => {
+            let values = values.into_iter();
+            let values: Vec<_> = values
+                .map(|element| value(source, element, diagnostics))
+                .collect();
+            Data::List(values.into_iter().collect::<Option<_>>()?)
+        }
+        DeValue::Table(entries) => Data::Table(table(source, entries, diagnostics)?),
+    };
+    Some(Value::new(place, data))
 }
 
 /// The first byte of what is too much to be parsed: a key with more parts than may be nested, since the parser does not limit them

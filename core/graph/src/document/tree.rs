@@ -35,6 +35,22 @@ pub enum Data {
 }
 
 impl Data {
+    /// What was found, for an error: `the number 5`, `the text "abc"`, `a list`.
+    pub(crate) fn found(&self) -> String {
+        match self {
+            Data::Text(text) => match text.char_indices().nth(60) {
+                Some((end, _)) => format!("the text \"{}\u{2026}\"", &text[..end]),
+                None => format!("the text \"{text}\""),
+            },
+            Data::Integer(number) => format!("the number {number}"),
+            Data::Float(number) => format!("the number {number}"),
+            Data::Bool(truth) => format!("{truth}"),
+            Data::Time(time) => format!("the time {time}"),
+            Data::List(_) => "a list".to_owned(),
+            Data::Table(_) => "a table".to_owned(),
+        }
+    }
+
     /// Whether it is a number of either sort.
     pub fn is_number(&self) -> bool {
         matches!(self, Self::Integer(_) | Self::Float(_))
@@ -205,19 +221,8 @@ impl Value {
         }
     }
 
-    /// What was found, for an error: `the number 5`, `the text "abc"`, `a list`.
+    /// As [`Data::found`].
     pub fn found(&self) -> String {
-        match &self.data {
-            Data::Text(text) => match text.char_indices().nth(60) {
-                Some((end, _)) => format!("the text \"{}\u{2026}\"", &text[..end]),
-                None => format!("the text \"{text}\""),
-            },
-            Data::Integer(number) => format!("the number {number}"),
-            Data::Float(number) => format!("the number {number}"),
-            Data::Bool(truth) => format!("{truth}"),
-            Data::Time(time) => format!("the time {time}"),
-            Data::List(_) => "a list".to_owned(),
-            Data::Table(_) => "a table".to_owned(),
-        }
+        self.data.found()
     }
 }

@@ -30,7 +30,6 @@ problem! {
         // What stands there may be somebody's data.
         false => format!("name what `athermal fit {machine} --data FILE -o MODEL.json` writes"),
     },
-    certain: true,
 }
 
 code!(
@@ -68,7 +67,6 @@ problem! {
         "fit this graph (`athermal fit {machine} --data FILE -o {path}`), or restore what was fitted"
     ),
     related: vec![(*named, "the model that was fitted".to_owned())],
-    certain: true,
 }
 
 code!(
@@ -92,7 +90,6 @@ problem! {
     label: "fitted on other values",
     help: "fit the graph anew to be sure; `athermal diff` shows what has changed",
     related: vec![(*named, "the model that was fitted".to_owned())],
-    certain: true,
 }
 
 /// The first few properties that differ: what the file says, then what was fitted. Where an input reads other channels, their

@@ -4,5 +4,6 @@
 
 mod faulty_kinds;
 mod misuse;
+mod orders;
 mod panics;
 mod sabotage;

@@ -23,7 +23,6 @@ problem! {
         Some(meant) => format!("did you mean `{meant}`?"),
         None => format!("its inputs are {}", names(known)),
     },
-    certain: true,
 }
 
 code!(

@@ -22,7 +22,6 @@ problem! {
         known,
         "`athermal build --with CRATE` brings those of a plugin crate; types in this program:",
     ),
-    certain: true,
 }
 
 code!(
@@ -39,7 +38,6 @@ problem! {
     message: format!("the node type `{kind}` is brought by several crates: {}", names(packages)),
     label: "which of them?",
     help: "leave one of the crates out when the program is built",
-    certain: true,
 }
 
 problem! {
@@ -58,7 +56,6 @@ problem! {
     help: format!(
         "give one of them another name in its `{of}!`, or leave one of the crates out when the program is built"
     ),
-    certain: true,
 }
 
 code!(
@@ -74,7 +71,6 @@ problem! {
     message: message.as_str(),
     label: "here",
     help: help.clone(),
-    certain: true,
 }
 
 code!(
@@ -121,7 +117,6 @@ problem! {
     message: format!("`{kind}` {}", fault.found),
     label: "a mistake of its kind, not of the graph",
     help: format!("for {author}: {}", fault.remedy),
-    certain: true,
 }
 
 impl FaultyKind {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::{nearest_of_many, nearest_or_all};
 use crate::diagnostic::{Names, code, names, problem};
-use crate::document::problem::A043;
 
 code!(
     A042,
@@ -35,6 +34,13 @@ problem! {
     help: "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`",
 }
 
+code!(
+    A043,
+    Error,
+    "unknown port",
+    "What follows the `:` of a reference is one of the node's output ports. `athermal nodes TYPE` lists them."
+);
+
 problem! {
     /// A reference to a port that the node does not have.
     A043 UnknownPort { node: String, port: String, known: Vec<&'static str> }
@@ -63,7 +69,6 @@ problem! {
             false => format!("{written}, or name a port; its ports are {}", names(known)),
         }
     },
-    certain: true,
 }
 
 code!(

@@ -1,4 +1,4 @@
-//! Decides when a truth may be told to whoever learns from it; not what is made of it.
+//! The embargo: truths wait until a prediction made now may know of them.
 
 use std::collections::VecDeque;
 
@@ -89,22 +89,22 @@ impl Embargo {
 
     /// Hands over every truth that arrived up to `newest`, in order.
     #[inline]
-    pub(crate) fn release(&mut self, newest: Instant, tell: impl FnMut(DueTruth<'_>)) {
+    pub(crate) fn release(&mut self, newest: Instant, give: impl FnMut(DueTruth<'_>)) {
         let next = self.state.withheld.front();
         if next.is_some_and(|late| late.arrived <= newest) {
-            self.release_some(newest, tell);
+            self.release_some(newest, give);
         }
     }
 
     #[inline(never)]
-    fn release_some(&mut self, newest: Instant, mut tell: impl FnMut(DueTruth<'_>)) {
+    fn release_some(&mut self, newest: Instant, mut give: impl FnMut(DueTruth<'_>)) {
         let EmbargoState { pairing, withheld } = &mut self.state;
         while let Some(&late) = withheld.front()
             && late.arrived <= newest
         {
             withheld.pop_front();
             if let Some(row) = pairing.row_of(late.run) {
-                tell(DueTruth {
+                give(DueTruth {
                     row,
                     truth: late.truth,
                     arrived: late.arrived,
@@ -116,9 +116,9 @@ impl Embargo {
     }
 
     /// Hands over all, up to the last tick of a segment that has ended.
-    pub(crate) fn end_segment(&mut self, last: Instant, tell: impl FnMut(DueTruth<'_>)) {
+    pub(crate) fn end_segment(&mut self, last: Instant, give: impl FnMut(DueTruth<'_>)) {
         // The embargo guards predictions of the segment that has ended; none of them is still to come.
-        self.release(last, tell);
+        self.release(last, give);
         self.state.pairing.clear();
     }
 

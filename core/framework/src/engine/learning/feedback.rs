@@ -1,5 +1,5 @@
-//! Decides what an estimator reads in place of measured past truths, where its own predictions are fed back; only
-//! evaluations do that, so that memory may be taken as it comes.
+//! What an estimator reads in place of measured past truths, where its own predictions are fed back. Only evaluations do
+//! that, so memory may grow.
 
 use std::collections::VecDeque;
 
@@ -29,9 +29,9 @@ pub(crate) struct Feedback {
     origin: Instant,
     /// How the prediction of the last run changes with each past truth.
     slopes: Vec<f64>,
-    /// By how much a past truth is changed to tell that.
+    /// By how much a past truth is changed to find that.
     nudge: f64,
-    /// What [`widened`](Self::widened) tells.
+    /// What [`widened`](Self::widened) gives.
     widened: f64,
 }
 
@@ -107,7 +107,7 @@ impl Feedback {
         }
     }
 
-    /// Takes a truth that has just been measured, be it nothing; it may be told twice.
+    /// Takes a truth that has just been measured, be it nothing; a second call at the same instant does nothing.
     pub(crate) fn observe(&mut self, measured: f64, stamp: Instant, now: Instant) {
         if self.truths.back().is_some_and(|last| last.at == now) {
             return;
@@ -180,7 +180,7 @@ impl Feedback {
             let mut predicted = f64::NAN;
             if !row.iter().any(|value| value.is_nan()) {
                 predicted = predict(&row, run.at);
-                self.tell_slopes(&mut run.slopes, &mut row, predicted, run.at, &predict);
+                self.find_slopes(&mut run.slopes, &mut row, predicted, run.at, &predict);
             }
             let brought = self.error_of(&run, origin, nth);
             let truth = &mut self.truths[nth];
@@ -235,7 +235,7 @@ impl Feedback {
             std::mem::take(&mut self.slopes),
         );
         nudged.copy_from_slice(row);
-        self.tell_slopes(&mut slopes, &mut nudged, prediction, now, predict);
+        self.find_slopes(&mut slopes, &mut nudged, prediction, now, predict);
         (self.row, self.slopes) = (nudged, slopes);
         self.pairing.run(now, [row, &self.slopes, &[prediction]]);
         let brought = self.brought(&self.slopes, now, self.origin, self.truths.len());
@@ -243,8 +243,8 @@ impl Feedback {
         self.widened = (1.0 + squares.sum::<f64>()).sqrt();
     }
 
-    /// Tells how a prediction from a row changes with each past truth in it.
-    fn tell_slopes(
+    /// Finds how a prediction from a row changes with each past truth in it.
+    fn find_slopes(
         &self,
         slopes: &mut [f64],
         row: &mut [f64],

@@ -1,4 +1,4 @@
-//! Decides what an estimator learns from while it runs, and what it is kept from; how it learns is the learner's.
+//! What an estimator learns from while it runs, and what it is kept from.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ pub(crate) struct GatedLearner {
     nothing: Vec<f64>,
 }
 
-/// What became of a truth that the embargo let through, as the port `learning` tells it.
+/// What became of a truth that the embargo let through, as the port `learning` gives it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum LearnOutcome {
@@ -76,7 +76,7 @@ impl GatedLearner {
         })
     }
 
-    /// Learns as late as a mode says.
+    /// Learns as late as a mode wants.
     pub(crate) fn predict_in(&mut self, mode: Mode) {
         self.mode = mode;
     }
@@ -164,7 +164,7 @@ impl GatedLearner {
         self.withheld.observe(truth, now, frozen);
     }
 
-    /// Learns from what the embargo lets through at `now`; tells what became of the newest, and when it had arrived.
+    /// Learns from what the embargo lets through at `now`; gives the outcome of the newest, and when it had arrived.
     pub(crate) fn release(
         &mut self,
         now: Instant,
@@ -174,16 +174,16 @@ impl GatedLearner {
         let frozen = self.frozen(gathered, on);
         let newest = self.newest(now);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
-        let mut news = None;
+        let mut newest_outcome = None;
         let free = self.mode == Mode::FreeRun;
         self.withheld.release(newest, |released| {
             if free && learner.is_settled() {
                 return;
             }
-            news = Some((gate.offer(learner, released, frozen), released.arrived));
+            newest_outcome = Some((gate.offer(learner, released, frozen), released.arrived));
         });
-        self.changed |= news.is_some();
-        news
+        self.changed |= newest_outcome.is_some();
+        newest_outcome
     }
 
     /// The segment has ended with this tick.
@@ -238,7 +238,7 @@ impl GatedLearner {
         let became = if !on && !self.learner.tracks_state() {
             LearnOutcome::FrozenOnCommand
         } else if channels.any(|&value| value != 0.0) {
-            // NaN too: where nobody says that learning may go on, it does not.
+            // NaN too: without a clear 0, learning does not go on.
             LearnOutcome::FrozenByChannel
         } else {
             LearnOutcome::Learned

@@ -1,4 +1,4 @@
-//! Decides by which past truths predictions may be made in an evaluation; not how they are scored.
+//! By which past truths predictions may be made in an evaluation.
 
 use std::num::NonZeroU32;
 
@@ -20,7 +20,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// How much earlier than in one step the newest truth must have arrived that is told at all.
+    /// How much earlier than in one step the newest truth must have arrived that counts at all.
     pub fn earlier(self, step: Duration) -> Duration {
         match self {
             Self::OneStep | Self::FreeRun => Duration::ZERO,
@@ -29,7 +29,7 @@ impl Mode {
     }
 }
 
-/// So many steps, as long as that can be told.
+/// So many steps; the longest duration where they are longer.
 pub fn times(step: Duration, count: i64) -> Duration {
     Duration::from_ns(step.as_ns().saturating_mul(count))
 }

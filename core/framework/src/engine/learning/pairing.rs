@@ -1,4 +1,4 @@
-//! Decides which run of a node a truth belongs to; not what is done with the pair.
+//! Which run of a node a truth belongs to.
 
 use super::rows::Rows;
 use crate::compile::TruthLink;

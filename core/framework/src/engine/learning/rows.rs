@@ -1,4 +1,4 @@
-//! Decides where rows of numbers lie while they wait; not what they wait for.
+//! Rows of numbers in one piece of memory, while they wait.
 
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,7 @@ impl TryFrom<InOrder> for Rows {
 
     fn try_from(kept: InOrder) -> Result<Self, Self::Error> {
         if kept.times.len().checked_mul(kept.width) != Some(kept.numbers.len()) {
-            return Err("rows of runs are not as long as they say");
+            return Err("rows of runs have another length than stated");
         }
         let mut rows = Self::new(kept.width);
         for (nth, at) in kept.times.iter().enumerate() {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_of_rows_does_not_tell_how_much_room_they_had() {
+    fn what_is_kept_of_rows_does_not_depend_on_how_much_room_they_had() {
         let mut rows = Rows::new(2);
         for nth in 0..11 {
             rows.push(Instant::from_ns(nth)).fill(nth as f64);

@@ -1,4 +1,4 @@
-//! Decides how an output passes from an old graph's value to a new one's without a step.
+//! How an output passes from an old graph's value to a new one's without a step.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Decides what of a running engine is kept, and in which form; who keeps it and when is decided elsewhere.
+//! The state of an engine and its form in bytes. [`snapshot`](super::snapshot) takes it down.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -91,7 +91,7 @@ pub enum RestoreError {
     Damaged,
     /// The form is one that this program does not know.
     Unreadable {
-        /// What the reader says.
+        /// The message of the reader.
         reason: String,
     },
     /// The snapshot belongs to another graph or fit.
@@ -136,7 +136,7 @@ impl fmt::Display for RestoreError {
 impl std::error::Error for RestoreError {}
 
 impl EngineState {
-    /// The state as bytes: a name, a checksum, and the state as MessagePack, which says itself what is what.
+    /// The state as bytes: a name, a checksum, and the state as MessagePack with names.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let payload = rmp_serde::to_vec_named(self)

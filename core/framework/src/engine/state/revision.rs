@@ -1,4 +1,4 @@
-//! Decides the revision of a fitted graph: a hash of what it computes, not of how it is written.
+//! The revision of a fitted graph: a hash of what it computes, not of how it is written.
 
 use std::collections::BTreeMap;
 use std::hash::Hasher;

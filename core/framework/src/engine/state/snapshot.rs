@@ -1,4 +1,4 @@
-//! Decides how an engine tells all that it knows, and goes on from what it or another one knew.
+//! The state of an engine taken down, and restored in the same or in another engine.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,13 +8,13 @@ use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
 use crate::engine::tick::Estimate;
-use crate::engine::tick::Given;
 use crate::engine::tick::NodeRunner;
 use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
 use crate::node::Restored;
+use crate::node::SlotTime;
 
 impl Engine {
-    /// All that the engine knows, as bytes that say themselves what they are.
+    /// All that the engine knows, as self-describing bytes.
     ///
     /// An engine of the same graph and fit that is given them goes on with the same bits.
     #[must_use]
@@ -82,9 +82,17 @@ impl Engine {
     /// All that the engine knows, by name.
     #[must_use]
     pub fn state(&self) -> EngineState {
-        let name = |slot: usize| self.plan.channels[slot].name.clone();
-        let outputs = self.plan.outputs.iter().enumerate();
-        let source = |index: usize| self.plan.sources[index].name.clone();
+        let plan = &self.plan;
+        let sources = || plan.sources.iter().map(|source| source.name.clone());
+        let channels = || plan.channels.iter().map(|channel| channel.name.clone());
+        let outputs = plan.outputs.iter().enumerate();
+        let values = self.slots.values.iter().zip(&self.slots.given);
+        let slots = values.map(|(&value, given)| SlotState {
+            value,
+            stamp: given.stamp,
+            written: given.tick,
+        });
+        let histories = channels().zip(self.histories.iter().cloned());
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             revision: self.revision().to_owned(),
@@ -92,40 +100,17 @@ impl Engine {
             last: self.last,
             before_break: self.before_break,
             frozen: self.frozen,
-            rejected: self
-                .rejected
-                .iter()
-                .enumerate()
-                .map(|(index, &count)| (source(index), count))
-                .collect(),
+            rejected: sources().zip(self.rejected.iter().copied()).collect(),
             refused: self.refused,
-            extremes: self
-                .extremes
-                .iter()
-                .enumerate()
-                .map(|(index, &extremes)| (source(index), extremes))
-                .collect(),
-            slots: (0..self.plan.channels.len())
-                .map(|slot| (name(slot), self.slot_state(slot)))
-                .collect(),
-            histories: self
-                .histories
-                .iter()
-                .enumerate()
-                .filter_map(|(slot, history)| history.clone().map(|history| (name(slot), history)))
+            extremes: sources().zip(self.extremes.iter().copied()).collect(),
+            slots: channels().zip(slots).collect(),
+            histories: histories
+                .filter_map(|(name, history)| Some((name, history?)))
                 .collect(),
             nodes: self.node_states(),
             blending: outputs
                 .map(|(index, output)| (output.name.clone(), self.outputs.blending(index)))
                 .collect(),
-        }
-    }
-
-    fn slot_state(&self, slot: usize) -> SlotState {
-        SlotState {
-            value: self.slots.values[slot],
-            stamp: self.slots.given[slot].stamp,
-            written: self.slots.given[slot].tick,
         }
     }
 
@@ -148,9 +133,9 @@ impl Engine {
         })
     }
 
-    /// Goes on from a state of this or another graph, as far as the transfer says.
+    /// Goes on from a state of this or another graph, as far as the transfer goes.
     ///
-    /// `warmed` says whether this engine has been stepped over the past, so that what is not carried is not cold.
+    /// `warmed`: whether this engine has been stepped over the past, so that what is not carried is not cold.
     pub fn adopt(
         &mut self,
         state: &EngineState,
@@ -217,7 +202,7 @@ impl Engine {
             }
             if let Some(was) = state.slots.get(&channel.name) {
                 self.slots.values[slot] = was.value;
-                self.slots.given[slot] = Given {
+                self.slots.given[slot] = SlotTime {
                     stamp: was.stamp,
                     tick: was.written,
                 };

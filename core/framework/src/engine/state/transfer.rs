@@ -1,4 +1,4 @@
-//! Decides which nodes of a new graph go on from what those of the old one know.
+//! Which nodes of a new graph go on from the state of the old one.
 
 use std::collections::HashMap;
 
@@ -204,7 +204,7 @@ enum Own {
     New,
     Type,
     Inputs,
-    /// What was learned for another one says nothing of this.
+    /// What was learned for another one is of no use for this.
     Horizon,
     Parameters,
     Unit,

@@ -1,4 +1,4 @@
-//! Decides which estimators are predicted at once; not what each of them predicts.
+//! Linear estimators that are predicted at once, to the bits of [each alone](super::estimate).
 
 use super::context::TickContext;
 use super::estimate::given;
@@ -101,7 +101,7 @@ impl<'a> Linear<'a> {
             node,
             slot: *slot,
             trigger: *trigger,
-            learns: !estimate.is_plain(),
+            learns: estimate.learning.is_some(),
             form,
             shared,
             own,

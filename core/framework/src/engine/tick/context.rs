@@ -1,4 +1,4 @@
-//! Decides what one node does at a tick: whether it runs, what it reads and where its outputs go; not in which order nodes do.
+//! What one node does at a tick: whether it runs, what it reads and where its outputs go.
 
 use std::ops::Range;
 
@@ -45,17 +45,6 @@ impl TickContext<'_> {
                 }
             }
             NodeRunner::Estimate {
-                estimate: Some(estimate),
-                trigger,
-                slot,
-                ..
-            } if estimate.is_plain() => {
-                if trigger.is_none_or(|gather| self.gathered[gather].fresh) {
-                    let (value, stamp) = estimate.predict(self.gathered, self.row, self.now);
-                    self.slots.set(*slot, value, stamp);
-                }
-            }
-            NodeRunner::Estimate {
                 estimate,
                 trigger,
                 slot,
@@ -74,7 +63,7 @@ impl TickContext<'_> {
         {
             operator.capture(&Tick {
                 now: self.now,
-                gathered: self.gathered,
+                gathered: &&*self.gathered,
                 ports: gathers,
             });
         }
@@ -108,13 +97,13 @@ impl TickContext<'_> {
         };
         let tick = Tick {
             now,
-            gathered,
+            gathered: &&**gathered,
             ports: gathers,
         };
         operator.step(&tick, &mut outputs);
     }
 
-    /// Lets an estimator learn before it runs; what became of the newest truth is told beside its prediction.
+    /// Lets an estimator learn before it runs; the outcome of the newest truth stands beside its prediction.
     #[inline]
     pub(crate) fn learn(&mut self, learning: &mut GatedLearner, slot: usize) {
         let (now, on) = (self.now, !self.frozen);
@@ -127,7 +116,7 @@ impl TickContext<'_> {
         }
     }
 
-    /// An estimator that does more than predict by its fit, or has none.
+    /// Lets an estimator learn, then predict.
     #[inline(never)]
     fn estimate(
         &mut self,

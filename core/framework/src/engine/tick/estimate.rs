@@ -1,4 +1,4 @@
-//! Decides how a fitted estimator is run: which regressors it is given, and when it gives nothing.
+//! A fitted estimator at work: which regressors it is given, and when it gives nothing.
 
 use std::sync::Arc;
 
@@ -67,12 +67,12 @@ pub(crate) struct Estimate {
     parts: Box<[Part]>,
     /// How many they are.
     width: usize,
-    /// Whether nothing is asked of it but its prediction, from what was measured.
+    /// Whether nothing is asked of it but its prediction, from what was measured; it may learn.
     plain: bool,
     takes_absent: bool,
-    /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
+    /// What goes on learning, where the plan wants it: it then predicts in place of the predictor.
     pub(crate) learning: Option<Box<GatedLearner>>,
-    /// What is read in place of measured past truths, in an evaluation that says so.
+    /// What is read in place of measured past truths, in an evaluation of several steps.
     feedback: Option<Box<Feedback>>,
 }
 
@@ -167,12 +167,6 @@ impl Estimate {
         self.feedback.as_deref_mut()
     }
 
-    /// Whether nothing is to be done but to [predict](Self::predict): it does not learn, nothing is fed back, and nobody asks for
-    /// its deviation.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.plain && self.learning.is_none()
-    }
-
     /// What the prediction is, where it is a linear form and nothing else is asked of it; it may learn.
     pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
         let form = match &self.learning {
@@ -188,30 +182,9 @@ impl Estimate {
         &self.parts
     }
 
-    /// The prediction of the fit and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
+    /// The prediction at a tick and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
     ///
-    /// `row` is room for the regressors.
-    #[inline]
-    pub(crate) fn predict(
-        &self,
-        gathered: &[Gathered],
-        row: &mut [f64],
-        now: Instant,
-    ) -> (f64, Instant) {
-        if let Some((row, stamp)) = self.in_place(gathered) {
-            return given(self.predictor.predict(row), stamp, now);
-        }
-        let row = &mut row[..self.width];
-        let (whole, oldest) = self.read(gathered, row, now);
-        // Where none of several regressors is there, none had a stamp.
-        if (whole || self.takes_absent) && oldest < Instant::MAX {
-            given(self.predictor.predict(row), oldest, now)
-        } else {
-            (f64::NAN, now)
-        }
-    }
-
-    /// The same where more is to be done; all regressors are left in `row`, and `on` says whether learning goes on.
+    /// All regressors are left in `row`, and `on` says whether learning goes on.
     #[inline(never)]
     pub(crate) fn run(
         &mut self,
@@ -222,49 +195,40 @@ impl Estimate {
     ) -> (f64, Instant) {
         let (mut whole, mut oldest) = self.read(gathered, row, now);
         whole |= self.takes_absent;
+        // Where none of several regressors is there, none had a stamp.
         whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
             // What is learned from was measured, whatever stands in for it in a prediction.
             learning.run(whole.then_some(&*row), now, gathered, on);
         }
-        if let Some(feedback) = &mut self.feedback {
-            let (learning, predictor) = (&self.learning, &self.predictor);
-            feedback.replace(row, now, |row, at| match learning {
-                Some(learning) => learning.predict(row, at),
-                None => predictor.predict(row),
-            });
+        if let Some(mut feedback) = self.feedback.take() {
+            feedback.replace(row, now, |row, at| self.predict(row, at));
             whole = self.takes_absent || row.iter().all(|value| !value.is_nan());
             oldest = oldest.min(now);
+            self.feedback = Some(feedback);
         }
-        let prediction = match &self.learning {
-            _ if !whole => f64::NAN,
-            Some(learning) => learning.predict(row, now),
-            None => self.predictor.predict(row),
+        let prediction = if whole {
+            self.predict(row, now)
+        } else {
+            f64::NAN
         };
-        if self.feedback.is_some() {
-            self.feed_back(row, prediction, now);
+        if let Some(mut feedback) = self.feedback.take() {
+            let std_dev = self.std_dev_of_one(row, now);
+            feedback.ran(row, prediction, std_dev, now, |row, at| {
+                self.predict(row, at)
+            });
+            self.feedback = Some(feedback);
         }
         given(prediction, oldest, now)
     }
 
-    /// Writes a run down for those that read its prediction in place of the truth.
-    fn feed_back(&mut self, row: &[f64], prediction: f64, now: Instant) {
-        let std_dev = self.std_dev_of_one(row, now);
-        let (learning, predictor) = (&self.learning, &self.predictor);
-        let predict = |row: &[f64], at: Instant| match learning {
-            Some(learning) => learning.predict(row, at),
-            None => predictor.predict(row),
-        };
-        if let Some(feedback) = &mut self.feedback {
-            feedback.ran(row, prediction, std_dev, now, predict);
-        }
-    }
-
-    /// The row where it lies and the stamp of all of it, where it lies in one piece.
+    /// The prediction from regressors at an instant: that of what goes on learning, else of the fit.
     #[inline]
-    fn in_place<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
-        let [part] = &self.parts[..] else { return None };
-        part.in_place(gathered)
+    fn predict(&self, row: &[f64], at: Instant) -> f64 {
+        match &self.learning {
+            Some(learning) => learning.predict(row, at),
+            None => self.predictor.predict(row),
+        }
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
@@ -332,8 +296,6 @@ impl Estimate {
     pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);
-        if let Some(learning) = &self.learning {
-            learning.predict(&row, Instant::from_ns(0));
-        }
+        self.predict(&row, Instant::from_ns(0));
     }
 }

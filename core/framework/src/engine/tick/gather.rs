@@ -1,10 +1,10 @@
-//! Decides what a node sees of the slots that it reads: fresh or held, how old, how far back; not what it does with it.
+//! What a node sees of the slots that it reads: fresh or held, how old, how far back.
 
 use super::history::{Cursor, History};
-use super::slots::{Given, Slots};
+use super::slots::Slots;
 use crate::channel::{ABSENT, UNCHANGED};
 use crate::compile::{Conversion, Entry, Gather};
-use crate::node::Read;
+use crate::node::{PortValues, Read, SlotTime};
 use crate::time::{Duration, Instant};
 
 /// A bundle of slots as read at the present tick, side by side.
@@ -101,7 +101,7 @@ impl Glance {
     };
 
     #[inline(always)]
-    fn add(&mut self, value: f64, given: &Given, tick: u64) {
+    fn add(&mut self, value: f64, given: &SlotTime, tick: u64) {
         let (ran, there) = (given.tick == tick, !value.is_nan());
         self.fresh |= ran & there;
         self.ended |= ran & !there;
@@ -109,6 +109,18 @@ impl Glance {
         self.lacks |= !there;
         self.oldest = self.oldest.min(given.stamp);
         self.newest = self.newest.max(given.stamp);
+    }
+}
+
+impl PortValues for &[Gathered] {
+    #[inline]
+    fn values(&self, bundle: usize) -> &[f64] {
+        &self[bundle].values
+    }
+
+    #[inline]
+    fn stamps(&self, bundle: usize) -> &[Instant] {
+        &self[bundle].stamps
     }
 }
 
@@ -147,7 +159,7 @@ impl Gathered {
     fn convert(&mut self) {
         for conversion in &self.conversions {
             let value = &mut self.values[conversion.entry];
-            // A NaN says why there is no value, and must stay as it is.
+            // A NaN carries the reason why there is no value, and must stay as it is.
             if !value.is_nan() {
                 *value *= conversion.factor();
             }
@@ -159,7 +171,7 @@ impl Gathered {
     #[inline(never)]
     fn read_side_by_side(&mut self, slots: &Slots, first: usize, now: Instant) {
         let range = first..first + self.values.len();
-        let hides = |given: &Given| match self.read {
+        let hides = |given: &SlotTime| match self.read {
             Read::Fresh => given.tick < slots.tick,
             Read::Held | Read::Truth => given.stamp < now - self.shortest,
         };

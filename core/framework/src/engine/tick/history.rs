@@ -1,4 +1,4 @@
-//! Decides what a channel held at an earlier instant; not who asks.
+//! What a channel held at an earlier instant.
 
 use std::collections::VecDeque;
 
@@ -184,7 +184,7 @@ mod tests {
 
     /// A reader that asks again only when it must sees what one sees that always asks.
     #[test]
-    fn an_answer_stays_as_it_is_until_it_was_said_to() {
+    fn an_answer_stays_as_it_is_until_its_end() {
         let (lag, max_age) = (d(30), d(12));
         let mut past = History::new(lag);
         let (mut always, mut seldom) = (0, 0);

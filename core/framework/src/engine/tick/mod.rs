@@ -22,4 +22,4 @@ pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
 pub(crate) use output_slots::OutputSlots;
 pub(crate) use runner::{NodeRunner, runners};
-pub(crate) use slots::{Given, Slots};
+pub(crate) use slots::Slots;

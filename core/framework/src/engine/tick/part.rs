@@ -1,4 +1,4 @@
-//! Decides where regressors are found among what gathers have read; not what is predicted from them.
+//! Where regressors are found among what gathers have read.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Decides how the products of several linear forms are summed at once; in which order those of each are is the form's.
+//! The products of several linear forms, summed at once, in the order in which each form sums its own.
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -1,4 +1,4 @@
-//! Decides what runs each node of a plan, given what was fitted.
+//! What runs each node of a plan, made of the plan and the fits.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -56,7 +56,7 @@ impl NodeRunner {
         matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
     }
 
-    /// The slot of the truth that it is told after all outputs.
+    /// The slot of the truth that it is given after all outputs.
     pub(crate) fn truth(&self) -> Option<usize> {
         match self {
             Self::Operator { .. } => None,

@@ -1,8 +1,9 @@
-//! Decides where the values of a plan lie between its steps.
+//! Where the values of a plan lie between its steps.
 
 use std::ops::Range;
 
 use crate::channel::ABSENT;
+use crate::node::SlotTime;
 use crate::time::Instant;
 
 /// One arena for all values of a plan, by slot number.
@@ -11,32 +12,22 @@ pub struct Slots {
     /// The last value given; NaN where the last run gave none.
     pub(crate) values: Vec<f64>,
     /// When it was.
-    pub(crate) given: Vec<Given>,
+    pub(crate) given: Vec<SlotTime>,
     /// The number of the present tick, from 1.
     pub(crate) tick: u64,
 }
 
-/// When a slot was given its value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Given {
-    /// The stamp of the value.
-    pub(crate) stamp: Instant,
-    /// The number of the tick at which the slot was last given something, be it nothing.
-    pub(crate) tick: u64,
-}
-
-impl Given {
-    const NEVER: Self = Self {
-        stamp: Instant::MIN,
-        tick: 0,
-    };
-}
+/// The time of a slot that was never given anything.
+const NEVER: SlotTime = SlotTime {
+    stamp: Instant::MIN,
+    tick: 0,
+};
 
 impl Slots {
     pub(crate) fn new(count: usize) -> Self {
         Self {
             values: vec![ABSENT; count],
-            given: vec![Given::NEVER; count],
+            given: vec![NEVER; count],
             tick: 0,
         }
     }
@@ -44,7 +35,7 @@ impl Slots {
     #[inline]
     pub(crate) fn set(&mut self, slot: usize, value: f64, stamp: Instant) {
         self.values[slot] = value;
-        self.given[slot] = Given {
+        self.given[slot] = SlotTime {
             stamp,
             tick: self.tick,
         };
@@ -74,7 +65,7 @@ impl Slots {
 
     /// When slots side by side were given their values, where all have one that was given at the same tick with the same stamp.
     #[inline]
-    pub(crate) fn given_together(&self, range: Range<usize>) -> Option<Given> {
+    pub(crate) fn given_together(&self, range: Range<usize>) -> Option<SlotTime> {
         let first = *self.given.get(range.start)?;
         // Loops without a way out take several values at once.
         let (mut apart, mut late) = (0, 0);

@@ -1,4 +1,4 @@
-//! Decides when a combiner is told of a truth; not what it makes of it.
+//! A combiner at work: votes combined, and truths handed to it once the embargo lets them through.
 
 use super::gather::Gathered;
 use crate::channel::unless_infinite;
@@ -18,8 +18,8 @@ pub(crate) struct Vote {
     interval: Option<[f64; 3]>,
     /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
-    /// How many truths it has been told that there was a vote for.
-    told: u64,
+    /// How many truths it has seen that there was a vote for.
+    truths: u64,
     pub(crate) wires: Wires,
 }
 
@@ -49,12 +49,12 @@ impl Vote {
             withheld: link.map(|link| Embargo::new(link, width)),
             interval,
             weights: vec![f64::NAN; voters],
-            told: 0,
+            truths: 0,
             wires,
         }
     }
 
-    /// Tells the combiner the state that it goes by.
+    /// Hands the combiner the state that it goes by.
     pub(crate) fn go_by(&mut self, state: f64, now: Instant) {
         self.combine.state(now, state);
     }
@@ -71,13 +71,13 @@ impl Vote {
             combine,
             withheld,
             weights,
-            told,
+            truths,
             ..
         } = self;
         if let Some(withheld) = withheld {
             let newest = withheld.newest(now);
             withheld.release(newest, |released| {
-                *told += tell(&mut **combine, weights.len(), released);
+                *truths += observe(&mut **combine, weights.len(), released);
             });
             combine.advance(newest);
         }
@@ -163,19 +163,19 @@ impl Vote {
             combine,
             withheld,
             weights,
-            told,
+            truths,
             ..
         } = self;
         if let Some(withheld) = withheld {
             withheld.end_segment(last, |released| {
-                *told += tell(&mut **combine, weights.len(), released);
+                *truths += observe(&mut **combine, weights.len(), released);
             });
         }
     }
 
     /// How many truths came, and how many of them it goes by.
     pub fn evidence(&self) -> Option<(u64, Evidence)> {
-        Some((self.told, self.combine.evidence()?))
+        Some((self.truths, self.combine.evidence()?))
     }
 
     /// What the combiner knows, and what is still withheld from it.
@@ -206,8 +206,8 @@ impl Vote {
     }
 }
 
-/// Tells a truth; 1 if there was any vote for it.
-fn tell(combine: &mut dyn Combine, voters: usize, released: DueTruth<'_>) -> u64 {
+/// Hands a truth over; 1 if there was any vote for it.
+fn observe(combine: &mut dyn Combine, voters: usize, released: DueTruth<'_>) -> u64 {
     let (votes, interval) = released.row.split_at(voters);
     if let &[lower, upper, extent] = interval {
         combine.judge([lower, upper], extent, released.truth);

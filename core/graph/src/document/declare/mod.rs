@@ -50,12 +50,7 @@ const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
 /// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
 /// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
-    let Document {
-        tree,
-        gaps,
-        removed,
-        ..
-    } = document;
+    let Document { tree, removed, .. } = document;
     let Data::Table(root) = &tree.data else {
         let expected = "a table".to_owned();
         diagnostics.report(
@@ -64,7 +59,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
                 key: None,
                 expected,
                 found: tree.found(),
-                lacks: None,
+                hint: None,
             },
         );
         return None;
@@ -72,14 +67,12 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     known_keys(root, &SECTIONS, "a graph file", diagnostics);
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
-    // Whoever refers to what stands in a section that is none has been told of the section.
+    // What stands in a section that is none is no mistake of those who refer to it.
     let strange = root.iter().filter(|(key, _)| !SECTIONS.contains(key));
     let below = strange.filter_map(|(_, section)| section.value.as_table());
-    let elsewhere = below.flat_map(Table::keys).map(str::to_owned);
-    let elsewhere: Vec<String> = elsewhere.chain(gaps.names.iter().cloned()).collect();
-    let mut broken = Vec::new();
+    let mut broken: Vec<String> = below.flat_map(Table::keys).map(str::to_owned).collect();
+    let sets = sets::declare(root.get("sets"), &broken, diagnostics);
     let shared = names::check(root, &mut broken, diagnostics);
-    let sets = sets::declare(root.get("sets"), &elsewhere, diagnostics);
     let time = time_base::declare(root.get("time"), diagnostics);
     let table = table::declare(root.get("table"), diagnostics);
     let sample = time.sample();
@@ -90,13 +83,6 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     signals.retain(|signal| !shared.contains(&signal.name));
     nodes.retain(|node| !shared.contains(&node.name));
     broken.extend(shared);
-    // Of what has gaps, its own mistakes are told, and nothing of those who read it.
-    let gapped = signals.iter().map(|signal| &signal.name);
-    broken.extend(gapped.filter(|name| gaps.concern(name)).cloned());
-    for node in nodes.iter_mut().filter(|node| gaps.concern(&node.name)) {
-        node.faulty.get_or_insert_default();
-        broken.push(node.name.clone());
-    }
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
     let mut tests = expanded.tests;
     if let Some(tests) = &mut tests {
@@ -112,7 +98,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
                 key: Some("tests".to_owned()),
                 expected,
                 found: tests.found(),
-                lacks: None,
+                hint: None,
             },
         );
     }
@@ -131,7 +117,6 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         signals,
         nodes,
         broken,
-        elsewhere,
         removed,
         outputs,
         tests,

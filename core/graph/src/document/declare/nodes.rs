@@ -7,8 +7,8 @@ use super::reading::{
     in_samples, known_keys, length, meant, missing, one_or_more, samples, table, text,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, Place, nearest};
-use crate::document::graph_file::{Faulty, InputDecl, InstanceDecl, NodeDecl};
+use crate::diagnostic::{Diagnostics, nearest};
+use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
@@ -37,9 +37,9 @@ pub(super) fn declare(
             && expanded.faulty
             && let Some(node) = &mut node
         {
-            node.faulty.get_or_insert_default();
+            (node.faulty, node.open) = (true, true);
         }
-        if node.as_ref().is_none_or(|node| node.faulty.is_some()) {
+        if node.as_ref().is_none_or(|node| node.faulty) {
             broken.push(placed.name.clone());
             node.iter_mut().for_each(leave_out_open);
         }
@@ -81,6 +81,7 @@ fn node(
     };
     let own = own_each(keys, sets, diagnostics);
     let each = around_and_own(placed, own.sets, sets);
+    let before_texts = diagnostics.reported();
     if own.known {
         let inside = placed.around.last();
         let parameters = inside.map_or(&[][..], |around| &around.parameters);
@@ -91,18 +92,20 @@ fn node(
         };
         named.check(&entry.value, diagnostics);
     }
-    let mut template = Template {
+    let mut parameters = Value::new(
+        entry.value.place,
+        Data::Table(own_parameters(keys, type_key)),
+    );
+    convert_samples(&mut parameters, sample, diagnostics);
+    let mut open = diagnostics.reported() > before_texts;
+    let template = Template {
         inputs: match keys.get("inputs") {
             Some(value) => inputs(value, &what, sample, diagnostics),
             None => Vec::new(),
         },
-        parameters: Value::new(
-            entry.value.place,
-            Data::Table(own_parameters(keys, type_key)),
-        ),
+        parameters,
         sample,
     };
-    convert_samples(&mut template.parameters, sample, diagnostics);
     let members = if own.sound {
         let (parameters, count) = (&template.parameters, template.inputs.len());
         room_for(name, entry, &each, parameters, count, total, diagnostics)
@@ -110,6 +113,7 @@ fn node(
         None
     };
     let is_expanded = members.is_some();
+    let before_members = diagnostics.reported();
     let mut instances = Vec::new();
     for member in members.into_iter().flatten() {
         let (inputs, parameters) = template.of_member(name, &member, diagnostics);
@@ -120,11 +124,8 @@ fn node(
             member: (!each.is_empty()).then_some(member.name),
         });
     }
-    let faulty = (!is_expanded || diagnostics.reported() > before).then(|| {
-        let mut open = Vec::new();
-        open_texts(&template.parameters, &mut open);
-        Faulty { open }
-    });
+    open |= !is_expanded || diagnostics.reported() > before_members;
+    let faulty = open || diagnostics.reported() > before;
     if !is_expanded {
         // Without its members, a node is looked through as if it had none.
         instances.push(InstanceDecl {
@@ -155,6 +156,7 @@ fn node(
         each,
         instances,
         faulty,
+        open,
     })
 }
 
@@ -453,18 +455,6 @@ fn filled(value: &Value, members: &[(&str, &str)]) -> Value {
         scalar => scalar.clone(),
     };
     Value::new(value.place, data)
-}
-
-/// The places of texts that still hold a placeholder or a number of samples.
-fn open_texts(value: &Value, open: &mut Vec<Place>) {
-    match &value.data {
-        Data::Text(_) if has_placeholders(value) || has_samples(value) => open.push(value.place),
-        Data::List(values) => values.iter().for_each(|value| open_texts(value, open)),
-        Data::Table(table) => table
-            .iter()
-            .for_each(|(_, entry)| open_texts(&entry.value, open)),
-        _ => {}
-    }
 }
 
 fn has_placeholders(value: &Value) -> bool {

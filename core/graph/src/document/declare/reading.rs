@@ -1,7 +1,7 @@
 //! How single values of a section are read and refused; what they are for is decided by the sections.
 
 use crate::diagnostic::{Diagnostics, Place, nearest};
-use crate::document::lacks::Lacks;
+use crate::document::hint::Hint;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Table, Value};
 use crate::quantity::{Quantity, QuantityError};
@@ -44,14 +44,14 @@ fn lacking(
     value: &Value,
     key: &str,
     expected: &str,
-    lacks: Option<Lacks>,
+    hint: Option<Hint>,
     diagnostics: &mut Diagnostics,
 ) {
     let problem = DocumentProblem::WrongType {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
-        lacks,
+        hint,
     };
     diagnostics.report(value.place, problem);
 }
@@ -103,8 +103,8 @@ pub(super) fn texts(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     let Data::List(values) = &value.data else {
-        let lacks = Lacks::for_texts(&value.data);
-        lacking(value, key, expected, lacks, diagnostics);
+        let hint = Hint::for_texts(&value.data);
+        lacking(value, key, expected, hint, diagnostics);
         return None;
     };
     let texts = values
@@ -144,8 +144,8 @@ pub(super) fn duration(
     diagnostics: &mut Diagnostics,
 ) -> Option<Duration> {
     let Some(text) = value.as_text() else {
-        let lacks = Lacks::for_duration(&value.data);
-        lacking(value, key, "a duration like \"5min\"", lacks, diagnostics);
+        let hint = Hint::for_duration(&value.data);
+        lacking(value, key, "a duration like \"5min\"", hint, diagnostics);
         return None;
     };
     let read = match samples(text) {
@@ -182,13 +182,13 @@ pub(super) fn quantity(
     match read {
         Some(Ok(quantity)) => return Some(quantity),
         Some(Err(QuantityError::NoUnit { .. })) | None => {
-            let lacks = Lacks::for_quantity(&value.data, unit, is_known);
+            let hint = Hint::for_quantity(&value.data, unit, is_known);
             let expected = if is_known {
                 format!("a quantity in {unit}")
             } else {
                 format!("a quantity like \"5 {unit}\"")
             };
-            lacking(value, key, &expected, lacks, diagnostics);
+            lacking(value, key, &expected, hint, diagnostics);
         }
         Some(Err(error)) => diagnostics.report(value.place, DocumentProblem::Quantity(error)),
     }

@@ -19,8 +19,6 @@ pub(super) struct Sets {
     broken: IndexSet<String>,
     /// The names of all, once somebody names another: a graph may do so thousands of times.
     known: OnceCell<Arc<Names>>,
-    /// The same with what may be a set elsewhere.
-    spelt: OnceCell<Names>,
 }
 
 /// Reads the section `[sets]`; what stands `elsewhere`, in a section that is none, may be a set as well.
@@ -33,7 +31,6 @@ pub(super) fn declare(
         members: IndexMap::new(),
         broken: elsewhere.iter().cloned().collect(),
         known: OnceCell::new(),
-        spelt: OnceCell::new(),
     };
     let Some(sets) = sets.and_then(|sets| table(sets, "sets", diagnostics)) else {
         return declared;
@@ -86,7 +83,7 @@ impl Sets {
         or: Option<String>,
         diagnostics: &mut Diagnostics,
     ) -> Option<&[String]> {
-        if !self.members.contains_key(name) && !self.is_misspelt(name) {
+        if !self.members.contains_key(name) && !self.broken.contains(name) {
             let problem = DocumentProblem::UnknownSet {
                 name: name.to_owned(),
                 known: Arc::clone(self.known()),
@@ -95,16 +92,6 @@ impl Sets {
             diagnostics.report(place, problem);
         }
         self.sound(name)
-    }
-
-    /// Whether a name that no set has is the right one of a set with mistakes.
-    pub(super) fn is_misspelt(&self, name: &str) -> bool {
-        if self.broken.is_empty() || self.broken.contains(name) {
-            return self.broken.contains(name);
-        }
-        let all = || self.members.keys().chain(&self.broken).cloned().collect();
-        let near = self.spelt.get_or_init(all).nearest(name);
-        near.is_some_and(|near| self.broken.contains(near) && !is_name(near, false))
     }
 
     fn known(&self) -> &Arc<Names> {

@@ -217,7 +217,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
                 key: Some("range".to_owned()),
                 expected,
                 found,
-                lacks: None,
+                hint: None,
             },
         );
         return None;

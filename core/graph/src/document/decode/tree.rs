@@ -1,4 +1,4 @@
-//! Serde's view of the tree: each value with the way to it, unknown keys noted on the side; it repairs nothing.
+//! Serde's view of the tree: each value with the keys to it, unknown keys noted on the side.
 
 use std::cell::RefCell;
 
@@ -6,60 +6,78 @@ use serde::de::value::StrDeserializer;
 use serde::de::{self, DeserializeSeed, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
 
-use super::error::{DecodeError, Mistake, Step};
+use super::error::{DecodeError, Mistake};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
 
-/// The way from the decoded value to one inside it, as a list on the stack.
+/// The keys from the decoded value to one inside it, as a list on the stack; the elements of a list have those of the list.
 #[derive(Clone, Copy)]
-pub(super) struct Place<'a> {
-    pub(super) above: Option<&'a Place<'a>>,
-    pub(super) step: Option<StepRef<'a>>,
+struct Way<'a> {
+    above: Option<&'a Way<'a>>,
+    key: &'a str,
 }
 
-#[derive(Clone, Copy)]
-pub(super) enum StepRef<'a> {
-    Key(&'a str),
-    Index(usize),
-}
-
-impl<'a> Place<'a> {
-    fn path(&self) -> Vec<Step> {
-        let mut path = self.above.map_or_else(Vec::new, Place::path);
-        path.extend(self.step.map(|step| match step {
-            StepRef::Key(key) => Step::Key(key.to_owned()),
-            StepRef::Index(index) => Step::Index(index),
-        }));
-        path
-    }
-
-    fn below(&'a self, step: StepRef<'a>) -> Place<'a> {
-        Place {
-            above: Some(self),
-            step: Some(step),
-        }
+impl Way<'_> {
+    fn keys(&self) -> Vec<String> {
+        let mut keys = self.above.map_or_else(Vec::new, Way::keys);
+        keys.push(self.key.to_owned());
+        keys
     }
 }
 
 /// A value to be read.
 #[derive(Clone, Copy)]
 pub(super) struct TreeDeserializer<'a> {
-    pub(super) value: &'a Value,
-    pub(super) place: Place<'a>,
-    pub(super) unknown: &'a RefCell<Vec<Mistake>>,
+    value: &'a Value,
+    way: Option<&'a Way<'a>>,
+    unknown: &'a RefCell<Vec<Mistake>>,
 }
 
 impl<'a> TreeDeserializer<'a> {
+    /// Reads a value; unknown keys go to `unknown`.
+    pub(super) fn new(value: &'a Value, unknown: &'a RefCell<Vec<Mistake>>) -> Self {
+        let way = None;
+        Self {
+            value,
+            way,
+            unknown,
+        }
+    }
+
+    fn keys(&self) -> Vec<String> {
+        self.way.map_or_else(Vec::new, Way::keys)
+    }
+
+    /// Reads a value inside of this one.
+    fn inside<T>(
+        &self,
+        key: &str,
+        value: &Value,
+        read: impl FnOnce(TreeDeserializer<'_>) -> Result<T, DecodeError>,
+    ) -> Result<T, DecodeError> {
+        let way = Way {
+            above: self.way,
+            key,
+        };
+        let inner = TreeDeserializer {
+            value,
+            way: Some(&way),
+            unknown: self.unknown,
+        };
+        inner.located(read(inner))
+    }
+
     fn located<T>(&self, result: Result<T, DecodeError>) -> Result<T, DecodeError> {
         result.map_err(|error| self.locate(error))
     }
 
     fn locate(&self, error: DecodeError) -> DecodeError {
-        error.at(self.value, || self.place.path())
+        error.at(self.value, || self.keys())
     }
 
-    fn wrong_type<T>(&self, expected: &dyn de::Expected) -> Result<T, DecodeError> {
-        self.located(Err(DecodeError::not_of(self.value, expected)))
+    fn wrong_type<T>(&self, expected: &str) -> Result<T, DecodeError> {
+        let found = self.value.found();
+        self.located(Err(DecodeError::wrong_type(found, expected, None)))
     }
 
     fn any<'de, V: Visitor<'de>>(&self, visitor: V) -> Result<V::Value, DecodeError> {
@@ -70,21 +88,35 @@ impl<'a> TreeDeserializer<'a> {
             Data::Bool(truth) => visitor.visit_bool(*truth),
             Data::List(values) => visitor.visit_seq(ListAccess {
                 of: self,
-                values: values.iter().enumerate(),
+                values: values.iter(),
             }),
             Data::Table(table) => visitor.visit_map(self.entries(table, None)),
         }
     }
 
+    /// The entries of a table; of a struct those that are none of its `fields` are noted, and passed over.
     fn entries<'b>(
         &'b self,
         table: &'b Table,
         fields: Option<&'static [&'static str]>,
     ) -> TableAccess<'b> {
+        let is_known = move |key: &str| fields.is_none_or(|fields| fields.contains(&key));
+        for (key, entry) in table.iter().filter(|(key, _)| !is_known(key)) {
+            let known = fields.into_iter().flatten();
+            let problem = DocumentProblem::UnknownKey {
+                key: key.to_owned(),
+                what: String::new(),
+                known: known.map(|field| (*field).to_owned()).collect(),
+            };
+            self.unknown.borrow_mut().push(Mistake {
+                keys: self.keys(),
+                place: entry.key,
+                problem,
+            });
+        }
         TableAccess {
             of: self,
-            entries: Box::new(table.iter()),
-            fields,
+            entries: Box::new(table.iter().filter(move |(key, _)| is_known(key))),
             current: None,
         }
     }
@@ -100,7 +132,7 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
     fn deserialize_str<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, DecodeError> {
         match &self.value.data {
             Data::Text(text) | Data::Time(text) => self.located(visitor.visit_str(text)),
-            _ => self.wrong_type(&visitor),
+            _ => self.wrong_type("a text in quotes"),
         }
     }
 
@@ -129,10 +161,13 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(
         self,
-        _: &'static str,
+        name: &'static str,
         visitor: V,
     ) -> Result<V::Value, DecodeError> {
-        self.located(visitor.visit_newtype_struct(self))
+        match DecodeError::in_place_of(name, self.value) {
+            Some(error) => self.located(Err(error)),
+            None => self.located(visitor.visit_newtype_struct(self)),
+        }
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
@@ -145,7 +180,7 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
             Data::Table(table) => {
                 self.located(visitor.visit_map(self.entries(table, Some(fields))))
             }
-            _ => self.wrong_type(&visitor),
+            _ => self.wrong_type("a table"),
         }
     }
 
@@ -167,9 +202,9 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
                     name,
                     content: Some(entry),
                 },
-                _ => return self.wrong_type(&"the name of a choice, or a table with one key"),
+                _ => return self.wrong_type("the name of a choice, or a table with one key"),
             },
-            _ => return self.wrong_type(&"the name of a choice"),
+            _ => return self.wrong_type("the name of a choice"),
         };
         self.located(visitor.visit_enum(access))
     }
@@ -181,7 +216,7 @@ impl<'de> de::Deserializer<'de> for TreeDeserializer<'_> {
 
 struct ListAccess<'b> {
     of: &'b TreeDeserializer<'b>,
-    values: std::iter::Enumerate<std::slice::Iter<'b, Value>>,
+    values: std::slice::Iter<'b, Value>,
 }
 
 impl<'de> de::SeqAccess<'de> for ListAccess<'_> {
@@ -191,15 +226,10 @@ impl<'de> de::SeqAccess<'de> for ListAccess<'_> {
         &mut self,
         seed: T,
     ) -> Result<Option<T::Value>, DecodeError> {
-        let Some((index, value)) = self.values.next() else {
+        let Some(value) = self.values.next() else {
             return Ok(None);
         };
-        let place = self.of.place.below(StepRef::Index(index));
-        let inner = TreeDeserializer {
-            value,
-            place,
-            unknown: self.of.unknown,
-        };
+        let inner = TreeDeserializer { value, ..*self.of };
         inner.located(seed.deserialize(inner)).map(Some)
     }
 
@@ -211,37 +241,7 @@ impl<'de> de::SeqAccess<'de> for ListAccess<'_> {
 struct TableAccess<'b> {
     of: &'b TreeDeserializer<'b>,
     entries: Box<dyn Iterator<Item = (&'b str, &'b Entry)> + 'b>,
-    /// The keys that a struct has; other keys are noted and passed over.
-    fields: Option<&'static [&'static str]>,
     current: Option<(&'b str, &'b Entry)>,
-}
-
-impl<'b> TableAccess<'b> {
-    /// The next entry that is not of an unknown key.
-    fn next_known(&mut self) -> Option<(&'b str, &'b Entry)> {
-        for (key, entry) in self.entries.by_ref() {
-            let Some(fields) = self.fields.filter(|fields| !fields.contains(&key)) else {
-                return Some((key, entry));
-            };
-            let known = fields.iter().map(|field| (*field).to_owned()).collect();
-            let problem = DocumentProblem::UnknownKey {
-                key: key.to_owned(),
-                what: String::new(),
-                known,
-            };
-            self.of.unknown.borrow_mut().push(Mistake {
-                path: self.of.place.below(StepRef::Key(key)).path(),
-                place: entry.key,
-                problem,
-            });
-        }
-        None
-    }
-
-    fn at_key(&self, error: DecodeError, key: &str, entry: &Entry) -> DecodeError {
-        let at_key = Value::new(entry.key, Data::Text(key.to_owned()));
-        error.at(&at_key, || self.of.place.below(StepRef::Key(key)).path())
-    }
 }
 
 impl<'de> de::MapAccess<'de> for TableAccess<'_> {
@@ -251,13 +251,13 @@ impl<'de> de::MapAccess<'de> for TableAccess<'_> {
         &mut self,
         seed: K,
     ) -> Result<Option<K::Value>, DecodeError> {
-        self.current = self.next_known();
+        self.current = self.entries.next();
         let Some((key, entry)) = self.current else {
             return Ok(None);
         };
         let deserializer: StrDeserializer<'_, DecodeError> = key.into_deserializer();
         let read = seed.deserialize(deserializer).map(Some);
-        read.map_err(|error| self.at_key(error, key, entry))
+        read.map_err(|error| at_key(error, key, entry, || self.of.keys()))
     }
 
     fn next_value_seed<S: DeserializeSeed<'de>>(
@@ -267,14 +267,19 @@ impl<'de> de::MapAccess<'de> for TableAccess<'_> {
         let Some((key, entry)) = self.current.take() else {
             return Err(de::Error::custom("a value was asked for before its key"));
         };
-        let place = self.of.place.below(StepRef::Key(key));
-        let inner = TreeDeserializer {
-            value: &entry.value,
-            place,
-            unknown: self.of.unknown,
-        };
-        inner.located(seed.deserialize(inner))
+        self.of
+            .inside(key, &entry.value, |inner| seed.deserialize(inner))
     }
+}
+
+/// Places an error at a key.
+fn at_key(
+    error: DecodeError,
+    key: &str,
+    entry: &Entry,
+    keys: impl FnOnce() -> Vec<String>,
+) -> DecodeError {
+    error.at(&Value::new(entry.key, Data::Text(key.to_owned())), keys)
 }
 
 struct EnumAccess<'b> {
@@ -295,10 +300,7 @@ impl<'de> de::EnumAccess<'de> for EnumAccess<'_> {
         let name = seed
             .deserialize(deserializer)
             .map_err(|error| match self.content {
-                Some(entry) => {
-                    let at_key = Value::new(entry.key, Data::Text(self.name.to_owned()));
-                    error.at(&at_key, || self.of.place.path())
-                }
+                Some(entry) => at_key(error, self.name, entry, || self.of.keys()),
                 None => error,
             })?;
         Ok((name, self))
@@ -308,22 +310,15 @@ impl<'de> de::EnumAccess<'de> for EnumAccess<'_> {
 impl EnumAccess<'_> {
     fn content<T>(
         &self,
-        expected: &dyn de::Expected,
+        expected: &str,
         read: impl FnOnce(TreeDeserializer<'_>) -> Result<T, DecodeError>,
     ) -> Result<T, DecodeError> {
         let Some(entry) = self.content else {
-            return self.of.located(Err(DecodeError::wrong_type(
-                "its name alone".to_owned(),
-                expected,
-            )));
+            let found = "its name alone".to_owned();
+            let error = DecodeError::wrong_type(found, expected, None);
+            return self.of.located(Err(error));
         };
-        let place = self.of.place.below(StepRef::Key(self.name));
-        let inner = TreeDeserializer {
-            value: &entry.value,
-            place,
-            unknown: self.of.unknown,
-        };
-        inner.located(read(inner))
+        self.of.inside(self.name, &entry.value, read)
     }
 }
 
@@ -333,8 +328,8 @@ impl<'de> de::VariantAccess<'de> for EnumAccess<'_> {
     fn unit_variant(self) -> Result<(), DecodeError> {
         match self.content {
             None => Ok(()),
-            Some(_) => self.content(&"the name of this choice alone", |inner| {
-                inner.wrong_type(&"the name of this choice alone")
+            Some(_) => self.content("the name of this choice alone", |inner| {
+                inner.wrong_type("the name of this choice alone")
             }),
         }
     }
@@ -343,13 +338,13 @@ impl<'de> de::VariantAccess<'de> for EnumAccess<'_> {
         self,
         seed: T,
     ) -> Result<T::Value, DecodeError> {
-        self.content(&"a table with this choice and its value", |inner| {
+        self.content("a table with this choice and its value", |inner| {
             seed.deserialize(inner)
         })
     }
 
     fn tuple_variant<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, DecodeError> {
-        self.content(&"a table with this choice and its values", |inner| {
+        self.content("a table with this choice and its values", |inner| {
             de::Deserializer::deserialize_any(inner, visitor)
         })
     }
@@ -359,7 +354,7 @@ impl<'de> de::VariantAccess<'de> for EnumAccess<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, DecodeError> {
-        self.content(&"a table with this choice and its keys", |inner| {
+        self.content("a table with this choice and its keys", |inner| {
             de::Deserializer::deserialize_struct(inner, "", fields, visitor)
         })
     }

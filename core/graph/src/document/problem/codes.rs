@@ -197,10 +197,3 @@ code!(
     "unknown output of a module",
     "A reference to an instance of a module names one of the outputs that the module declares; without one it means the first."
 );
-
-code!(
-    A043,
-    Error,
-    "unknown port",
-    "What follows the `:` of a reference is one of the node's output ports. `athermal nodes TYPE` lists them."
-);

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::{DocumentProblem, codes};
 use crate::diagnostic::{Code, Names, Place, Problem, listed, nearest};
-use crate::document::lacks::Lacks;
-use crate::document::salvage::DUPLICATE_KEY;
+use crate::document::hint::Hint;
+use crate::document::toml_text::DUPLICATE_KEY;
 use crate::quantity::QuantityError;
 
 /// At most twelve names in quotes, for a list of what there is.
@@ -259,8 +259,8 @@ impl Problem for DocumentProblem {
                 Some("begin the file with `schema = 1`".to_owned())
             }
             Self::Syntax {
-                slip: Some(slip), ..
-            } => Some(slip.help()),
+                foreign: Some(foreign), ..
+            } => Some(foreign.help()),
             Self::Syntax { reason, .. } if reason == DUPLICATE_KEY => Some(
                 "a key stands once, be it `key = …`, `[key]` or `[[key]]`: take one of the two away"
                     .to_owned(),
@@ -301,7 +301,7 @@ impl Problem for DocumentProblem {
                 Some(format!("`{input}` is an input: write `inputs.{input} = …`"))
             }
             Self::MissingKey { advice, .. } => advice.clone(),
-            Self::WrongType { lacks, .. } => lacks.as_ref().map(Lacks::help),
+            Self::WrongType { hint, .. } => hint.as_ref().map(Hint::help),
             Self::UnknownChoice { found, choices, .. } => {
                 suggestion(found, choices, "the choices are")
             }
@@ -422,52 +422,6 @@ impl Problem for DocumentProblem {
                 )
             }
             _ => None,
-        }
-    }
-
-    fn may_follow_from_a_gap(&self) -> bool {
-        match self {
-            Self::MissingKey { .. }
-            | Self::UnknownSet { .. }
-            | Self::NothingToRemove { .. }
-            | Self::SamplesWithoutClock { .. }
-            | Self::UnknownChannel { .. }
-            | Self::UnknownModule { .. }
-            | Self::OutOfReach { .. }
-            | Self::UnknownOutput { .. } => true,
-            // In an output none has a meaning.
-            Self::UnknownPlaceholder { instead, .. } => instead.is_none(),
-            Self::Syntax { .. }
-            | Self::Unreadable { .. }
-            | Self::TooLarge { .. }
-            | Self::TooDeep { .. }
-            | Self::LongList { .. }
-            | Self::LongChain { .. }
-            | Self::ExtendsLoop { .. }
-            | Self::SchemaMissing
-            | Self::SchemaUnknown { .. }
-            | Self::UnknownKey { .. }
-            | Self::InputAsKey { .. }
-            | Self::WrongType { .. }
-            | Self::UnknownChoice { .. }
-            | Self::Refused { .. }
-            | Self::NumberTooLarge { .. }
-            | Self::BadName { .. }
-            | Self::DuplicateName { .. }
-            | Self::EmptyList { .. }
-            | Self::TooManyInstances { .. }
-            | Self::TooLargeExpanded { .. }
-            | Self::Unit(_)
-            | Self::Duration(_)
-            | Self::Quantity(_)
-            | Self::OneColumn { .. }
-            | Self::RangeUnit { .. }
-            | Self::RangeOrder { .. }
-            | Self::TimeContradiction { .. }
-            | Self::NoLength { .. }
-            | Self::StepNotPositive
-            | Self::UnitTwice { .. }
-            | Self::ModuleLoop { .. } => false,
         }
     }
 

@@ -36,7 +36,7 @@ fn read(files: &[(&str, &str)]) -> Outcome {
     }
 }
 
-/// The diagnostics as text, after a line break; a file without any is a mistake of the test.
+/// The diagnostics as text; a file without any is a mistake of the test.
 fn rendered(files: &[(&str, &str)]) -> String {
     let Outcome {
         sources,
@@ -44,8 +44,7 @@ fn rendered(files: &[(&str, &str)]) -> String {
         ..
     } = read(files);
     assert!(diagnostics.has_errors(), "the file has no mistake");
-    let text = diagnostics.render(&sources, false, 120);
-    format!("\n{text}")
+    diagnostics.render(&sources, false, 120)
 }
 
 /// A graph file of two sets with a thousand members each, and a node for each of `each`.
@@ -66,4 +65,27 @@ fn many_members(each: &[&str], parameters: &str) -> String {
 /// The graph of the language's documentation.
 fn die_tester() -> &'static str {
     include_str!("die_tester.toml")
+}
+
+/// Compares the reports on broken files with those that a text has for them: each case is `## title`, the text of `a.toml`, any
+/// further file under `>> name`, and behind `---` the report.
+pub(super) fn check_cases(cases: &str, report: impl Fn(&[(String, String)]) -> String) {
+    let mut differing = String::new();
+    for case in cases.split("## ").skip(1) {
+        let (title, case) = case.split_once('\n').expect("a title is a line");
+        let (texts, expected) = case.split_once("---\n").expect("a case has a report");
+        let texts = match texts.strip_prefix(">> ") {
+            Some(texts) => texts.to_owned(),
+            None => format!("a.toml\n{texts}"),
+        };
+        let files = texts.split(">> ").map(|file| {
+            let (name, text) = file.split_once('\n').expect("a name is a line");
+            (name.to_owned(), text.to_owned())
+        });
+        let report = report(&files.collect::<Vec<_>>());
+        if report.trim_end() != expected.trim_end() {
+            differing += &format!("## {title}\n{report}\n");
+        }
+    }
+    assert!(differing.is_empty(), "other reports:\n{differing}");
 }

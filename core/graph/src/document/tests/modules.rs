@@ -300,8 +300,7 @@ fn a_parameter_with_a_unit_that_its_module_adds_is_told_where_it_is_given() {
     let told = rendered(&[("a.toml", &graph("\"0.15 um/min\"", "5"))]);
     assert_eq!(
         told,
-        r#"
-error[A018]: module "m" adds the unit to `limit` itself, as "{limit} nm/min"
+        r#"error[A018]: module "m" adds the unit to `limit` itself, as "{limit} nm/min"
  --> a.toml:7:9
   |
 7 | limit = "0.15 um/min"

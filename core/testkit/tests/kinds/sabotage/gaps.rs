@@ -61,14 +61,11 @@ impl Operator for Bridging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Known>() {
-            Ok(known) if known.last.len() == self.last.len() => {
-                self.last = known.last;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+        state.accept(|known: Known| {
+            let fits = known.last.len() == self.last.len();
+            fits.then(|| self.last = known.last)
+                .ok_or("the number of channels differs")
+        })
     }
 }
 

@@ -156,13 +156,7 @@ impl Learner for Learning {
         if self.fault == Fault::Forgets {
             return Restored::Accepted;
         }
-        match state.known() {
-            Ok(known) => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.known)
     }
 }
 

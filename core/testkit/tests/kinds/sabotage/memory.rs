@@ -190,13 +190,7 @@ impl Combine for Errors {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known() {
-            Ok(known) => {
-                *self = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(self)
     }
 }
 

@@ -78,13 +78,7 @@ impl Operator for Waiting {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known() {
-            Ok(known) => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Err(cold) => cold,
-        }
+        state.replace(&mut self.known)
     }
 }
 

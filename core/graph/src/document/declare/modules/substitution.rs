@@ -117,7 +117,7 @@ impl Given {
                         key: Some(name.to_owned()),
                         expected: "a text or a number within a text".to_owned(),
                         found: value.found(),
-                        lacks: None,
+                        hint: None,
                     };
                     diagnostics.report(place, problem);
                 }

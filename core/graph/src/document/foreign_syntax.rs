@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// What is usual elsewhere, and no TOML.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Slip {
+pub enum ForeignSyntax {
     /// A number with a decimal comma.
     DecimalComma {
         /// The number with a point.
@@ -28,7 +28,7 @@ const CURLY: [char; 10] = [
     '\u{ab}', '\u{bb}',
 ];
 
-impl Slip {
+impl ForeignSyntax {
     /// What to write instead.
     pub(super) fn help(&self) -> String {
         match self {
@@ -44,7 +44,7 @@ impl Slip {
 }
 
 /// What the text of a syntax error is, if it is such.
-pub(super) fn of(text: &str, bytes: &Range<usize>) -> Option<Slip> {
+pub(super) fn of(text: &str, bytes: &Range<usize>) -> Option<ForeignSyntax> {
     let before = text.get(..bytes.start)?;
     let begin = before.rfind('\n').map_or(0, |at| at + 1);
     let rest = &text[begin..];
@@ -55,17 +55,17 @@ pub(super) fn of(text: &str, bytes: &Range<usize>) -> Option<Slip> {
         .or_else(|| backslash(line, at))
 }
 
-fn curly_quotes(line: &str, at: usize) -> Option<Slip> {
+fn curly_quotes(line: &str, at: usize) -> Option<ForeignSyntax> {
     let found = line.get(at..)?;
     let inner = found.strip_prefix(CURLY)?;
     let text = &inner[..inner.find(CURLY).unwrap_or(inner.len())];
-    Some(Slip::CurlyQuotes {
+    Some(ForeignSyntax::CurlyQuotes {
         text: text.trim_end().to_owned(),
     })
 }
 
 /// A number with a comma behind an equals sign, with digits on both sides of the comma.
-fn decimal_comma(line: &str, at: usize) -> Option<Slip> {
+fn decimal_comma(line: &str, at: usize) -> Option<ForeignSyntax> {
     line.match_indices('=')
         .filter(|(equals, _)| *equals < at)
         .find_map(|(equals, _)| {
@@ -76,21 +76,21 @@ fn decimal_comma(line: &str, at: usize) -> Option<Slip> {
             let is_whole = whole.trim_start_matches(['+', '-']);
             let is_number =
                 |digits: &str| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-            (is_number(is_whole) && is_number(fraction)).then(|| Slip::DecimalComma {
+            (is_number(is_whole) && is_number(fraction)).then(|| ForeignSyntax::DecimalComma {
                 number: format!("{whole}.{fraction}"),
             })
         })
 }
 
 /// A text in double quotes in which a backslash before the error begins no sign that there is.
-fn backslash(line: &str, at: usize) -> Option<Slip> {
+fn backslash(line: &str, at: usize) -> Option<ForeignSyntax> {
     let (mut open, mut bad) = (None, false);
     let mut rest = line.char_indices();
     while let Some((place, c)) = rest.next() {
         match (c, open) {
             ('"', None) => open = Some(place + 1),
             ('"', Some(begin)) if bad => {
-                return Some(Slip::Backslash {
+                return Some(ForeignSyntax::Backslash {
                     text: line[begin..place].replace('\\', "/"),
                 });
             }

@@ -1,10 +1,10 @@
-//! What a value of another type lacks to be right, and how that is said; which types are needed is decided by who reads it.
+//! What to write instead of a value of another type.
 
 use super::tree::Data;
 
 /// What alone stands between a value and the type that its key needs.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Lacks {
+pub enum Hint {
     /// The unit of a duration.
     UnitOfTime,
     /// The unit of a quantity.
@@ -21,14 +21,9 @@ pub enum Lacks {
         /// What stands in them.
         around: String,
     },
-    /// Braces with keys in them.
-    Table {
-        /// A table that stands there by default.
-        example: String,
-    },
 }
 
-impl Lacks {
+impl Hint {
     /// What a value that is found in the place of a duration lacks.
     pub(super) fn for_duration(found: &Data) -> Option<Self> {
         found.is_number().then_some(Self::UnitOfTime)
@@ -48,16 +43,6 @@ impl Lacks {
             unit: unit.to_owned(),
             known,
         })
-    }
-
-    /// The unit that a number lacks to be like an example.
-    pub(super) fn unit_of(number: String, example: &str) -> Self {
-        let unit = example.split_once(' ').map_or("1", |(_, unit)| unit);
-        Self::Unit {
-            number,
-            unit: unit.to_owned(),
-            known: false,
-        }
     }
 
     /// What a value that is found in the place of a list of texts lacks.
@@ -91,7 +76,6 @@ impl Lacks {
             Self::Brackets { around } => {
                 format!("a list stands in brackets, e.g. [{around}]")
             }
-            Self::Table { example } => format!("the default is {example}"),
         }
     }
 }
