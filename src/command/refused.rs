@@ -1,6 +1,6 @@
 //! Rows and cells that a reader does not take, as events for programs.
 
-use athermal::files::FileError;
+use athermal::files::{CellFault, FileError};
 use serde_json::{Value, json};
 
 use crate::message::Message;
@@ -35,15 +35,20 @@ fn facts(error: &FileError) -> (&'static str, Value) {
         FileError::TimeLeaps { time, .. } => {
             (ROWS, json!({ "reason": "time_leaps", "time": time }))
         }
-        FileError::BadTime { column, found, .. }
-        | FileError::TimeBeyond { column, found, .. }
-        | FileError::TimeSkipped { column, found, .. } => (
-            ROWS,
-            json!({ "reason": "time_unreadable", "column": column, "found": found }),
-        ),
-        FileError::BadCell { column, found, .. } | FileError::MixedMarks { column, found, .. } => {
-            (CELLS, json!({ "column": column, "found": found }))
-        }
+        FileError::BadCell {
+            column,
+            found,
+            fault,
+            ..
+        } => match fault {
+            CellFault::NoNumber | CellFault::OtherMark { .. } => {
+                (CELLS, json!({ "column": column, "found": found }))
+            }
+            _ => (
+                ROWS,
+                json!({ "reason": "time_unreadable", "column": column, "found": found }),
+            ),
+        },
         FileError::StillRefused { newest, .. } => facts(newest),
         FileError::HeaderAgain { .. } => ("header_again", json!({})),
         FileError::MissingColumns { missing, .. } => {

@@ -25,24 +25,14 @@ pub struct Clock {
     pub(super) other: Option<TimeFormat>,
 }
 
-const NAMES: [&str; 16] = [
-    "time",
-    "timestamp",
-    "datetime",
-    "date",
-    "utc",
-    "epoch",
-    "ts",
-    "t",
-    "datum",
-    "zeit",
-    "uhrzeit",
-    "clock",
-    "elapsed",
-    "sample",
-    "index",
-    "n",
-];
+/// What a time is called, the likeliest first.
+const NAMES: &str =
+    "time timestamp datetime date utc epoch ts t datum zeit uhrzeit clock elapsed sample index n";
+
+/// The place of a word among the names of a time.
+fn place_of(word: &str) -> Option<usize> {
+    NAMES.split(' ').position(|name| name == word)
+}
 
 /// A unit of a time column's name, as a graph file names it, in nanoseconds.
 type Unit = (&'static str, &'static str, i64);
@@ -141,8 +131,7 @@ pub fn find(
     let rank = |index: usize| {
         let name = described.columns[index].to_lowercase();
         let first = words_of_time(&name).into_iter().next().unwrap_or_default();
-        let known = NAMES.iter().position(|known| *known == first);
-        known.unwrap_or(NAMES.len())
+        place_of(first).unwrap_or(usize::MAX)
     };
     let likely = (0..described.columns.len()).filter(may_be);
     let likely = likely.map(|index| (rank(index), Texts::of(described, index)));
@@ -154,7 +143,7 @@ pub fn find(
     // Beside what is meant to be a time, no other column that happens to grow is one.
     let mut found = likely
         .iter()
-        .filter(|(rank, _)| unread.is_none() || *rank < NAMES.len())
+        .filter(|(rank, _)| unread.is_none() || *rank < usize::MAX)
         .filter_map(|(_, texts)| clock(texts));
     match (found.next(), unread) {
         (Some(clock), _) => Ok(clock),
@@ -162,7 +151,7 @@ pub fn find(
         (None, None)
             if let Some(back) = likely
                 .iter()
-                .find(|(rank, texts)| *rank < NAMES.len() && goes_back(texts)) =>
+                .find(|(rank, texts)| *rank < usize::MAX && goes_back(texts)) =>
         {
             Err(no_clock(&back.1, format))
         }
@@ -242,7 +231,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         pairs.filter(|pair| is(&pair[1], &pair[0])).count()
     };
     let (all, advance) = (numbers.len() - 1, steps(f64::gt));
-    let is_called = parts.first().is_some_and(|first| NAMES.contains(first));
+    let is_called = parts.first().is_some_and(|first| place_of(first).is_some());
     let stands = is_called && steps(f64::ge) * 100 >= all * 95 && advance * 10 >= all;
     if advance * 100 < all * 95 && !stands {
         return None;
@@ -255,18 +244,24 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         let beyond = |number: &&f64| number.abs() * ns_per_unit as f64 >= i64::MAX as f64;
         numbers.iter().filter(beyond).count() * 2 < numbers.len()
     };
+    let counted = |name: &'static str, ns_per_unit, why| Clock {
+        columns: columns.clone(),
+        form: TimeForm::Numbers { ns_per_unit },
+        declared: (name != "s").then(|| ("unit", name.to_owned())),
+        lacks_zone: false,
+        why,
+        other: None,
+    };
     if let Some(&(_, name, ns_per_unit)) = unit.filter(fits) {
-        return Some(Clock {
-            columns,
-            form: TimeForm::Numbers { ns_per_unit },
-            declared: declared(name),
-            lacks_zone: false,
-            why: match known(&below) {
-                Some(_) => format!("numbers in {name}, as the row below its name says"),
-                None => format!("numbers in {name}, by its name"),
-            },
-            other: None,
-        });
+        let by = match known(&below) {
+            Some(_) => "as the row below its name says",
+            None => "by its name",
+        };
+        return Some(counted(
+            name,
+            ns_per_unit,
+            format!("numbers in {name}, {by}"),
+        ));
     }
     let numbered = parts
         .first()
@@ -274,29 +269,22 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     if numbered {
         return Some(Clock {
-            columns,
             form: TimeForm::Samples { step_ns: SAMPLE_NS },
             declared: Some(("step", "1s".to_owned())),
-            lacks_zone: false,
-            why: "a sample number; how long a sample takes the log does not say".to_owned(),
-            other: None,
+            ..counted(
+                "s",
+                SAMPLE_NS,
+                "a sample number; how long a sample takes the log does not say".to_owned(),
+            )
         });
     }
     if counts_days(&numbers) {
-        return Some(Clock {
-            columns,
-            form: TimeForm::Numbers {
-                ns_per_unit: 86_400_000_000_000,
-            },
-            declared: declared("d"),
-            lacks_zone: false,
-            why: format!(
-                "numbers from {} on that rise by parts of one, taken for days as a spreadsheet counts them; if they are \
-                 another unit, its name must say so: time_s, time_ms, time_min, time_h",
-                numbers[0].floor()
-            ),
-            other: None,
-        });
+        let why = format!(
+            "numbers from {} on that rise by parts of one, taken for days as a spreadsheet counts them; if they are another unit, its \
+             name must say so: time_s, time_ms, time_min, time_h",
+            numbers[0].floor()
+        );
+        return Some(counted("d", 86_400_000_000_000, why));
     }
     // Seconds since 1970 have ten digits before the point until 2286, milliseconds thirteen, and so on.
     let (name, ns_per_unit) = match numbers[0] {
@@ -313,14 +301,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
             "numbers, taken for {name} since its name does not say, as time_s, time_ms or time_min would"
         ),
     };
-    Some(Clock {
-        columns,
-        form: TimeForm::Numbers { ns_per_unit },
-        declared: declared(name),
-        lacks_zone: false,
-        why,
-        other: None,
-    })
+    Some(counted(name, ns_per_unit, why))
 }
 
 /// Whether numbers look like the days of a spreadsheet, of which 40,000 is in 2009 and 60,000 in 2064, at a rate of more
@@ -333,11 +314,6 @@ fn counts_days(numbers: &[f64]) -> bool {
         .iter()
         .all(|number| (40_000.0..60_000.0).contains(number));
     days && usual < 0.5
-}
-
-/// What a graph file says of numbers of a unit; of seconds nothing.
-fn declared(unit: &str) -> Option<(&'static str, String)> {
-    (unit != "s").then(|| ("unit", unit.to_owned()))
 }
 
 #[cfg(test)]

@@ -137,3 +137,7 @@ fn too_few(described: &Description) -> Option<String> {
         described.columns.join(", ")
     ))
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

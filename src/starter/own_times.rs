@@ -49,31 +49,27 @@ pub fn refusal(described: &Description, clock: &Clock) -> Option<String> {
                 }
                 (other, own) => is_dated(other) && is_dated(own),
             });
-        let Some(other) = other.filter(|other| {
-            !other
+        let is_own = |other: &Clock| {
+            other
                 .columns
                 .names()
                 .iter()
                 .all(|name| names.contains(name))
-        }) else {
+        };
+        let Some(other) = other.filter(|other| !is_own(other)) else {
             continue;
         };
-        let instants = instants(described, &other);
-        let pairs: Vec<(usize, f64)> = instants
-            .iter()
-            .filter_map(|(row, ns)| Some((*row, ns.saturating_sub(*own.get(row)?) as f64)))
-            .collect();
-        let advance = instants
-            .values()
-            .zip(instants.values().skip(1))
-            .filter(|(a, b)| b > a)
-            .count();
-        let extreme =
-            |pick: fn(f64, f64) -> f64, from| pairs.iter().map(|pair| pair.1).fold(from, pick);
-        let spread = extreme(f64::max, f64::NEG_INFINITY) - extreme(f64::min, f64::INFINITY);
-        if pairs.len() > 2 && spread > STEPS * usual && (advance + 1) * 100 >= instants.len() * 95 {
-            let last = pairs.last().map_or(0, |pair| pair.0);
-            others.push((other.columns.to_string(), last));
+        let instants = instants(described, &other).into_iter();
+        let pairs =
+            instants.filter_map(|(row, ns)| Some((row, ns.saturating_sub(*own.get(&row)?))));
+        let pairs: Vec<(usize, i64)> = pairs.collect();
+        let apart = || pairs.iter().map(|pair| pair.1);
+        let (Some(most), Some(least)) = (apart().max(), apart().min()) else {
+            continue;
+        };
+        let spread = most.saturating_sub(least);
+        if pairs.len() > 2 && spread as f64 > STEPS * usual {
+            others.push((other.columns.to_string(), pairs[pairs.len() - 1].0));
         }
     }
     let (first, row) = others.first()?;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use athermal::core::document::{TableBase, TableFormat};
 use athermal::files::{
-    ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
+    CellFault, ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -60,57 +60,38 @@ pub struct Unreadable {
 
 impl Unreadable {
     fn of(error: &FileError) -> Option<Self> {
-        let (found, line, mark) = match error {
-            FileError::BadCell { found, place, .. } => (found, place.line, None),
-            FileError::MixedMarks {
-                found,
-                place,
-                mark,
-                since,
-                ..
-            } => (found, place.line, Some((*mark, *since))),
-            _ => return None,
+        let FileError::BadCell {
+            found,
+            place,
+            fault,
+            ..
+        } = error
+        else {
+            return None;
+        };
+        let mark = match fault {
+            CellFault::OtherMark { mark, since } => Some((*mark, *since)),
+            _ => None,
         };
         let found = found.replace(char::is_control, "\u{fffd}");
         Some(Self {
-            example: format!("`{found}` in line {line}"),
+            example: format!("`{found}` in line {}", place.line),
             found,
             mark,
         })
     }
 }
 
-/// What programs write where they have no value, in small letters.
-const NO_VALUES: [&str; 23] = [
-    "-",
-    "--",
-    "---",
-    "?",
-    "*",
-    "na",
-    "n/a",
-    "n.a.",
-    "k.a.",
-    "#n/a",
-    "#nv",
-    "#wert!",
-    "#value!",
-    "#num!",
-    "#div/0!",
-    "none",
-    "bad",
-    "no data",
-    "nodata",
-    "no value",
-    "overrange",
-    "i/o timeout",
-    "1.#qnan",
-];
+/// What programs write where they have no value, in small letters, between bars.
+const NO_VALUES: &str = "-|--|---|?|*|na|n/a|n.a.|k.a.|#n/a|#nv|#wert!|#value!|#num!|#div/0!|none|bad|no data|nodata|no value|overrange|i/o timeout|1.#qnan";
 
 impl Unreadable {
     /// Whether it is what stands for no value.
     fn is_none(&self) -> bool {
-        NO_VALUES.contains(&&*self.found.to_lowercase())
+        {
+            let found = self.found.to_lowercase();
+            NO_VALUES.split('|').any(|none| none == found)
+        }
     }
 }
 
@@ -280,14 +261,15 @@ impl Survey {
             {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
-                    Some((mark, Some(since))) => format!(
-                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write all numbers of a \
-                         file with one mark"
-                    ),
-                    Some((mark, None)) => format!(
-                        "it has numbers such as {example}, but the decimal mark of the others is `{mark}`; write all numbers of a file \
-                         with one mark"
-                    ),
+                    Some((mark, since)) => {
+                        let of_others = match since {
+                            Some(line) => format!("since line {line} the decimal mark is"),
+                            None => "the decimal mark of the others is".to_owned(),
+                        };
+                        format!(
+                            "it has numbers such as {example}, but {of_others} `{mark}`; write all numbers of a file with one mark"
+                        )
+                    }
                     None if first.is_some_and(|first| has_clock(&first.found)) => {
                         format!("it has other times, such as {example}")
                     }
@@ -303,15 +285,15 @@ impl Survey {
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));
             } else if series.unreadable > 0 {
-                let (many, the_first) = match series.unreadable {
-                    1 => ("1 cell".to_owned(), ""),
-                    more => (counted(more, "cell"), ", the first"),
+                let (cells, all) = (counted(series.unreadable, "cell"), count(cells));
+                let such = if series.unreadable > 1 {
+                    ", the first"
+                } else {
+                    ""
                 };
-                let many = format!(
-                    "{many} of {} cannot be read{the_first} {example}",
-                    count(cells)
-                );
-                column.warn(format!("{many}, and is taken as missing"));
+                column.warn(format!(
+                    "{cells} of {all} cannot be read{such} {example}; taken as missing"
+                ));
             }
         }
     }

@@ -23,7 +23,7 @@ pub(crate) struct Begun {
 
 impl Begun {
     /// Looks at a file; none where it is empty or no file. `seen` is what is known to have been read when it was written, which may
-    /// tell what a time means that comes twice.
+    /// decide what a time means that comes twice.
     ///
     /// # Errors
     /// The file cannot be read, or is not one with these columns.
@@ -45,14 +45,14 @@ impl Begun {
         };
         // Only a part of the file is read, whose lines are counted from where it begins.
         let of_line = |line: &str, error: FileError| {
-            let told = match (&error, format) {
+            let message = match (&error, format) {
                 (FileError::Empty { .. }, Format::Csv) => "it names no columns".to_owned(),
                 (FileError::Empty { .. }, Format::JsonLines) => "it is no JSON object".to_owned(),
                 _ => error.to_string(),
             };
             let place = error.place().map(|place| format!("{place}: "));
-            let what = place.and_then(|place| told.strip_prefix(&place));
-            other(format!("{line}: {}", what.unwrap_or(&told)))
+            let what = place.and_then(|place| message.strip_prefix(&place));
+            other(format!("{line}: {}", what.unwrap_or(&message)))
         };
         let ends = ends.ok_or_else(|| other("it has no whole line".to_owned()))?;
         let expected = [&[time.columns.title()], columns].concat();
@@ -314,7 +314,7 @@ mod tests {
                 assert_eq!(last(name, -1800..=end, None), end, "{name}");
             }
             let single = |at: i64, seen_s| last(name, std::iter::once(at), seen_s);
-            assert_eq!(single(4200, None), 600, "nothing tells");
+            assert_eq!(single(4200, None), 600, "nothing decides");
             assert_eq!(single(4200, Some(4200)), 4200);
             assert_eq!(single(4200, Some(4190)), 4200);
             assert_eq!(single(600, Some(590)), 600);

@@ -7,8 +7,8 @@ use crate::{FileError, Place};
 pub(crate) trait Cells {
     /// Goes to the next whole row; false at the end.
     fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError>;
-    /// The cell of the time column.
-    fn time(&self) -> &[u8];
+    /// The cell of a column of the time.
+    fn time(&self, column: usize) -> &[u8];
     /// The cell of a channel of the layout; empty if there is none.
     fn channel(&self, index: usize) -> &[u8];
     fn place(&self) -> Place;

@@ -56,11 +56,6 @@ impl Columns {
         }
     }
 
-    /// How many are there.
-    pub fn count(&self) -> usize {
-        self.time.iter().chain(&self.channels).flatten().count()
-    }
-
     /// Whether the time is there, with all its columns.
     pub fn have_time(&self) -> bool {
         self.time.iter().all(Option::is_some)

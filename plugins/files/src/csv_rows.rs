@@ -3,7 +3,7 @@
 use athermal_core::document::{Encoding, TableFormat};
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
-use crate::cell::{self, is_number, trim};
+use crate::cell::{self, is_number};
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
 use crate::detect::{self, Head, LongFormat, are_units};
@@ -33,8 +33,6 @@ pub(crate) struct CsvRows {
     windows_1252: bool,
     layout: Option<Layout>,
     columns: Columns,
-    /// The text of the time of the current row, where it is put together from several cells.
-    joined: Option<Vec<u8>>,
 }
 
 /// How a row came out of the stream.
@@ -125,9 +123,6 @@ impl CsvRows {
             windows_1252: false,
             layout: layout.cloned(),
             columns: Columns::default(),
-            joined: layout
-                .filter(|layout| !layout.time.columns.is_one())
-                .map(|_| Vec::new()),
         };
         let cells = match rows.read_record()? {
             Record::Row { cells, .. } => cells,
@@ -317,7 +312,7 @@ impl CsvRows {
         if let Some(error) = unusable {
             ledger.refuse_header(error)?;
             if cells >= self.names.len() && !columns.agree_with(&self.columns) {
-                // Rows have no time until the columns are named so that they can be told apart.
+                // Rows have no time until names say which columns are which.
                 self.columns.time.fill(None);
             }
             return Ok(true);
@@ -421,16 +416,6 @@ impl CsvRows {
         }
     }
 
-    /// Puts the time of the current row together.
-    fn join_time(&mut self) {
-        let mut text = self.joined.take().unwrap_or_default();
-        if let Some(layout) = &self.layout {
-            let cell = |column: usize| trim(self.cell(self.columns.time[column]));
-            layout.time.columns.join(&mut text, cell);
-        }
-        self.joined = Some(text);
-    }
-
     /// The cell of a column, if that is there; else an empty one.
     fn cell(&self, column: Option<usize>) -> &[u8] {
         column.map_or(&[], |column| self.column(column))
@@ -469,19 +454,13 @@ impl Cells for CsvRows {
                 false => self.unusual(cells, complete, ledger)?,
             };
             if let Some(taken) = taken {
-                if taken && self.joined.is_some() {
-                    self.join_time();
-                }
                 return Ok(taken);
             }
         }
     }
 
-    fn time(&self) -> &[u8] {
-        match &self.joined {
-            Some(joined) => joined,
-            None => self.cell(self.columns.time.first().copied().flatten()),
-        }
+    fn time(&self, column: usize) -> &[u8] {
+        self.cell(self.columns.time[column])
     }
 
     fn channel(&self, index: usize) -> &[u8] {

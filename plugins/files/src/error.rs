@@ -48,6 +48,42 @@ pub enum Again {
     Other(String),
 }
 
+/// What is wrong with a cell.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CellFault {
+    /// A value that is neither a number nor "no value".
+    NoNumber,
+    /// A number with another decimal mark than others.
+    OtherMark {
+        /// Their mark: `,` or `.`.
+        mark: char,
+        /// The line of the first of them; none where `[table]` declares the mark.
+        since: Option<u64>,
+    },
+    /// A time beyond 64 bits of nanoseconds.
+    TimeBeyond,
+    /// A time that is not in the stated form.
+    NoTime {
+        /// What the cell should look like.
+        expected: String,
+    },
+    /// A time that no clock of the stated zone has shown, since it was set forward over it.
+    TimeSkipped {
+        /// The zone, as it is stated.
+        zone: String,
+        /// How far the clock was from UTC before, in s, positive to the east.
+        offset_s: i32,
+    },
+}
+
+impl CellFault {
+    /// Whether it is one of a value, or of a number, and not of a time alone.
+    #[must_use]
+    pub fn is_of_value(&self) -> bool {
+        matches!(self, Self::NoNumber | Self::OtherMark { .. })
+    }
+}
+
 /// What went wrong while a recording was read or written.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -117,7 +153,7 @@ pub enum FileError {
         /// How these were read, where that may be why; to stand behind them.
         note: &'static str,
     },
-    /// A cell that is neither a number nor "no value".
+    /// A cell that is not taken as it stands.
     BadCell {
         /// The row.
         place: Place,
@@ -125,52 +161,8 @@ pub enum FileError {
         column: String,
         /// The text of the cell.
         found: String,
-    },
-    /// A number with another decimal mark than the numbers before it.
-    MixedMarks {
-        /// The row.
-        place: Place,
-        /// The name of the column.
-        column: String,
-        /// The text of the cell.
-        found: String,
-        /// The mark that the numbers before it have: `,` or `.`.
-        mark: char,
-        /// The line of the first of them; none where `[table]` declares the mark.
-        since: Option<u64>,
-    },
-    /// A time cell beyond 64 bits of nanoseconds.
-    TimeBeyond {
-        /// The row.
-        place: Place,
-        /// The name of the column.
-        column: String,
-        /// The text of the cell.
-        found: String,
-    },
-    /// A time cell that is not in the stated form.
-    BadTime {
-        /// The row.
-        place: Place,
-        /// The name of the column.
-        column: String,
-        /// The text of the cell.
-        found: String,
-        /// What the cell should look like.
-        expected: String,
-    },
-    /// A time that no clock of the stated zone has shown, since it was set forward over it.
-    TimeSkipped {
-        /// The row.
-        place: Place,
-        /// The name of the column.
-        column: String,
-        /// The text of the cell.
-        found: String,
-        /// The zone, as it is stated.
-        zone: String,
-        /// How far the clock was from UTC before, in s, positive to the east.
-        offset_s: i32,
+        /// What is wrong with it.
+        fault: CellFault,
     },
     /// An instant that is that of the row before.
     TimeAgain {
@@ -267,7 +259,7 @@ pub enum FileError {
     NotBegun {
         /// The name of the file.
         file: Arc<str>,
-        /// What tells so.
+        /// Why.
         reason: String,
     },
     /// A row to be written has not as many values as there are columns.
@@ -308,10 +300,6 @@ impl FileError {
             | Self::DuplicateColumn { place, .. }
             | Self::MissingColumns { place, .. }
             | Self::BadCell { place, .. }
-            | Self::MixedMarks { place, .. }
-            | Self::TimeBeyond { place, .. }
-            | Self::BadTime { place, .. }
-            | Self::TimeSkipped { place, .. }
             | Self::TimeAgain { place, .. }
             | Self::TimeNotAfter { place, .. }
             | Self::TimeLeaps { place, .. }
@@ -329,7 +317,7 @@ impl FileError {
     #[must_use]
     pub fn column(&self) -> Option<&str> {
         match self {
-            Self::BadCell { column, .. } | Self::MixedMarks { column, .. } => Some(column),
+            Self::BadCell { column, fault, .. } if fault.is_of_value() => Some(column),
             _ => None,
         }
     }

@@ -13,7 +13,7 @@ use crate::{TimeColumn, TimeForm};
 const DATE_LENGTH: usize = 10;
 
 impl TimeColumn {
-    /// What a trimmed cell stands for, or `None` if it is not of this form. Where times come twice, `last` tells which is meant: the
+    /// What a trimmed cell stands for, or `None` if it is not of this form. Where times come twice, `last` says which is meant: the
     /// instant before, with the time from one to the next in ns.
     #[must_use]
     pub fn read(&self, text: &[u8], last: Option<(Instant, i64)>) -> Option<Civil> {

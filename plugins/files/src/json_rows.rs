@@ -8,7 +8,6 @@ use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
 use serde_json::Deserializer;
 use serde_json::value::RawValue;
 
-use crate::cell::trim;
 use crate::cells::Cells;
 use crate::columns;
 use crate::detect::begins_json_array;
@@ -22,8 +21,6 @@ pub(crate) struct JsonRows {
     keys: Vec<Key>,
     /// What gives the time; it has the first keys.
     time: TimeColumns,
-    /// The text of the time of the current row, where it is put together from several cells.
-    joined: Vec<u8>,
     /// For each channel of the layout, its key.
     channels: Vec<usize>,
     /// The keys of the first object, for a message about those that lack.
@@ -71,7 +68,6 @@ impl JsonRows {
             lines,
             keys,
             time,
-            joined: Vec::new(),
             channels,
             found: None,
             has_begun: false,
@@ -148,9 +144,6 @@ impl Cells for JsonRows {
                     if is_first && let Some(error) = self.never_seen() {
                         ledger.report_early(|| error);
                     }
-                    if !self.time.is_one() {
-                        self.join_time();
-                    }
                     return Ok(true);
                 }
                 // The time must stand in every object; what else this one lacks may stand in the next.
@@ -171,18 +164,15 @@ impl Cells for JsonRows {
                 })?,
             }
         }
-        // Of what never ends whoever asked was told at the first object, and another may have them when it goes on.
+        // Of what never ends that was reported at the first object, and another may have them when it goes on.
         match self.never_seen() {
             Some(error) if ledger.on_first.is_none() => Err(error),
             _ => Ok(false),
         }
     }
 
-    fn time(&self) -> &[u8] {
-        match self.time.is_one() {
-            true => self.cell(0),
-            false => &self.joined,
-        }
+    fn time(&self, column: usize) -> &[u8] {
+        self.cell(column)
     }
 
     fn channel(&self, index: usize) -> &[u8] {
@@ -198,13 +188,6 @@ impl JsonRows {
     /// The keys of the time.
     fn of_time(&self) -> impl Iterator<Item = &Key> {
         self.keys[..self.time.names().len()].iter()
-    }
-
-    /// Puts the time of the current row together.
-    fn join_time(&mut self) {
-        let mut text = std::mem::take(&mut self.joined);
-        self.time.join(&mut text, |key| trim(self.cell(key)));
-        self.joined = text;
     }
 
     fn cell(&self, key: usize) -> &[u8] {

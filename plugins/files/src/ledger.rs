@@ -28,7 +28,7 @@ pub struct Report {
     pub refused_rows: Count,
     /// Rows within the recording that name its columns again as before ([`FileError::HeaderAgain`]).
     pub headers: Count,
-    /// Those that name them in other places, unless each was told at once.
+    /// Those that name them in other places, unless each was reported at once.
     pub headers_moved: Count,
     /// The columns of channels under whose names stands a unit, with that.
     pub units: Vec<(String, Unit)>,
@@ -201,7 +201,7 @@ impl Ledger {
         }
     }
 
-    /// Whether a last row that leaps is left out: two rows do not tell how far apart rows are. That of what goes on is read again, save
+    /// Whether a last row that leaps is left out: two rows do not say how far apart rows are. That of what goes on is read again, save
     /// where it is the only one.
     pub fn knows_leaps(&self) -> bool {
         self.goes_on && self.last_ns.is_some() || self.step_ns > 0
@@ -307,7 +307,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Something that is an error at the end only, where the data ever end: whoever asked is told of it now.
+    /// Something that is an error at the end only, where the data ever end: it is reported now.
     pub fn report_early(&mut self, error: impl FnOnce() -> FileError) {
         if let Some(report) = &mut self.on_first {
             report(&error());
@@ -319,15 +319,15 @@ impl Ledger {
         self.lenient
     }
 
-    /// A row that names the columns again. Each that moves them is told.
+    /// A row that names the columns again. Each that moves them is reported.
     pub fn header(&mut self, again: FileError) {
         let report = &mut self.report;
         match (&again, &mut self.on_first) {
-            (FileError::HeaderAgain { moved: true, .. }, Some(tell)) => tell(&again),
+            (FileError::HeaderAgain { moved: true, .. }, Some(report)) => report(&again),
             (FileError::HeaderAgain { moved: true, .. }, None) => {
                 report.headers_moved.add(|| again, &mut None);
             }
-            (_, tell) => report.headers.add(|| again, tell),
+            (_, on_first) => report.headers.add(|| again, on_first),
         }
     }
 
@@ -363,7 +363,7 @@ mod tests {
     use crate::{Layout, Options, Reader, Row, TimeForm};
 
     #[test]
-    fn a_clock_that_was_set_back_is_told_again_and_again_while_nothing_comes_of_the_rows() {
+    fn a_clock_that_was_set_back_is_reported_again_while_nothing_comes_of_the_rows() {
         let rows = |from: u32, to: u32| (from..to).map(|t| format!("{t},1\n"));
         let text: String = std::iter::once("t,a\n0,1\n0,1\n4990,1\n5000,1\n".to_owned())
             .chain(rows(1, 151))
@@ -372,10 +372,10 @@ mod tests {
         let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
         let text = std::io::Cursor::new(text.into_bytes());
         let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
-        let told = Arc::new(Mutex::new(Vec::new()));
+        let reported = Arc::new(Mutex::new(Vec::new()));
         reader.report_first({
-            let told = Arc::clone(&told);
-            move |error| told.lock().unwrap().push(error.to_string())
+            let reported = Arc::clone(&reported);
+            move |error| reported.lock().unwrap().push(error.to_string())
         });
         let mut row = Row::default();
         while reader.next_into(&mut row).unwrap() {}
@@ -386,7 +386,7 @@ mod tests {
             )
         };
         assert_eq!(
-            *told.lock().unwrap(),
+            *reported.lock().unwrap(),
             [
                 "pipe:3: the time `0` is that of the row before; the row was left out: where rows are taken as they come, what belongs to \
                  one time must stand in one"
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_cannot_be_read_are_told_again_and_again_while_nothing_comes_of_them() {
+    fn rows_that_cannot_be_read_are_reported_again_while_nothing_comes_of_them() {
         let rows = |count: u32, from: u32| -> String {
             let broken = (0..count).map(|nth| format!("{},x,1\n", from + nth));
             broken.chain([format!("{},1\n", from + count)]).collect()
@@ -415,10 +415,10 @@ mod tests {
         };
         let text = std::io::Cursor::new(text.into_bytes());
         let mut reader = Reader::from_read("pipe", text, layout, options).unwrap();
-        let told = Arc::new(Mutex::new(Vec::new()));
+        let reported = Arc::new(Mutex::new(Vec::new()));
         reader.report_first({
-            let told = Arc::clone(&told);
-            move |error| told.lock().unwrap().push(error.to_string())
+            let reported = Arc::clone(&reported);
+            move |error| reported.lock().unwrap().push(error.to_string())
         });
         let mut row = Row::default();
         while reader.next_into(&mut row).unwrap() {}
@@ -430,7 +430,7 @@ mod tests {
             )
         };
         assert_eq!(
-            *told.lock().unwrap(),
+            *reported.lock().unwrap(),
             [
                 first.to_owned(),
                 stays(12, 10),

@@ -50,7 +50,7 @@ pub use begun::begun_columns;
 pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
 pub use detect::{Description, Format, LongFormat};
-pub use error::{Again, FileError, MissingColumn, Place};
+pub use error::{Again, CellFault, FileError, MissingColumn, Place};
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};

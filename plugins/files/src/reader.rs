@@ -15,7 +15,9 @@ use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
 use crate::long::Long;
-use crate::{Again, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn};
+use crate::{
+    Again, CellFault, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn,
+};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -72,6 +74,8 @@ struct Reading {
     layout: Layout,
     ledger: Ledger,
     commas: Commas,
+    /// The text of the time of the row that was read last.
+    time: Vec<u8>,
     /// Which cell says the segment of a row, after those of the channels.
     segment_cell: Option<usize>,
     /// The segment of the row that was read last.
@@ -112,16 +116,6 @@ struct Stamped {
     row: Row,
     cell: Vec<u8>,
     place: Place,
-}
-
-impl Stamped {
-    fn new<C: Cells>(row: &Row, rows: &C) -> Self {
-        Self {
-            row: row.clone(),
-            cell: cell::trim(rows.time()).to_vec(),
-            place: rows.place(),
-        }
-    }
 }
 
 impl Reader {
@@ -207,6 +201,7 @@ impl Reader {
                 layout,
                 ledger,
                 commas: Commas::of(table, separator),
+                time: Vec::new(),
                 segment_cell,
                 segment: Vec::new(),
                 long,
@@ -334,16 +329,25 @@ impl Reading {
         match self.read(rows, row)? {
             None => return Ok(false),
             Some(Follows::Leaping) => {
-                let doubted = Stamped::new(row, rows);
+                let doubted = self.stamped(row, rows);
                 return self.next_doubted(rows, doubted, row);
             }
             Some(Follows::Again) => {}
             Some(_) => {
-                let cell = cell::trim(rows.time());
-                self.ledger.take(row.time_ns, cell, row.begins_segment);
+                self.ledger
+                    .take(row.time_ns, &self.time, row.begins_segment);
             }
         }
         Ok(true)
+    }
+
+    /// The row that was read last.
+    fn stamped<C: Cells>(&self, row: &Row, rows: &C) -> Stamped {
+        Stamped {
+            row: row.clone(),
+            cell: self.time.clone(),
+            place: rows.place(),
+        }
     }
 
     /// How a row follows the last one that was taken; the first of a segment follows none.
@@ -364,7 +368,7 @@ impl Reading {
     ) -> Result<bool, FileError> {
         while self.follows(&doubted.row) == Follows::Leaping {
             let next = match self.read(rows, row) {
-                Ok(Some(_)) => Stamped::new(row, rows),
+                Ok(Some(_)) => self.stamped(row, rows),
                 Ok(None) if !self.ledger.knows_leaps() => break,
                 end => {
                     self.ledger.refuse_leap(&doubted.cell, doubted.place, None);
@@ -416,11 +420,10 @@ impl Reading {
             });
             let follows = self.follows(row);
             if self.ledger.refuses(follows) {
-                let cell = cell::trim(rows.time());
                 if self.long.is_some() && follows == Follows::Behind {
-                    return Err(self.ledger.out_of_order(cell, rows.place()));
+                    return Err(self.ledger.out_of_order(&self.time, rows.place()));
                 }
-                self.ledger.refuse(follows, cell, || rows.place());
+                self.ledger.refuse(follows, &self.time, || rows.place());
                 continue;
             }
             self.read_values(rows, &mut row.values)?;
@@ -439,9 +442,11 @@ impl Reading {
         rows: &mut C,
         text: &mut String,
     ) -> Result<Option<i64>, FileError> {
-        let cell = cell::trim(rows.time());
         text.clear();
         let (time, ledger) = (&self.layout.time, &mut self.ledger);
+        time.columns
+            .join(&mut self.time, |column| cell::trim(rows.time(column)));
+        let cell = self.time.as_slice();
         let read = std::str::from_utf8(cell).ok().and_then(|cell| {
             text.push_str(cell);
             if self.commas.times
@@ -455,7 +460,10 @@ impl Reading {
             if read.is_none() && rows.take_header(ledger)? {
                 return Ok(None);
             }
-            ledger.refuse_row(|| no_instant(time, read, rows.place(), cell::trim(rows.time())))?;
+            ledger.refuse_row(|| {
+                let column = time.columns.to_string();
+                bad_cell(rows.place(), &column, cell, no_instant(time, read))
+            })?;
             return Ok(None);
         };
         if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
@@ -466,7 +474,10 @@ impl Reading {
         } else if self.commas.times
             && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
         {
-            ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
+            ledger.refuse_row(|| {
+                let column = time.columns.to_string();
+                bad_cell(rows.place(), &column, cell, other_mark(mark))
+            })?;
             return Ok(None);
         }
         Ok(Some(at.as_ns()))
@@ -475,24 +486,17 @@ impl Reading {
     fn read_values<C: Cells>(&mut self, rows: &C, values: &mut Vec<f64>) -> Result<(), FileError> {
         values.clear();
         let channels = self.layout.channels.len();
-        match self.long.take() {
-            None => {
-                for index in 0..channels {
-                    let value = self.read_value(rows, index, rows.channel(index))?;
-                    values.push(value);
-                }
+        if self.long.is_none() {
+            for index in 0..channels {
+                let value = self.read_value(rows, index, rows.channel(index))?;
+                values.push(value);
             }
-            Some(long) => {
-                values.resize(channels, f64::NAN);
-                let channels = long.channels().iter();
-                let read = channels.map(|&index| {
-                    values[index] = self.read_value(rows, index, rows.channel(1))?;
-                    Ok(())
-                });
-                let read = read.collect();
-                self.long = Some(long);
-                return read;
-            }
+            return Ok(());
+        }
+        values.resize(channels, f64::NAN);
+        let of_row = |long: &Long| long.channels().to_vec();
+        for index in self.long.as_ref().map_or(Vec::new(), of_row) {
+            values[index] = self.read_value(rows, index, rows.channel(1))?;
         }
         Ok(())
     }
@@ -510,50 +514,46 @@ impl Reading {
                 if self.commas.values
                     && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
             {
-                ledger.bad_cell(index, || mixed(rows.place(), column, cell, mark))?;
+                ledger.bad_cell(index, || {
+                    bad_cell(rows.place(), column, cell::trim(cell), other_mark(mark))
+                })?;
             }
             Some(value) => return Ok(value),
-            None => ledger.bad_cell(index, || FileError::BadCell {
-                place: rows.place(),
-                column: column.clone(),
-                found: excerpt(cell::trim(cell)),
+            None => ledger.bad_cell(index, || {
+                bad_cell(rows.place(), column, cell::trim(cell), CellFault::NoNumber)
             })?,
         }
         Ok(f64::NAN)
     }
 }
 
+/// A cell that is not taken.
+fn bad_cell(place: Place, column: &str, cell: &[u8], fault: CellFault) -> FileError {
+    FileError::BadCell {
+        place,
+        column: column.to_owned(),
+        found: excerpt(cell),
+        fault,
+    }
+}
+
 /// What is wrong with a time that is no instant, read as this.
-fn no_instant(time: &TimeColumn, read: Option<Civil>, place: Place, cell: &[u8]) -> FileError {
-    let (column, found) = (time.columns.to_string(), excerpt(cell));
+fn no_instant(time: &TimeColumn, read: Option<Civil>) -> CellFault {
     match (read, &time.zone) {
-        (Some(Civil::Skipped { offset_s }), Some(zone)) => FileError::TimeSkipped {
-            place,
-            column,
-            found,
+        (Some(Civil::Skipped { offset_s }), Some(zone)) => CellFault::TimeSkipped {
             zone: zone.to_string(),
             offset_s,
         },
-        (Some(_), _) => FileError::TimeBeyond {
-            place,
-            column,
-            found,
-        },
-        (None, _) => FileError::BadTime {
-            place,
-            column,
-            found,
+        (Some(_), _) => CellFault::TimeBeyond,
+        (None, _) => CellFault::NoTime {
             expected: time.form.expected(),
         },
     }
 }
 
 /// What is wrong with a number that has another decimal mark than those since that line.
-fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, Option<u64>)) -> FileError {
-    FileError::MixedMarks {
-        place,
-        column: column.to_owned(),
-        found: excerpt(cell::trim(cell)),
+fn other_mark((mark, since): (u8, Option<u64>)) -> CellFault {
+    CellFault::OtherMark {
         mark: char::from(mark),
         since,
     }

@@ -24,7 +24,7 @@ pub enum Event {
 /// at or before it is a segment of its own. That also holds for files that cover the same period with different columns: they
 /// are not merged; with [`Options::segments`] every file is one. A file without rows is passed over.
 ///
-/// Where times are dates, or numbers that must be some, the reports tell how many rows lie in the period of another file.
+/// Where times are dates, or numbers that must be some, the reports count the rows that lie in the period of another file.
 pub struct Recording {
     rest: std::vec::IntoIter<PathBuf>,
     layout: Layout,
@@ -210,7 +210,7 @@ mod tests {
     use super::*;
     use crate::TimeForm;
 
-    /// Reads the parts, each in a file of its own, to their end, and tells rows by their value and breaks by `|`.
+    /// Reads the parts, each in a file of its own, to their end: rows by their values and breaks as `|`.
     fn read(test: &str, form: TimeForm, parts: &[&str], look: impl FnOnce(&Recording)) -> String {
         let folder =
             std::env::temp_dir().join(format!("athermal-files-{}-{test}", std::process::id()));
@@ -224,40 +224,40 @@ mod tests {
         let layout = Layout::new("t", form, ["x"]);
         let mut recording = Recording::join(&paths, layout, Options::default()).unwrap();
         let mut row = Row::default();
-        let mut told = String::new();
+        let mut lines = String::new();
         loop {
             match recording.next_into(&mut row).unwrap() {
-                Event::Row => told += &format!("{}@{} ", row.values[0], row.time_text),
-                Event::Segment => told += "| ",
+                Event::Row => lines += &format!("{}@{} ", row.values[0], row.time_text),
+                Event::Segment => lines += "| ",
                 Event::End => break,
             }
         }
         assert_eq!(recording.reports().len(), parts.len());
         look(&recording);
         std::fs::remove_dir_all(&folder).unwrap();
-        told.trim_end().to_owned()
+        lines.trim_end().to_owned()
     }
 
-    fn told(test: &str, parts: &[&str]) -> String {
+    fn lines(test: &str, parts: &[&str]) -> String {
         read(test, TimeForm::SECONDS, parts, |_| {})
     }
 
     #[test]
     fn files_are_put_in_the_order_of_their_first_instants() {
         let parts = ["t,x\n20,3\n30,4\n", "t,x\n0,1\n10,2\n"];
-        assert_eq!(told("order", &parts), "1@0 2@10 3@20 4@30");
+        assert_eq!(lines("order", &parts), "1@0 2@10 3@20 4@30");
     }
 
     #[test]
     fn files_whose_times_start_again_are_segments_in_the_order_given() {
         let parts = ["t,x\n0,5\n10,6\n", "t,x\n0,1\n10,2\n", "t,x\n20,3\n"];
-        assert_eq!(told("again", &parts), "5@0 6@10 | 1@0 2@10 3@20");
+        assert_eq!(lines("again", &parts), "5@0 6@10 | 1@0 2@10 3@20");
     }
 
     #[test]
     fn a_file_that_starts_at_the_last_instant_of_the_other_is_a_segment() {
         assert_eq!(
-            told("touch", &["t,x\n0,1\n10,2\n", "t,x\n10,3\n"]),
+            lines("touch", &["t,x\n0,1\n10,2\n", "t,x\n10,3\n"]),
             "1@0 2@10 | 3@10"
         );
     }
@@ -265,13 +265,13 @@ mod tests {
     #[test]
     fn files_that_overlap_are_segments_in_the_order_of_dates_or_else_as_they_are_given() {
         let parts = ["t,x\n5,3\n15,4\n", "t,x\n0,1\n10,2\n"];
-        assert_eq!(told("overlap", &parts), "3@5 4@15 | 1@0 2@10");
+        assert_eq!(lines("overlap", &parts), "3@5 4@15 | 1@0 2@10");
         let dated = [
             "t,x\n1700000005,3\n1700000015,4\n",
             "t,x\n1700000000,1\n1700000010,2\n",
         ];
         assert_eq!(
-            told("overlap-dated", &dated),
+            lines("overlap-dated", &dated),
             "1@1700000000 2@1700000010 | 3@1700000005 4@1700000015"
         );
     }
@@ -316,7 +316,7 @@ mod tests {
             "t,x\n0.2,5\n10,6\n",
         ];
         assert_eq!(
-            told("jitter", &parts),
+            lines("jitter", &parts),
             "1@0.3 2@10 | 3@0.1 4@10 | 5@0.2 6@10"
         );
     }
@@ -365,18 +365,18 @@ mod tests {
     #[test]
     fn a_file_without_rows_is_passed_over() {
         let parts = ["t,x\n0,1\n", "t,x\n", "t,x\n0,2\n"];
-        assert_eq!(told("norows", &parts), "1@0 | 2@0");
+        assert_eq!(lines("norows", &parts), "1@0 | 2@0");
     }
 
     #[test]
     fn each_file_has_an_order_of_columns_of_its_own_and_may_change_it() {
         let parts = ["t,x\n0,1\n", "x,t\n2,10\nt,x\n20,3\n"];
-        assert_eq!(told("columns", &parts), "1@0 2@10 3@20");
+        assert_eq!(lines("columns", &parts), "1@0 2@10 3@20");
     }
 
     #[test]
     fn a_single_file_is_one_segment() {
-        assert_eq!(told("single", &["t,x\n0,1\n10,2\n"]), "1@0 2@10");
+        assert_eq!(lines("single", &["t,x\n0,1\n10,2\n"]), "1@0 2@10");
     }
 
     #[test]

@@ -77,7 +77,7 @@ impl Writer {
 
     /// Goes on with a file that was written with the same columns before: a last line that was cut off is removed, and rows up to the
     /// last one, which stand there already, are passed over. What is not there yet, empty or no file is created. `seen` is up to
-    /// where the rows that it was written from were read, if that is known: a time that comes twice may be told by it.
+    /// where the rows that it was written from were read, if that is known: it may decide which instant a time means that comes twice.
     ///
     /// # Errors
     /// The file cannot be read or written, or was written with other columns; nothing is then changed.

@@ -19,11 +19,11 @@ fn reader(text: &str, options: Options) -> Result<Reader, FileError> {
 fn read_with(text: &str, options: Options) -> (String, Reader) {
     let mut reader = reader(text, options).unwrap();
     let mut row = Row::default();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     while reader.next_into(&mut row).unwrap() {
-        told.push(format!("{} {:?}", row.time_text, row.values));
+        reported.push(format!("{} {:?}", row.time_text, row.values));
     }
-    (told.join("; "), reader)
+    (reported.join("; "), reader)
 }
 
 /// The rows of a text whose layout is declared, or the message of the error.
@@ -264,7 +264,7 @@ fn two_byte_text_without_a_mark_is_refused_with_advice() {
     assert!(matches!(refused, Err(FileError::NotText { place }) if place.line == 1));
 }
 
-/// What was told of rows that name the columns again.
+/// What was reported of rows that name the columns again.
 fn headers(reader: &Reader) -> (u64, String) {
     let report = reader.report();
     let headers = match report.headers_moved.count {
@@ -292,10 +292,10 @@ fn a_header_within_the_log_moves_the_columns_and_is_told() {
             let (rows, reader) = read_with(moved, options);
             assert_eq!(rows, TWO_ROWS, "{moved}");
             let line = moved.lines().count() - 1 - usize::from(moved.contains("nm"));
-            let told = format!(
+            let reported = format!(
                 "f.csv:{line}: the names of the columns stand here again, in other places; from here on values are taken by them"
             );
-            assert_eq!(headers(&reader), (1, told), "{moved}");
+            assert_eq!(headers(&reader), (1, reported), "{moved}");
             assert_eq!(reader.report().refused_rows.count, 0);
         }
     }
@@ -305,10 +305,10 @@ fn a_header_within_the_log_moves_the_columns_and_is_told() {
 fn a_header_that_says_the_same_again_is_left_out_and_told_once_and_each_that_does_not_is_told() {
     let text = "t,a,b\nt,a,b\n0,1,2.5\nt,a,b\n1,3,\nt,b,a\n2,5,6\nt,b,a\nt,a,b\n3,7,8\n";
     let mut reader = reader(text, Options::default()).unwrap();
-    let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+    let reported = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     reader.report_first({
-        let told = told.clone();
-        move |error| told.lock().unwrap().push(error.to_string())
+        let reported = reported.clone();
+        move |error| reported.lock().unwrap().push(error.to_string())
     });
     let mut row = Row::default();
     while reader.next_into(&mut row).unwrap() {}
@@ -317,7 +317,7 @@ fn a_header_that_says_the_same_again_is_left_out_and_told_once_and_each_that_doe
     };
     let moved = "in other places; from here on values are taken by them";
     assert_eq!(
-        *told.lock().unwrap(),
+        *reported.lock().unwrap(),
         [
             again(2, "as before; the row was left out"),
             again(6, moved),
@@ -326,7 +326,7 @@ fn a_header_that_says_the_same_again_is_left_out_and_told_once_and_each_that_doe
     );
     let report = reader.report();
     assert_eq!((report.rows, report.headers.count), (4, 3));
-    assert_eq!(report.headers_moved.count, 0, "each was told");
+    assert_eq!(report.headers_moved.count, 0, "each was reported");
 }
 
 #[test]
@@ -347,13 +347,13 @@ fn a_header_within_the_log_that_lacks_a_channel_is_an_error_and_leniently_the_ch
 
 #[test]
 fn a_header_within_the_log_that_cannot_be_used_is_an_error_or_left_out_and_the_columns_stay() {
-    for (header, told) in [
+    for (header, reported) in [
         ("time,a,b", "f.csv:3: there is no column `t`"),
         ("t,a,b,a", "f.csv:3: the name `a` stands at columns 2 and 4"),
     ] {
         let text = format!("t,a,b\n0,1,2.5\n{header}\n1,3,\n");
         let failed = error(&text);
-        assert!(failed.starts_with(told), "{failed}");
+        assert!(failed.starts_with(reported), "{failed}");
         let (rows, reader) = read_with(&text, lenient());
         assert_eq!(rows, TWO_ROWS);
         let refused = &reader.report().refused_rows;
@@ -364,7 +364,7 @@ fn a_header_within_the_log_that_cannot_be_used_is_an_error_or_left_out_and_the_c
                 .as_ref()
                 .unwrap()
                 .to_string()
-                .starts_with(told)
+                .starts_with(reported)
         );
     }
     let other_places = "t,a,b\n0,1,2.5\ntime,b,a\n5,6,7\nt,b,a\n1,,3\n";
@@ -382,14 +382,14 @@ fn a_header_that_was_cut_off_within_the_log_is_an_error_or_left_out_and_the_colu
         assert_eq!(rows, TWO_ROWS, "{header}");
         let refused = &reader.report().refused_rows;
         assert_eq!((refused.count, headers(&reader).0), (1, 0));
-        let told = "f.csv:3: there ";
+        let reported = "f.csv:3: there ";
         assert!(
             refused
                 .first
                 .as_ref()
                 .unwrap()
                 .to_string()
-                .starts_with(told)
+                .starts_with(reported)
         );
     }
 }
@@ -480,19 +480,19 @@ fn a_row_of_units_below_the_names_is_no_data() {
 fn rows_may_end_in_a_delimiter_that_the_names_lack() {
     assert_eq!(read("t,a,b\n0,1,2.5,\n1,3,,\n"), TWO_ROWS);
     assert_eq!(read("t,a,b\r\n0,1,2.5, \r\n1,3,\r\n"), TWO_ROWS);
-    let told = "4 cells where the header has 3";
-    assert!(error("t,a,b\n0,1,2.5,\n1,3,5,7\n").contains(told));
+    let reported = "4 cells where the header has 3";
+    assert!(error("t,a,b\n0,1,2.5,\n1,3,5,7\n").contains(reported));
     // The first row says how all end: here one number has a comma that was meant to be decimal.
-    assert!(error("t,a,b\n0,1,2.5\n1,3,5,\n").contains(told));
+    assert!(error("t,a,b\n0,1,2.5\n1,3,5,\n").contains(reported));
 }
 
 #[test]
 fn a_log_in_long_format_is_refused_as_that() {
     let text = "t;tag;value\n0;a;1\n0;b;2,5\n";
-    let told = error(text);
+    let reported = error(text);
     assert!(
-        told.starts_with("f.csv:1: the log is in long format: `tag` says"),
-        "{told}"
+        reported.starts_with("f.csv:1: the log is in long format: `tag` says"),
+        "{reported}"
     );
     let text = "wann;was;wieviel\n0;a;1\n0;b;2,5\n";
     assert!(error(text).contains(".pivot(index=\"wann\", columns=\"was\", values=\"wieviel\")"));

@@ -45,26 +45,6 @@ impl Description {
         Ok(described)
     }
 
-    /// Goes through the texts of all rows of a CSV file. Broken rows are passed over.
-    ///
-    /// # Errors
-    /// As for [`Description::of`].
-    pub fn each_row(
-        path: impl AsRef<Path>,
-        mut take: impl FnMut(&[String]),
-    ) -> Result<(), FileError> {
-        let mut csv = CsvRows::headed(
-            Lines::open(path.as_ref(), None)?,
-            &TableFormat::default(),
-            None,
-        )?;
-        let mut ledger = Ledger::new(true, None);
-        while csv.advance(&mut ledger)? {
-            take(&csv.texts());
-        }
-        Ok(())
-    }
-
     /// Looks at the first `rows` rows of any stream of bytes; `name` stands for it in messages.
     ///
     /// # Errors
@@ -141,19 +121,6 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
             break;
         }
         texts.push(row);
-    }
-    // Sorted by what they have, rows of a long format are all alike to begin with.
-    if let Some((column, name)) = LongFormat::of_one_name(csv.names(), &texts) {
-        while csv.advance(&mut ledger)? {
-            let row = csv.texts();
-            if row
-                .get(column)
-                .is_some_and(|other| !other.is_empty() && *other != name)
-            {
-                texts.push(row);
-                break;
-            }
-        }
     }
     Ok(Description {
         format: Format::Csv,

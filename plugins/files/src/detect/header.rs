@@ -29,8 +29,8 @@ pub(crate) struct Head {
 
 /// Goes to the header, so that it is the next line: where it is declared, or where it is found.
 ///
-/// By a layout the header is the first line that names the time and all channels that must be there, and may be a comment; if none
-/// does, the line that names the most. Where none names any, and without a layout, it is the line that begins the longest table.
+/// By a layout the header is the first line that names the time and all channels that must be there, and may be a comment. If none
+/// does, and without a layout, it is the line that begins the longest table.
 pub(crate) fn seek(
     lines: &mut Lines,
     table: &TableFormat,
@@ -64,9 +64,7 @@ pub(crate) fn seek(
         }
     }
     if !declared {
-        found = found
-            .or_else(|| most_named(&seen, separator, layout?))
-            .or_else(|| longest_table(&seen, separator));
+        found = found.or_else(|| longest_table(&seen, separator));
     }
     let Some((first, separator)) = found else {
         return Err(match seen.last() {
@@ -176,27 +174,6 @@ impl Line {
         let any = layout.channels.is_empty() || columns.channels.iter().any(Option::is_some);
         (any && columns.lacking(layout).is_empty()).then_some(separator)
     }
-}
-
-/// The first of the lines that name the most wanted columns and hold no values; none where none names any.
-fn most_named(seen: &[Line], declared: Option<u8>, layout: &Layout) -> Option<(usize, u8)> {
-    let content = seen
-        .iter()
-        .enumerate()
-        .filter(|(_, line)| !line.is_comment());
-    let each = content.map(|(at, line)| {
-        let separator = declared.unwrap_or_else(|| line.separator(Some(layout)));
-        let names = names_in(&line.text, separator);
-        let named = match can_name(&names) {
-            true => Columns::of(layout, &names).count(),
-            false => 0,
-        };
-        (named, at, separator)
-    });
-    // `max_by_key` takes the last of equals.
-    let most = each.rev().max_by_key(|(named, ..)| *named);
-    most.filter(|(named, ..)| *named > 0)
-        .map(|(_, at, separator)| (at, separator))
 }
 
 /// The line that names the columns of the longest table: the fullest of its width that holds no values, or else the comment just

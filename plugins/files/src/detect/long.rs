@@ -1,5 +1,5 @@
-//! Whether a table is in long format, a row for each value, and what its columns then are. It is not read: whoever wrote it knows best
-//! which rows belong to one instant.
+//! Whether a table is in long format, a row for each value, and what its columns then are. It is read where it is
+//! declared.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -19,35 +19,8 @@ pub struct LongFormat {
 }
 
 /// How such columns are usually called.
-const NAMES: [&str; 16] = [
-    "tag",
-    "tagname",
-    "name",
-    "variable",
-    "varname",
-    "signal",
-    "channel",
-    "sensor",
-    "parameter",
-    "point",
-    "item",
-    "metric",
-    "variable_name",
-    "tag_name",
-    "kanal",
-    "messstelle",
-];
-const VALUES: [&str; 9] = [
-    "value",
-    "val",
-    "values",
-    "data",
-    "reading",
-    "varvalue",
-    "wert",
-    "messwert",
-    "measurement",
-];
+const NAMES: &str = "tag tagname name variable varname signal channel sensor parameter point item metric variable_name tag_name kanal messstelle";
+const VALUES: &str = "value val values data reading varvalue wert messwert measurement";
 
 /// A wider table is none.
 const WIDEST: usize = 8;
@@ -63,17 +36,19 @@ impl LongFormat {
             let cells = rows.iter().filter_map(move |row| row.get(column));
             cells.map(String::as_str).filter(|cell| !cell.is_empty())
         };
-        let called =
-            |column: usize, known: &[&str]| known.contains(&&*columns[column].to_lowercase());
+        let called = |column: usize, known: &str| {
+            let name = columns[column].to_lowercase();
+            known.split(' ').any(|of| of == name)
+        };
         let all = 0..columns.len();
         let is_text =
             |&column: &usize| !cells(column).any(|cell| is_number(cell) || has_clock(cell));
-        let is_value = |&column: &usize| called(column, &VALUES) && cells(column).any(is_number);
+        let is_value = |&column: &usize| called(column, VALUES) && cells(column).any(is_number);
         let numbers = |&column: &usize| cells(column).any(is_number);
         let names = all.clone().filter(is_text).find(|&column| {
             let different: BTreeSet<&str> = cells(column).collect();
-            let is_called = called(column, &NAMES) && all.clone().any(|column| is_value(&column));
-            different.len() > 1 && (is_called || cells(column).any(is_wanted))
+            let is_called = called(column, NAMES) && all.clone().any(|column| is_value(&column));
+            is_called || different.len() > 1 && cells(column).any(is_wanted)
         })?;
         let values = all
             .clone()
@@ -88,18 +63,6 @@ impl LongFormat {
             values: columns[values].clone(),
         })
     }
-
-    /// The column of names, and the name, where columns are called as in long format and all rows have one name.
-    pub(crate) fn of_one_name(columns: &[String], rows: &[Vec<String>]) -> Option<(usize, String)> {
-        let called = |known: &[&str]| {
-            let mut names = columns.iter();
-            names.position(|name| known.contains(&&*name.to_lowercase()))
-        };
-        let (names, _) = (called(&NAMES)?, called(&VALUES)?);
-        let mut cells = rows.iter().filter_map(|row| row.get(names));
-        let first = cells.next().filter(|first| !is_number(first))?;
-        (columns.len() <= WIDEST && cells.all(|cell| cell == first)).then(|| (names, first.clone()))
-    }
 }
 
 impl fmt::Display for LongFormat {
@@ -111,9 +74,9 @@ impl fmt::Display for LongFormat {
         } = self;
         write!(
             f,
-            "the log is in long format: `{names}` says of each row what its `{values}` is, where a column for each signal is expected, and \
-             a row for each time; pivot it, in pandas by `.pivot(index=\"{time}\", columns=\"{names}\", values=\"{values}\")`, and \
-             give the result"
+            "the log is in long format: `{names}` says of each row what its `{values}` is; declare that in `[table]` by `layout = \"long\"`, \
+             `name = \"{names}\"` and `value = \"{values}\"`, or pivot it to a column for each signal, in pandas by \
+             `.pivot(index=\"{time}\", columns=\"{names}\", values=\"{values}\")`"
         )
     }
 }
@@ -131,12 +94,13 @@ mod tests {
     }
 
     #[test]
-    fn a_row_for_each_value_is_seen_by_its_names_and_told_with_a_way_out() {
+    fn a_row_for_each_value_is_seen_by_its_names_and_refused_with_a_way_out() {
         let long = of("time;tag;value\n0;plate;21,5\n0;Z;3\n1;plate;21,6\n", "").unwrap();
         assert_eq!(
             long.to_string(),
-            "the log is in long format: `tag` says of each row what its `value` is, where a column for each signal is expected, and a row \
-             for each time; pivot it, in pandas by `.pivot(index=\"time\", columns=\"tag\", values=\"value\")`, and give the result"
+            "the log is in long format: `tag` says of each row what its `value` is; declare that in `[table]` by `layout = \"long\"`, \
+             `name = \"tag\"` and `value = \"value\"`, or pivot it to a column for each signal, in pandas by \
+             `.pivot(index=\"time\", columns=\"tag\", values=\"value\")`"
         );
         let otherwise = "wann;was;wieviel\n2026-03-01 12:00;plate;21\n2026-03-01 12:00;Z;3\n";
         assert_eq!(of(otherwise, "room"), None);
@@ -150,6 +114,6 @@ mod tests {
     #[test]
     fn a_column_of_text_beside_others_makes_no_long_format() {
         assert_eq!(of("time;state;Z_nm\n0;on;1\n1;off;2\n", "Z_nm"), None);
-        assert_eq!(of("time;name;value\n0;A;1\n1;A;2\n", ""), None);
+        assert_eq!(of("time;name;level\n0;A;1\n1;A;2\n", ""), None);
     }
 }

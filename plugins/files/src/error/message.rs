@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::{Again, FileError, MissingColumn, Place, quoted};
+use super::{Again, CellFault, FileError, MissingColumn, quoted};
 use crate::cell;
 use crate::instant::{has_clock, is_time_of_day};
 
@@ -70,6 +70,11 @@ impl FileError {
 
     /// Writes the message; `strict` is whether the file may still be read leniently.
     fn write(&self, f: &mut dyn Write, strict: bool) -> fmt::Result {
+        if let Some(place) = self.place()
+            && !matches!(self, Self::StillRefused { .. })
+        {
+            write!(f, "{place}: ")?;
+        }
         match self {
             Self::Open { file, source } => {
                 write!(
@@ -77,7 +82,7 @@ impl FileError {
                     "{file}: cannot be opened: {source}; check the path and the rights"
                 )
             }
-            Self::Read { place, source } => write!(f, "{place}: cannot be read further: {source}"),
+            Self::Read { source, .. } => write!(f, "cannot be read further: {source}"),
             Self::Write { file, source } => write!(f, "{file}: cannot be written: {source}"),
             Self::StandardInputInList => write!(
                 f,
@@ -87,30 +92,30 @@ impl FileError {
                 f,
                 "{file}: is empty; a recording starts with a line of column names (CSV) or an object (JSON lines)"
             ),
-            Self::NotText { place } => {
+            Self::NotText { .. } => {
                 write!(
                     f,
-                    "{place}: is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
+                    "is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
                 )
             }
-            Self::TooLong { place, limit } => {
+            Self::TooLong { limit, .. } => {
                 write!(
                     f,
-                    "{place}: a row longer than {limit} bytes starts here; look for missing line ends"
+                    "a row longer than {limit} bytes starts here; look for missing line ends"
                 )?;
                 or_leniently(f, strict, "leave it out")
             }
-            Self::UnclosedQuote { place } => {
+            Self::UnclosedQuote { .. } => {
                 write!(
                     f,
-                    "{place}: a quoted cell starts here that does not end; close the quote or remove it"
+                    "a quoted cell starts here that does not end; close the quote or remove it"
                 )?;
                 or_leniently(f, strict, "leave the row out")
             }
             Self::DuplicateColumn {
-                place,
                 column,
                 positions: [first, second],
+                ..
             } => {
                 let is_time = ["time", "timestamp", "datetime", "zeit"];
                 let advice = match is_time.contains(&&*column.to_lowercase()) {
@@ -119,105 +124,26 @@ impl FileError {
                 };
                 write!(
                     f,
-                    "{place}: the name `{column}` stands at columns {first} and {second}; {advice}"
+                    "the name `{column}` stands at columns {first} and {second}; {advice}"
                 )
             }
             Self::MissingColumns {
-                place,
                 missing,
                 found,
                 note,
-            } => lacking(f, place, missing, found, note),
+                ..
+            } => lacking(f, missing, found, note),
             Self::BadCell {
-                place,
                 column,
                 found,
+                fault,
+                ..
             } => {
-                write!(
-                    f,
-                    "{place}: column `{column}`: expected a number, found `{found}`; "
-                )?;
-                f.write_str("leave the cell empty where there is no value")?;
-                or_leniently(f, strict, "take it as absent")
+                write!(f, "column `{column}`: ")?;
+                fault.write(f, found, strict)
             }
-            Self::MixedMarks {
-                place,
-                column,
-                found,
-                mark,
-                since,
-            } => {
-                let as_where = match since {
-                    Some(line) => format!("as in line {line}"),
-                    None => "as `[table]` declares".to_owned(),
-                };
-                write!(
-                    f,
-                    "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, {as_where}, found `{found}`; "
-                )?;
-                f.write_str("write all numbers of a file with one mark")?;
-                or_leniently(f, strict, "leave out those with another")
-            }
-            Self::TimeBeyond {
-                place,
-                column,
-                found,
-            } => {
-                write!(
-                    f,
-                    "{place}: column `{column}`: the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`"
-                )?;
-                or_leniently(f, strict, "leave the row out")
-            }
-            Self::BadTime {
-                place,
-                column,
-                found,
-                expected,
-            } => {
-                write!(f, "{place}: column `{column}`: expected {expected}, found ")?;
-                match found.as_str() {
-                    "" => write!(f, "nothing")?,
-                    found => write!(f, "`{found}`")?,
-                }
-                if is_time_of_day(found) {
-                    return write!(
-                        f,
-                        "; a time of day alone is no instant: where its date stands in another column, name both in `[time]`, e.g. `column = \"{{Date}} {{Time}}\"`, \
-                         else write it before the time"
-                    );
-                }
-                if is_date(found) && !is_date(expected) {
-                    return write!(f, "; `unit = \"rfc3339\"` in `[time]` reads such times");
-                }
-                if has_clock(found) && !is_date(found) && !expected.contains('%') {
-                    return write!(
-                        f,
-                        "; `[time]` reads dates and times by their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
-                    );
-                }
-                f.write_str("; correct the time or how it is to be read")?;
-                or_leniently(f, strict, "leave the row out")
-            }
-            Self::TimeSkipped {
-                place,
-                column,
-                found,
-                zone,
-                offset_s,
-            } => {
-                let (sign, minutes) = (if *offset_s < 0 { '-' } else { '+' }, offset_s.abs() / 60);
-                write!(
-                    f,
-                    "{place}: column `{column}`: `{found}` is no time in {zone}: the clocks are set forward over it; a logger whose clock is not \
-                     set forward has `zone = \"{sign}{:02}:{:02}\"` in `[time]`",
-                    minutes / 60,
-                    minutes % 60
-                )?;
-                or_leniently(f, strict, "leave the row out")
-            }
-            Self::TimeAgain { place, time, why } => {
-                write!(f, "{place}: the time `{time}` is that of the row before")?;
+            Self::TimeAgain { time, why, .. } => {
+                write!(f, "the time `{time}` is that of the row before")?;
                 match why {
                     Again::Live => write!(
                         f,
@@ -232,21 +158,17 @@ impl FileError {
                     ),
                 }
             }
-            Self::TimeNotAfter {
-                place,
-                time,
-                previous,
-            } => write!(
+            Self::TimeNotAfter { time, previous, .. } => write!(
                 f,
-                "{place}: the time `{time}` is not after `{previous}`; the row was left out"
+                "the time `{time}` is not after `{previous}`; the row was left out"
             ),
             Self::TimeLeaps {
-                place,
                 time,
                 previous,
                 next,
+                ..
             } => {
-                write!(f, "{place}: the time `{time}` is far after ")?;
+                write!(f, "the time `{time}` is far after ")?;
                 if let Some(previous) = previous {
                     write!(f, "`{previous}`, and ")?;
                 }
@@ -254,7 +176,7 @@ impl FileError {
                     (Some(next), Some(_)) => write!(f, "the next one, `{next}`, is not")?,
                     (Some(next), None) => write!(f, "the next one, `{next}`")?,
                     (None, _) => {
-                        f.write_str("no row follows by which to tell a gap from a wrong time")?
+                        f.write_str("no row follows that decides between a gap and a wrong time")?
                     }
                 }
                 f.write_str("; the row was left out")
@@ -270,12 +192,8 @@ impl FileError {
                     _ => Ok(()),
                 }
             }
-            Self::HeaderAgain {
-                place,
-                moved,
-                lacking,
-            } => {
-                write!(f, "{place}: the names of the columns stand here again, ")?;
+            Self::HeaderAgain { moved, lacking, .. } => {
+                write!(f, "the names of the columns stand here again, ")?;
                 match moved {
                     true => write!(f, "in other places; from here on values are taken by them")?,
                     false => write!(f, "as before; the row was left out")?,
@@ -288,40 +206,34 @@ impl FileError {
                     }
                 }
             }
-            Self::NotAsDeclared { place, key, found } => write!(
+            Self::NotAsDeclared { key, found, .. } => write!(
                 f,
-                "{place}: {found}, other than `{key}` in `[table]` declares; correct `{key}`, or leave it out so that it is found"
+                "{found}, other than `{key}` in `[table]` declares; correct `{key}`, or leave it out so that it is found"
             ),
-            Self::LongOutOfOrder {
-                place,
-                time,
-                previous,
-            } => write!(
+            Self::LongOutOfOrder { time, previous, .. } => write!(
                 f,
-                "{place}: the time `{time}` is before `{previous}`; a long layout is read in order of time: sort the rows by their time"
+                "the time `{time}` is before `{previous}`; a long layout is read in order of time: sort the rows by their time"
             ),
-            Self::LongFormat { place, long } => write!(f, "{place}: {long}"),
+            Self::LongFormat { long, .. } => write!(f, "{long}"),
             Self::CellCount {
-                place,
-                expected,
-                found,
+                expected, found, ..
             } => {
                 write!(
                     f,
-                    "{place}: {found} cells where the header has {expected}; correct the row"
+                    "{found} cells where the header has {expected}; correct the row"
                 )?;
                 or_leniently(f, strict, "leave it out")
             }
-            Self::BadObject { place, reason } => {
+            Self::BadObject { reason, .. } => {
                 write!(
                     f,
-                    "{place}: expected one JSON object on the line: {reason}; write one object per line"
+                    "expected one JSON object on the line: {reason}; write one object per line"
                 )?;
                 or_leniently(f, strict, "leave the line out")
             }
-            Self::JsonArray { place } => write!(
+            Self::JsonArray { .. } => write!(
                 f,
-                "{place}: a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
+                "a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
             ),
             Self::NotBegun { file, reason } => write!(
                 f,
@@ -336,10 +248,80 @@ impl FileError {
     }
 }
 
+impl CellFault {
+    /// Writes what is wrong with the cell that holds `found`; `strict` is whether it may still be read leniently.
+    fn write(&self, f: &mut dyn Write, found: &str, strict: bool) -> fmt::Result {
+        let then = match self {
+            Self::NoNumber => {
+                write!(
+                    f,
+                    "expected a number, found `{found}`; leave the cell empty where there is no value"
+                )?;
+                "take it as absent"
+            }
+            Self::OtherMark { mark, since } => {
+                let as_where = match since {
+                    Some(line) => format!("as in line {line}"),
+                    None => "as `[table]` declares".to_owned(),
+                };
+                write!(
+                    f,
+                    "expected a number with the decimal mark `{mark}`, {as_where}, found `{found}`; write all numbers of a file with \
+                     one mark"
+                )?;
+                "leave out those with another"
+            }
+            Self::TimeBeyond => {
+                write!(
+                    f,
+                    "the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or \
+                     its `unit` in `[time]`"
+                )?;
+                "leave the row out"
+            }
+            Self::NoTime { expected } => {
+                write!(f, "expected {expected}, found ")?;
+                match found {
+                    "" => f.write_str("nothing")?,
+                    found => write!(f, "`{found}`")?,
+                }
+                f.write_str("; ")?;
+                if is_time_of_day(found) {
+                    return f.write_str(
+                        "a time of day alone is no instant: where its date stands in another column, name both in `[time]`, e.g. \
+                         `column = \"{Date} {Time}\"`, else write it before the time",
+                    );
+                }
+                if is_date(found) && !is_date(expected) {
+                    return f.write_str("`unit = \"rfc3339\"` in `[time]` reads such times");
+                }
+                if has_clock(found) && !is_date(found) && !expected.contains('%') {
+                    return f.write_str(
+                        "`[time]` reads dates and times by their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59",
+                    );
+                }
+                f.write_str("correct the time or how it is to be read")?;
+                "leave the row out"
+            }
+            Self::TimeSkipped { zone, offset_s } => {
+                let (sign, minutes) = (if *offset_s < 0 { '-' } else { '+' }, offset_s.abs() / 60);
+                write!(
+                    f,
+                    "`{found}` is no time in {zone}: the clocks are set forward over it; a logger whose clock is not set forward has \
+                     `zone = \"{sign}{:02}:{:02}\"` in `[time]`",
+                    minutes / 60,
+                    minutes % 60
+                )?;
+                "leave the row out"
+            }
+        };
+        or_leniently(f, strict, then)
+    }
+}
+
 /// Which columns are missing, what is there, and what each may be called there.
 fn lacking(
     f: &mut dyn Write,
-    place: &Place,
     missing: &[MissingColumn],
     found: &[String],
     note: &str,
@@ -360,7 +342,7 @@ fn lacking(
     };
     write!(
         f,
-        "{place}: there {is} {}; found {there}{note}; ",
+        "there {is} {}; found {there}{note}; ",
         quoted(missing.iter().map(|column| column.name.as_str()))
     )?;
     let mut named = found.iter().filter(|name| !name.is_empty());

@@ -13,35 +13,41 @@ fn messages_say_what_where_and_what_to_do() {
         place: place(),
         column: "room".into(),
         found: "off".into(),
+        fault: CellFault::NoNumber,
     };
     assert_eq!(
         bad.to_string(),
         "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
     );
-    let time = FileError::BadTime {
+    let time = FileError::BadCell {
         place: place(),
         column: "time_s".into(),
         found: String::new(),
-        expected: "a decimal number".to_owned(),
+        fault: CellFault::NoTime {
+            expected: "a decimal number".to_owned(),
+        },
     };
     assert_eq!(
         time.to_string(),
         "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
     );
-    let beyond = FileError::TimeBeyond {
+    let beyond = FileError::BadCell {
         place: place(),
         column: "time_s".into(),
         found: "9223372046".into(),
+        fault: CellFault::TimeBeyond,
     };
     assert_eq!(
         beyond.to_string(),
         "run.csv:12: column `time_s`: the time `9223372046` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
     );
-    let dated = FileError::BadTime {
+    let dated = FileError::BadCell {
         place: place(),
         column: "time_s".into(),
         found: "2026-03-01 10:00".into(),
-        expected: "a decimal number".to_owned(),
+        fault: CellFault::NoTime {
+            expected: "a decimal number".to_owned(),
+        },
     };
     assert_eq!(
         dated.to_string(),
@@ -51,11 +57,13 @@ fn messages_say_what_where_and_what_to_do() {
         "a decimal number",
         "a date and time such as 2013-07-04T00:00:00Z",
     ] {
-        let elsewhere = FileError::BadTime {
+        let elsewhere = FileError::BadCell {
             place: place(),
             column: "time_s".into(),
             found: "01.03.2026 10:00".into(),
-            expected: expected.to_owned(),
+            fault: CellFault::NoTime {
+                expected: expected.to_owned(),
+            },
         };
         assert_eq!(
             elsewhere.to_string(),
@@ -65,11 +73,13 @@ fn messages_say_what_where_and_what_to_do() {
             )
         );
     }
-    let of_day = FileError::BadTime {
+    let of_day = FileError::BadCell {
         place: place(),
         column: "Time".into(),
         found: "12:00:00,5".into(),
-        expected: "a date and time such as 2013-07-04T00:00:00Z".to_owned(),
+        fault: CellFault::NoTime {
+            expected: "a date and time such as 2013-07-04T00:00:00Z".to_owned(),
+        },
     };
     assert_eq!(
         of_day.to_string(),
@@ -90,7 +100,7 @@ fn messages_say_what_where_and_what_to_do() {
 
 #[test]
 fn all_missing_columns_stand_in_one_message() {
-    let told = |missing: &[(&str, Option<&str>)]| {
+    let reported = |missing: &[(&str, Option<&str>)]| {
         let column = |(name, nearest): &(&str, Option<&str>)| MissingColumn {
             name: (*name).into(),
             nearest: nearest.map(Into::into),
@@ -109,19 +119,19 @@ fn all_missing_columns_stand_in_one_message() {
         ("plate", None),
     );
     assert_eq!(
-        told(&[room]),
+        reported(&[room]),
         "run.csv:12: there is no column `rom`; found `time_s`, `room`; did you mean `room`?"
     );
     assert_eq!(
-        told(&[plate]),
+        reported(&[plate]),
         "run.csv:12: there is no column `plate`; found `time_s`, `room`; correct the name, or make it optional if it is a channel"
     );
     assert_eq!(
-        told(&[time, room]),
+        reported(&[time, room]),
         "run.csv:12: there are no columns `tme_s`, `rom`; found `time_s`, `room`; did you mean `time_s` for `tme_s`, `room` for `rom`?"
     );
     assert_eq!(
-        told(&[plate, room]),
+        reported(&[plate, room]),
         "run.csv:12: there are no columns `plate`, `rom`; found `time_s`, `room`; did you mean `room` for `rom`? otherwise correct the names, or make optional those that are channels"
     );
 }
@@ -139,13 +149,14 @@ fn what_would_clear_a_screen_or_break_a_line_is_told_as_its_number() {
         place: place(),
         column: "a\u{7}".into(),
         found: excerpt(b"\x1b[2J1\n2\xe2\x80\xae\xc2\xb0C"),
+        fault: CellFault::NoNumber,
     };
-    let told = bad.to_string();
+    let reported = bad.to_string();
     assert!(
-        told.starts_with(
+        reported.starts_with(
             "run.csv:12: column `a\\u{7}`: expected a number, found `\\u{1b}[2J1\\n2\\u{202e}°C`; leave the cell empty"
         ),
-        "{told}"
+        "{reported}"
     );
     let excerpt = excerpt("x\n".repeat(500).as_bytes());
     assert!(excerpt.len() < 200, "{excerpt}");

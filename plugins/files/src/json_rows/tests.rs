@@ -9,11 +9,11 @@ fn read_with(text: &str, lenient: bool) -> Result<(String, Reader), FileError> {
     let input = std::io::Cursor::new(text.to_owned());
     let mut reader = Reader::from_read("standard input", input, layout, options)?;
     let mut row = Row::default();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     while reader.next_into(&mut row)? {
-        told.push(format!("{} {:?}", row.time_text, row.values));
+        reported.push(format!("{} {:?}", row.time_text, row.values));
     }
-    Ok((told.join("; "), reader))
+    Ok((reported.join("; "), reader))
 }
 
 fn read(text: &str) -> String {
@@ -118,10 +118,10 @@ fn an_array_is_an_error_that_asks_for_one_object_a_line() {
     ];
     for text in arrays {
         for lenient in [false, true] {
-            let told = read_with(&text, lenient).err().unwrap().to_string();
+            let reported = read_with(&text, lenient).err().unwrap().to_string();
             assert!(
-                told.starts_with("standard input:1: a JSON array begins here, where one object a line is expected"),
-                "{told}"
+                reported.starts_with("standard input:1: a JSON array begins here, where one object a line is expected"),
+                "{reported}"
             );
         }
     }
@@ -180,15 +180,15 @@ fn keys_that_the_first_object_lacks_are_told_at_once_where_that_is_asked_for() {
     let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
     let text = &b"{\"t\":0,\"a\":1,\"bb\":1}\n{\"t\":1}\n{\"t\":2,\"b\":1}\n"[..];
     let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
-    let told = Arc::new(Mutex::new(Vec::new()));
+    let reported = Arc::new(Mutex::new(Vec::new()));
     reader.report_first({
-        let told = Arc::clone(&told);
-        move |first| told.lock().unwrap().push(first.to_string())
+        let reported = Arc::clone(&reported);
+        move |first| reported.lock().unwrap().push(first.to_string())
     });
     let expected = ["pipe:1: there is no column `b`; found `t`, `a`, `bb`; did you mean `bb`?"];
     let mut row = Row::default();
     while reader.next_into(&mut row).unwrap() {
-        assert_eq!(*told.lock().unwrap(), expected);
+        assert_eq!(*reported.lock().unwrap(), expected);
     }
 }
 

@@ -38,10 +38,10 @@ fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
         .map(|(_, text)| text)
         .collect();
     assert_eq!(times, ["0", "10", "10.5"]);
-    let told = |count: &crate::Count| (count.count, count.first.as_ref().unwrap().to_string());
+    let reported = |count: &crate::Count| (count.count, count.first.as_ref().unwrap().to_string());
     let report = reader.report();
     assert_eq!(
-        told(&report.repeated_time),
+        reported(&report.repeated_time),
         (
             1,
             "f.csv:4: the time `10` is that of the row before; the row was left out: where rows are taken as they come, what belongs to \
@@ -50,7 +50,7 @@ fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
         )
     );
     assert_eq!(
-        told(&report.refused_time),
+        reported(&report.refused_time),
         (
             1,
             "f.csv:5: the time `5` is not after `10`; the row was left out".to_owned()
@@ -132,7 +132,7 @@ fn the_row_before_an_error_is_given_first_where_rows_are_put_together() {
 
 #[test]
 fn a_time_that_steps_back_is_told_as_the_file_has_it() {
-    let told = |text: &'static str, form| {
+    let reported = |text: &'static str, form| {
         let mut reader =
             Reader::from_read("f.csv", text.as_bytes(), layout(form), Options::default()).unwrap();
         assert_eq!(rows(&mut reader).len(), 1);
@@ -140,14 +140,14 @@ fn a_time_that_steps_back_is_told_as_the_file_has_it() {
         refused.first.as_ref().unwrap().to_string()
     };
     assert_eq!(
-        told(
+        reported(
             "t,a\n2026-03-02T08:30:00+01:00,1\n2026-03-02T07:29:30+01:00,1\n",
             TimeForm::Rfc3339
         ),
         "f.csv:3: the time `2026-03-02T07:29:30+01:00` is not after `2026-03-02T08:30:00+01:00`; the row was left out"
     );
     assert_eq!(
-        told("t;a\n1,50;1\n 1,25 ;1\n", TimeForm::SECONDS),
+        reported("t;a\n1,50;1\n 1,25 ;1\n", TimeForm::SECONDS),
         "f.csv:3: the time `1,25` is not after `1,50`; the row was left out"
     );
 }
@@ -232,16 +232,16 @@ fn the_first_cell_of_each_channel_that_cannot_be_read_is_told_at_once() {
     let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
     let text = &b"t,a,b\n0,ERR,1\n1,ERR,1\n2,ERR,FAIL\n3,ERR,FAIL\n"[..];
     let mut reader = Reader::from_read("pipe", text, layout, lenient()).unwrap();
-    let told = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let reported = Arc::new(std::sync::Mutex::new(Vec::new()));
     reader.report_first({
-        let told = Arc::clone(&told);
-        move |error| told.lock().unwrap().push(error.to_string())
+        let reported = Arc::clone(&reported);
+        move |error| reported.lock().unwrap().push(error.to_string())
     });
     assert_eq!(rows(&mut reader).len(), 4);
-    let told = told.lock().unwrap();
-    assert_eq!(told.len(), 2);
-    assert!(told[0].starts_with("pipe:2: column `a`: expected a number, found `ERR`"));
-    assert!(told[1].starts_with("pipe:4: column `b`: expected a number, found `FAIL`"));
+    let reported = reported.lock().unwrap();
+    assert_eq!(reported.len(), 2);
+    assert!(reported[0].starts_with("pipe:2: column `a`: expected a number, found `ERR`"));
+    assert!(reported[1].starts_with("pipe:4: column `b`: expected a number, found `FAIL`"));
     assert_eq!(reader.report().bad_cells.count, 6);
 }
 
@@ -297,10 +297,10 @@ fn a_row_is_given_as_soon_as_its_line_is_there() {
 /// The times that are given, what was left out, and the error at the end, if there was one.
 fn given(text: &'static str) -> (String, Vec<String>, String) {
     let mut reader = open(text, Options::default());
-    let told = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let reported = Arc::new(std::sync::Mutex::new(Vec::new()));
     reader.report_first({
-        let told = Arc::clone(&told);
-        move |error| told.lock().unwrap().push(error.to_string())
+        let reported = Arc::clone(&reported);
+        move |error| reported.lock().unwrap().push(error.to_string())
     });
     let (mut times, mut row) = (Vec::new(), Row::default());
     let end = loop {
@@ -311,16 +311,16 @@ fn given(text: &'static str) -> (String, Vec<String>, String) {
         }
     };
     assert_eq!(reader.report().rows, times.len() as u64);
-    let told = told.lock().unwrap().clone();
-    (times.join(" "), told, end)
+    let reported = reported.lock().unwrap().clone();
+    (times.join(" "), reported, end)
 }
 
 #[test]
 fn a_single_time_far_ahead_is_left_out_and_the_rows_after_it_are_not() {
-    let (times, told, end) = given("t,a\n0,1\n10,2\n4102444800,3\n20,4\n30,5\n");
+    let (times, reported, end) = given("t,a\n0,1\n10,2\n4102444800,3\n20,4\n30,5\n");
     assert_eq!((&*times, &*end), ("0=1 10=2 20=4 30=5", ""));
     assert_eq!(
-        told,
+        reported,
         [
             "f.csv:4: the time `4102444800` is far after `10`, and the next one, `20`, is not; the row was left out"
         ]
@@ -331,32 +331,39 @@ fn a_single_time_far_ahead_is_left_out_and_the_rows_after_it_are_not() {
 
 #[test]
 fn rows_after_a_gap_are_all_given() {
-    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,4\n90000,5\n90010,6\n");
+    let (times, reported, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,4\n90000,5\n90010,6\n");
     let all = "0=1 10=2 40000=3 40010=4 90000=5 90010=6";
     assert_eq!((&*times, &*end), (all, ""));
-    assert!(told.is_empty(), "{told:?}");
-    let (times, told, _) = given("t,a\n0,1\n10,2\n40000,3\n40000,4\n40010,5\n");
+    assert!(reported.is_empty(), "{reported:?}");
+    let (times, reported, _) = given("t,a\n0,1\n10,2\n40000,3\n40000,4\n40010,5\n");
     assert_eq!(times, "0=1 10=2 40000=3 40010=5");
     assert!(
-        told[0].starts_with("f.csv:5: the time `40000` is that of the row before"),
-        "{told:?}"
+        reported[0].starts_with("f.csv:5: the time `40000` is that of the row before"),
+        "{reported:?}"
     );
 }
 
 #[test]
 fn a_last_row_far_ahead_is_left_out_since_it_may_be_a_wrong_time_as_well_as_one_after_a_gap() {
-    let left_out = "f.csv:4: the time `40000` is far after `10`, and no row follows by which to tell a gap from a wrong time; the row \
-                    was left out";
-    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n");
+    let left_out = "f.csv:4: the time `40000` is far after `10`, and no row follows that decides between a gap and a wrong time; the \
+                    row was left out";
+    let (times, reported, end) = given("t,a\n0,1\n10,2\n40000,3\n");
     assert_eq!((&*times, &*end), ("0=1 10=2", ""));
-    assert_eq!(told, [left_out]);
-    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
-    assert_eq!((&*times, &*told), ("0=1 10=2", &[left_out.to_owned()][..]));
+    assert_eq!(reported, [left_out]);
+    let (times, reported, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
+    assert_eq!(
+        (&*times, &*reported),
+        ("0=1 10=2", &[left_out.to_owned()][..])
+    );
     assert!(end.starts_with("f.csv:5: column `a`"), "{end}");
-    let (times, told, _) = given("t,a\n0,1\n10,2\n90000,3\n40000,4\n");
-    assert_eq!((&*times, told.len()), ("0=1 10=2", 1), "others are counted");
+    let (times, reported, _) = given("t,a\n0,1\n10,2\n90000,3\n40000,4\n");
+    assert_eq!(
+        (&*times, reported.len()),
+        ("0=1 10=2", 1),
+        "others are counted"
+    );
     let two = "t,a\n0,1\n3600,2\n";
-    assert_eq!(given(two).0, "0=1 3600=2", "nothing tells that it leaps");
+    assert_eq!(given(two).0, "0=1 3600=2", "nothing says that it leaps");
     let goes_on = Options {
         goes_on: true,
         ..Options::default()
