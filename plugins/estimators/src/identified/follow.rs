@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Beginning, Polynomials, Stepper};
+use athermal_numerics::{Beginning, Stepper};
 use serde::{Deserialize, Serialize};
 
 use super::model::Identified;

@@ -3,6 +3,7 @@
 use super::super::model::{MOST_SERIES, identified};
 use super::*;
 use athermal_core::node::Predictor;
+use athermal_numerics::Polynomials;
 
 #[test]
 fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noise_give() {
