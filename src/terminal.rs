@@ -9,7 +9,7 @@ use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
 use athermal::files::FileError;
 use athermal::run::fit::FitError;
-use athermal::run::live::RunError;
+use athermal::run::live::{RunError, StateError};
 use athermal::trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -335,10 +335,24 @@ impl From<FileError> for Failure {
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Source(error) | RunError::Sink(error) | RunError::Keep(error) => {
-                outside(error)
+            RunError::Source(error) | RunError::Sink(error) => outside(error),
+            RunError::State(error) => error.into(),
+            RunError::Engine(_) | RunError::Stage(_) | RunError::Copy(_) => {
+                Self::Request(error.to_string())
             }
-            RunError::Engine(error) => Self::Request(error.to_string()),
+        }
+    }
+}
+
+impl From<StateError> for Failure {
+    fn from(error: StateError) -> Self {
+        match error {
+            StateError::Foreign { .. } => Self::Request(error.to_string()),
+            StateError::Held { path } => Self::Outside(format!(
+                "{}: another run keeps its state there: end that one first, or name another file with `--state`",
+                path.display()
+            )),
+            other => Self::Outside(other.to_string()),
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Writing whole files: beside their place first, then renamed, so that a reader never sees half of one.
 
 use std::fs;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
 
 use athermal::files::STANDARD_INPUT;
+use athermal::run::live::store::write_whole;
 
 use crate::terminal::Failure;
 
@@ -69,8 +70,7 @@ fn is_one_file(_one: &Path, _other: &Path) -> bool {
 /// # Errors
 /// When it cannot be written.
 pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
-    let failed = |error| Failure::Outside(not_written(path, &error));
-    whole_aside(path, content.as_ref()).map_err(failed)
+    write_whole(path, content.as_ref()).map_err(|error| Failure::Outside(not_written(path, &error)))
 }
 
 /// Why a file is not written.
@@ -78,56 +78,11 @@ pub fn not_written(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}", path.display())
 }
 
-/// The same with the bare error.
-///
-/// # Errors
-/// When it cannot be written.
-pub fn whole_aside(path: &Path, content: &[u8]) -> io::Result<()> {
-    let synced = |to: &Path| {
-        let mut file = fs::File::create(to)?;
-        file.write_all(content)?;
-        file.sync_all()
-    };
-    put(path, "part", synced, |to| fs::write(to, content))
-}
-
-/// The same with a copy of another file, which keeps its rights.
-///
-/// # Errors
-/// When it cannot be read or written.
-pub fn copy_aside(from: &Path, path: &Path) -> io::Result<()> {
-    let copied = |to: &Path| fs::copy(from, to).map(|_| ());
-    let written = |to: &Path| fs::write(to, fs::read(from)?);
-    put(path, "new", copied, written)
-}
-
-/// Makes a file beside a path and gives it that name; or writes to what is there, where that is no file. A link stays one, to what
-/// takes the place of what it links to.
-fn put(
-    path: &Path,
-    ending: &str,
-    make: impl FnOnce(&Path) -> io::Result<()>,
-    write_to: impl FnOnce(&Path) -> io::Result<()>,
-) -> io::Result<()> {
-    if fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
-        return write_to(path);
-    }
-    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut aside = path.as_os_str().to_owned();
-    aside.push(".");
-    aside.push(ending);
-    let aside = PathBuf::from(aside);
-    make(&aside)
-        .and_then(|()| fs::rename(&aside, path))
-        .inspect_err(|_| {
-            // Half a file is of no use, and on a full disk it takes the room of the next.
-            let _ = fs::remove_file(&aside);
-        })
-}
-
 #[cfg(test)]
 #[cfg(unix)]
 mod tests {
+    use athermal::run::live::store::copy_whole;
+
     use super::*;
 
     /// What a pipe is given, which stays one.
@@ -167,10 +122,10 @@ mod tests {
         assert_eq!(read, "a model");
         let program = std::env::temp_dir().join(format!("athermal-built-{}", std::process::id()));
         fs::write(&program, "a program").unwrap();
-        let read = through_a_pipe("copied", |pipe| copy_aside(&program, pipe).unwrap());
+        let read = through_a_pipe("copied", |pipe| copy_whole(&program, pipe).unwrap());
         assert_eq!(read, "a program");
         let placed = program.with_extension("placed");
-        copy_aside(&program, &placed).unwrap();
+        copy_whole(&program, &placed).unwrap();
         assert_eq!(fs::read_to_string(&placed).unwrap(), "a program");
         for file in [program, placed] {
             fs::remove_file(file).unwrap();

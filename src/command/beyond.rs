@@ -1,6 +1,7 @@
 //! When data lie so far from those of a fit that predictions of them mean little.
 
 use athermal::core::engine::SampleRange;
+use athermal::run::live::monitor::usual;
 use serde::Serialize;
 use serde_json::json;
 
@@ -59,11 +60,6 @@ pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
     }
 }
 
-/// Whether a sample is such.
-pub fn is_beyond(usual: &SampleRange, sample: f64) -> bool {
-    doubt(usual, sample, sample).is_some()
-}
-
 /// Warns of the first such sample of a channel.
 pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
     if let Some(doubt) = doubt(usual, sample, sample) {
@@ -83,11 +79,6 @@ pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: 
         });
         terminal.warning(Message::new(OUTSIDE, facts, words));
     }
-}
-
-/// Where the samples of a channel lay in a fit.
-pub fn usual<'a>(fit: &'a [SampleRange], channel: &str) -> Option<&'a SampleRange> {
-    fit.iter().find(|usual| usual.channel == channel)
 }
 
 /// What to think of samples that lie far outside; none where they do not.

@@ -11,6 +11,7 @@ use athermal::core::diagnostic::Sources;
 use athermal::core::engine::{Engine, SampleRange};
 use athermal::diagnosis::comparison::{Comparison, Contender, Row, compare};
 use athermal::run::fit::{FitOptions, FitReport, Outcome};
+use athermal::run::live::monitor::usual;
 use athermal::run::recording::Event;
 use athermal::run::score::{Lack, ScoreOptions, Trace, trace_as};
 use clap::Args;
@@ -99,7 +100,7 @@ impl Once<'_> {
     }
 
     fn warn_beyond(&mut self, report: &FitReport, trace: &Trace) {
-        let new = |range: &&SampleRange| beyond::usual(&self.in_fits, &range.channel).is_none();
+        let new = |range: &&SampleRange| usual(&self.in_fits, &range.channel).is_none();
         let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
         beyond::warn(self.terminal, &beyond::beyond(&new, &trace.ranges));
         self.in_fits.extend(new);

@@ -1,11 +1,9 @@
 //! Warnings about faulty sensors.
 
-pub use athermal::diagnosis::watch::{
-    ChannelFaults, ChannelWatch as Looks, FaultWatch, Purpose, facts, places,
-};
+pub use athermal::diagnosis::watch::{ChannelFaults, ChannelWatch, FaultWatch, Purpose, facts};
 
 use athermal::diagnosis::leap::Leaps;
-use athermal::diagnosis::silence::Silence;
+use athermal::run::live::monitor::silence::Silence;
 use serde_json::Value;
 
 use crate::message::Message;

@@ -61,12 +61,16 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
 
 /// Warns of the nodes of a model whose fit failed.
 pub fn warn_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
-    let nodes = model.unfitted();
+    warn_nodes_unfitted(terminal, &model.unfitted(), path);
+}
+
+/// The same, of nodes that are known.
+pub fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
     if !nodes.is_empty() {
         terminal.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",
             path.display(),
-            few(&nodes),
+            few(nodes),
             if nodes.len() == 1 { "gives" } else { "give" },
         ));
     }

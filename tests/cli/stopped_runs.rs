@@ -1,4 +1,4 @@
-//! A run beside a machine that is told to stop ends as at the end of its input: what came of it is out, and nothing of what it knows is
+//! A run beside a machine that gets a signal to stop ends as at the end of its input: what came of it is out, and nothing of what it knows is
 //! lost.
 
 #![cfg(unix)]
@@ -122,7 +122,7 @@ fn a_run_that_is_told_to_stop_ends_in_order_and_the_next_goes_on_from_there() {
         let (status, rest, told) = live.ended();
         assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
         assert!(told.contains("5 × unreadable cell"), "{told}");
-        assert!(told.contains("told to stop"), "{told}");
+        assert!(told.contains("stopped: what had been read"), "{told}");
         assert!(!told.contains("(`--lenient`)"), "{told}");
 
         let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
@@ -183,7 +183,7 @@ fn a_file_that_a_run_keeps_or_writes_is_refused_to_another_until_the_first_is_de
     let more: [&dyn AsRef<std::ffi::OsStr>; 6] = [&"run", &graph, &"-i", &"-", &"--state", &state];
     let refused = athermal_fed(&more, b"time_s,Z\n500,1\n").ended(3);
     refused.tells(&[
-        "state: another run keeps there what it knows",
+        "state: another run keeps its state there",
         "end that one first, or name another file with `--state`",
     ]);
     assert_eq!(refused.out, "");

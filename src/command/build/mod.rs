@@ -10,9 +10,9 @@ use std::process::Command;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::aside::copy_aside;
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal::run::live::store::copy_whole;
 use cargo::Cargo;
 use project::Project;
 use wish::Wish;
@@ -225,7 +225,7 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
 fn place(built: &Path, output: &Path) -> Result<(), Failure> {
     let folder = output.parent().map_or(Ok(()), std::fs::create_dir_all);
     folder
-        .and_then(|()| copy_aside(built, output))
+        .and_then(|()| copy_whole(built, output))
         .map_err(|error| {
             Failure::Outside(format!(
                 "cannot put {} at {}: {error}",

@@ -1,4 +1,4 @@
-//! Decides how a run beside a machine ends that is told to stop: as at the end of its input. What that is, is decided elsewhere.
+//! Signals: a run beside a machine ends as at the end of its input.
 
 use std::io::{self, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,12 +9,12 @@ const PIECE: usize = 64 * 1024;
 /// Pieces that may wait to be taken.
 const WAITING: usize = 2;
 
-/// Whether the program has been told to stop.
-static TOLD: AtomicBool = AtomicBool::new(false);
+/// Whether a signal to stop has come.
+static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// Whether the program has been told to stop.
-pub fn is_told() -> bool {
-    TOLD.load(Ordering::Relaxed)
+/// Whether a signal to stop has come.
+pub fn is_stopped() -> bool {
+    STOPPED.load(Ordering::Relaxed)
 }
 
 /// A piece of an input; an empty one is its end.
@@ -23,7 +23,7 @@ type Piece = io::Result<Vec<u8>>;
 /// An input that may never end by itself: from here on SIGINT or SIGTERM ends it, after all that has been read of it until then, and a
 /// second one ends the program at once. SIGHUP ends it as they do where it is not ignored, and no more than that: a session that closes
 /// may send several. Where there are no signals it is as it was.
-pub fn until_told(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
+pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     let (give, pieces) = sync_channel(WAITING);
     if !listen(give.clone()) {
         return input;
@@ -40,13 +40,13 @@ fn listen(give: SyncSender<Piece>) -> bool {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    let hangs_up = is_told_of_a_hangup().then_some(SIGHUP);
+    let hangs_up = ends_at_a_hangup().then_some(SIGHUP);
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(hangs_up)) else {
         return false;
     };
     std::thread::spawn(move || {
         for signal in signals.forever() {
-            if TOLD.swap(true, Ordering::Relaxed) && signal != SIGHUP {
+            if STOPPED.swap(true, Ordering::Relaxed) && signal != SIGHUP {
                 let _ = emulate_default_handler(signal);
             }
             // There may be no room yet, and the second signal is listened to meanwhile.
@@ -60,7 +60,7 @@ fn listen(give: SyncSender<Piece>) -> bool {
 /// Whether SIGHUP is there to end the program, and not ignored as under `nohup`, which listening to it would undo. Where that cannot be
 /// known, nobody listens.
 #[cfg(unix)]
-fn is_told_of_a_hangup() -> bool {
+fn ends_at_a_hangup() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
@@ -72,10 +72,10 @@ fn listen(_give: SyncSender<Piece>) -> bool {
     false
 }
 
-/// Reads an input piece by piece, to its end or until the program is told to stop.
+/// Reads an input piece by piece, to its end or until a signal to stop.
 fn read(mut input: impl Read, give: &SyncSender<Piece>) {
     let mut piece = vec![0; PIECE];
-    while !is_told() {
+    while !is_stopped() {
         let read = match input.read(&mut piece) {
             Ok(read) => Ok(piece[..read].to_vec()),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,

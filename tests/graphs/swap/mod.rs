@@ -8,6 +8,7 @@ mod model;
 mod planted;
 mod properties;
 mod random_graph;
+mod session;
 mod snapshots;
 mod standing;
 mod threads;

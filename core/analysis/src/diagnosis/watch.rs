@@ -2,17 +2,19 @@
 
 use std::cell::RefCell;
 
+use athermal_core::compile::origins::{health_reasons, of_truths};
 use athermal_core::compile::{Plan, SourceChannel};
+use athermal_core::engine::SampleRange;
 use athermal_core::time::Instant;
-use athermal_run::live::Feed;
+use athermal_run::live::monitor::silence::{self, Silence};
+use athermal_run::live::monitor::standstill::{self, Standstill};
+use athermal_run::live::monitor::{Monitor, places};
+use athermal_run::live::{Feed, Reporter};
 use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::leap::{self, Leaps};
-use super::silence::{self, Silence};
-use super::standstill::{self, Standstill};
-use super::{health_reasons, of_truths};
 use crate::figures::seconds;
 
 /// What a recording is read for.
@@ -135,7 +137,7 @@ impl Recording for FaultWatch<'_> {
 }
 
 impl ChannelWatch {
-    /// ChannelWatch at the channels of this plan.
+    /// Watches the channels of this plan.
     pub fn at(plan: &Plan) -> Self {
         let watched = health_reasons(plan);
         let channels = plan.sources.iter().zip(leap::finders(plan));
@@ -157,50 +159,6 @@ impl ChannelWatch {
             places: (0..channels.len()).map(Some).collect(),
             channels,
         }
-    }
-
-    /// Goes on with the channels of a graph that has taken over, which reads them among those of a feed.
-    pub fn follow(&mut self, plan: &Plan, feed: &[Feed]) {
-        let mut before = std::mem::take(&mut self.places);
-        let mut added = Vec::new();
-        for (new, place) in Self::at(plan).channels.into_iter().zip(places(plan, feed)) {
-            let known = before.iter().position(|of| of.is_some() && *of == place);
-            match known {
-                Some(nth) if self.channels[nth].is_looked_at_as(&new) => {
-                    self.channels[nth].source = new.source;
-                }
-                // What was found of it until now is reported as it was looked at then.
-                known => {
-                    known.into_iter().for_each(|nth| before[nth] = None);
-                    added.push((new, place));
-                }
-            }
-        }
-        let read: Vec<_> = places(plan, feed).collect();
-        before
-            .iter_mut()
-            .filter(|place| !read.contains(place))
-            .for_each(|place| *place = None);
-        self.places = before;
-        for (new, place) in added {
-            self.channels.push(new);
-            self.places.push(place);
-        }
-    }
-
-    /// Takes the next row, its values in the order of the plan's channels, or in that of the feed.
-    pub fn row(&mut self, now: Instant, values: &[f64]) {
-        let at_s = seconds(now);
-        for (of, place) in self.channels.iter_mut().zip(&self.places) {
-            if let Some(&value) = place.and_then(|place| values.get(place)) {
-                of.row(at_s, value);
-            }
-        }
-    }
-
-    /// What follows is not set against what was.
-    pub fn interrupt(&mut self) {
-        self.channels.iter_mut().for_each(WatchedChannel::interrupt);
     }
 
     /// The channels of which something is wrong, in the order of the plan.
@@ -232,10 +190,47 @@ impl ChannelWatch {
     }
 }
 
-/// Where each channel of a plan stands among those of a feed.
-pub fn places<'a>(plan: &'a Plan, feed: &'a [Feed]) -> impl Iterator<Item = Option<usize>> + 'a {
-    let place = |fed: Feed| feed.iter().position(|of| *of == fed);
-    Feed::of(plan).into_iter().map(place)
+impl Monitor for ChannelWatch {
+    fn row(&mut self, now: Instant, samples: &Samples, _reporter: &dyn Reporter) {
+        let at_s = seconds(now);
+        for (of, place) in self.channels.iter_mut().zip(&self.places) {
+            if let Some(&value) = place.and_then(|place| samples.values.get(place)) {
+                of.row(at_s, value);
+            }
+        }
+    }
+
+    fn segment(&mut self) {
+        self.channels.iter_mut().for_each(WatchedChannel::interrupt);
+    }
+
+    fn follow(&mut self, plan: &Plan, feed: &[Feed], _usual: &[SampleRange]) {
+        let mut before = std::mem::take(&mut self.places);
+        let mut added = Vec::new();
+        for (new, place) in Self::at(plan).channels.into_iter().zip(places(plan, feed)) {
+            let known = before.iter().position(|of| of.is_some() && *of == place);
+            match known {
+                Some(nth) if self.channels[nth].is_looked_at_as(&new) => {
+                    self.channels[nth].source = new.source;
+                }
+                // What was found of it until now is reported as it was looked at then.
+                known => {
+                    known.into_iter().for_each(|nth| before[nth] = None);
+                    added.push((new, place));
+                }
+            }
+        }
+        let read: Vec<_> = places(plan, feed).collect();
+        before
+            .iter_mut()
+            .filter(|place| !read.contains(place))
+            .for_each(|place| *place = None);
+        self.places = before;
+        for (new, place) in added {
+            self.channels.push(new);
+            self.places.push(place);
+        }
+    }
 }
 
 impl WatchedChannel {
@@ -286,8 +281,8 @@ impl Source for Looking<'_> {
         let event = self.rows.next(samples)?;
         if let State::Read(looks) = &mut *self.state.borrow_mut() {
             match event {
-                Some(Event::Row(now)) => looks.row(now, &samples.values),
-                Some(Event::Segment) => looks.interrupt(),
+                Some(Event::Row(now)) => looks.row(now, samples, &()),
+                Some(Event::Segment) => looks.segment(),
                 None => {}
             }
         }

@@ -112,7 +112,7 @@ fn as_period<S: Serializer>(period_s: &Option<(f64, f64)>, to: S) -> Result<S::O
 }
 
 /// The plan, with the weights of votes and the reasons of watches computed, whether or not the graph reads them.
-fn telling(plan: &Plan) -> Plan {
+fn with_weights(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
     ask_for_reasons(&mut plan);
     let weights = plan.nodes.iter().filter_map(|node| node.port("weights"));
@@ -133,7 +133,7 @@ pub(super) fn follow(
     recording: &dyn Recording,
     trace: &Trace,
 ) -> Result<(Course, Track, Vec<Unjudged>), ReportError> {
-    let plan = Arc::new(telling(&model.plan));
+    let plan = Arc::new(with_weights(&model.plan));
     let mut engine = Engine::new(Arc::clone(&plan), &model.fitted)?;
     let (corrected, mut track, unjudged) = places(&plan);
     let (axes, of_axes) = axes(&plan, trace, &track);

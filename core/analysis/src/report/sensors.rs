@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
-use crate::diagnosis::standstill;
-use crate::diagnosis::{health_reasons, of_truths};
 use crate::figures::{counted, time};
+use athermal_core::compile::origins::{health_reasons, of_truths};
+use athermal_run::live::monitor::standstill;
 
 /// The facts about a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]

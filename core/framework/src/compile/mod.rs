@@ -20,6 +20,7 @@ mod leak;
 mod learning;
 mod misplaced;
 mod order;
+pub mod origins;
 mod plan;
 mod port_channels;
 pub mod problem;

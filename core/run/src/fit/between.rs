@@ -1,7 +1,7 @@
-//! Decides which runs between two truths are told to a trainer that asks for them; not what it makes of them.
+//! Which runs between two truths a trainer sees that asks for them.
 //!
-//! Runs come far more often than truths, and where truths come as usual they tell a trainer nothing: only where one is missing are
-//! those told that lie between. What is usual is known from the truths until then.
+//! Runs come far more often than truths, and where truths come as usual a trainer learns nothing from them. It sees those between two
+//! truths only where one is missing. What is usual is known from the truths until then.
 
 use std::collections::VecDeque;
 
@@ -129,10 +129,10 @@ mod tests {
         Duration::from_ns(seconds * 1_000_000_000)
     }
 
-    /// The runs that are told of truths at these instants, with a run at every second.
-    fn told(every: Option<Duration>, truths: &[i64]) -> Vec<i64> {
+    /// The runs that are given for truths at these instants, with a run at every second.
+    fn runs(every: Option<Duration>, truths: &[i64]) -> Vec<i64> {
         let mut between = Between::new(every, 1);
-        let (mut told, mut ran) = (Vec::new(), 0);
+        let (mut runs, mut ran) = (Vec::new(), 0);
         for &truth in truths {
             while ran <= truth + 5 {
                 between.run(s(ran), [&[ran as f64][..]].into_iter());
@@ -140,37 +140,37 @@ mod tests {
             }
             between.truth(s(truth), |of, row| {
                 assert_eq!(of, s(row[0] as i64));
-                told.push(row[0] as i64);
+                runs.push(row[0] as i64);
             });
         }
-        told
+        runs
     }
 
     #[test]
-    fn only_where_a_truth_is_missing_runs_are_told() {
-        assert!(told(None, &[0, 10, 20, 30, 41, 50]).is_empty());
+    fn only_where_a_truth_is_missing_runs_are_given() {
+        assert!(runs(None, &[0, 10, 20, 30, 41, 50]).is_empty());
         let expected: Vec<i64> = (31..50).collect();
-        assert_eq!(told(None, &[0, 10, 20, 30, 50, 60]), expected);
+        assert_eq!(runs(None, &[0, 10, 20, 30, 50, 60]), expected);
         // From the first two alone it is not known what is usual.
-        assert!(told(None, &[0, 20, 30, 40, 50]).is_empty());
+        assert!(runs(None, &[0, 20, 30, 40, 50]).is_empty());
     }
 
     #[test]
     fn where_it_is_stated_how_far_apart_truths_are_wanted_that_is_usual() {
         let expected: Vec<i64> = (1..10).chain(11..20).collect();
-        assert_eq!(told(Some(d(5)), &[0, 10, 20]), expected);
-        assert!(told(Some(d(60)), &[0, 10, 20, 30]).is_empty());
+        assert_eq!(runs(Some(d(5)), &[0, 10, 20]), expected);
+        assert!(runs(Some(d(60)), &[0, 10, 20, 30]).is_empty());
     }
 
     #[test]
-    fn of_many_runs_those_a_sixteenth_of_the_usual_distance_apart_are_told() {
+    fn of_many_runs_those_a_sixteenth_of_the_usual_distance_apart_are_given() {
         let mut truths: Vec<i64> = (0..8).map(|nth| nth * 160).collect();
         truths.push(9 * 160);
-        let told = told(None, &truths);
-        assert_eq!(told.len(), 2 * 16, "{told:?}");
+        let runs = runs(None, &truths);
+        assert_eq!(runs.len(), 2 * 16, "{runs:?}");
         assert!(
-            told.windows(2).all(|pair| pair[1] - pair[0] == 10),
-            "{told:?}"
+            runs.windows(2).all(|pair| pair[1] - pair[0] == 10),
+            "{runs:?}"
         );
     }
 

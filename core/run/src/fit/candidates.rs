@@ -32,7 +32,7 @@ impl Validity {
         }
     }
 
-    /// Whether there was no row to tell candidates by.
+    /// Whether there was no row to judge candidates by.
     pub(super) fn knows_nothing(&self) -> bool {
         self.rows == 0
     }

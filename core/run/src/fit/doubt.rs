@@ -11,7 +11,7 @@ const WORSE_THAN_MEAN: f64 = 1.1;
 /// The share of a mean that rounding may make up.
 const ROUNDING: f64 = 1e-9;
 
-/// The share of the rows from which it is told what those that are incomplete lack.
+/// From this share of incomplete rows on, the report says what they lack.
 const MANY_INCOMPLETE: f64 = 0.01;
 /// So many of what they lack are named.
 const NAMED: usize = 3;
@@ -69,8 +69,8 @@ impl Lacking {
         named
     }
 
-    /// Tells where values were missing that cost a fit many of its rows, of which so many are complete.
-    pub(super) fn tell(&self, complete: u64, report: &mut TrainingReport) {
+    /// Notes where values were missing that cost a fit many of its rows, of which so many are complete.
+    pub(super) fn note(&self, complete: u64, report: &mut TrainingReport) {
         let many = MANY_INCOMPLETE * (complete + self.rows) as f64;
         if self.rows == 0 || (self.rows as f64) < many {
             return;
@@ -84,7 +84,7 @@ impl Lacking {
         report.figure("lacking", Figure::named(each));
     }
 
-    /// Fewer rows than are needed, told with what others lack.
+    /// Fewer rows than are needed, with what others lack.
     pub(super) fn too_few(&self, error: TrainingError, incomplete: u64) -> TrainingError {
         match error {
             TrainingError::TooFewRows { rows, needed } if incomplete > 0 => {
@@ -103,14 +103,14 @@ impl Lacking {
 
 /// The first of them, with their rows.
 fn in_words(named: &[(String, u64)]) -> String {
-    let told = named.iter().take(NAMED);
-    let told = told.map(|(name, rows)| format!("{name} ({})", count(*rows)));
+    let first = named.iter().take(NAMED);
+    let first = first.map(|(name, rows)| format!("{name} ({})", count(*rows)));
     let others = (named.len() > NAMED).then(|| "and others".to_owned());
-    told.chain(others).collect::<Vec<_>>().join(", ")
+    first.chain(others).collect::<Vec<_>>().join(", ")
 }
 
-/// Tells of the regressors that were left out since they stay the same.
-pub(super) fn tell_constant<'a>(names: impl Iterator<Item = &'a str>, report: &mut TrainingReport) {
+/// Notes the regressors that were left out since they stay the same.
+pub(super) fn note_constant<'a>(names: impl Iterator<Item = &'a str>, report: &mut TrainingReport) {
     let names: Vec<&str> = names.collect();
     if !names.is_empty() {
         let all = names.join(", ");
@@ -157,8 +157,8 @@ impl Truths {
         self.squares += off * (truth - self.mean);
     }
 
-    /// Tells of a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has, and
-    /// `learns` whether it is told truths while it runs.
+    /// Notes a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has, and
+    /// `learns` whether it sees truths while it runs.
     pub(super) fn doubt(
         self,
         predictor: &dyn Predictor,
@@ -185,7 +185,7 @@ impl Truths {
         self.doubt_large_error(report);
     }
 
-    /// Tells of a fit with so many coefficients that it can meet its rows whatever they are.
+    /// Notes a fit with so many coefficients that it can meet its rows whatever they are.
     fn doubt_few_rows(self, predictor: &dyn Predictor, report: &mut TrainingReport) {
         let terms = predictor.coefficients().map_or(Vec::new(), |all| all.terms);
         let fitted = terms.iter().filter(|term| term.value != 0.0).count();
@@ -199,7 +199,7 @@ impl Truths {
         }
     }
 
-    /// Tells of a fit that is clearly worse on its rows than their mean.
+    /// Notes a fit that is clearly worse on its rows than their mean.
     fn doubt_large_error(self, report: &mut TrainingReport) {
         let Some(rmse) = report.in_sample_rmse else {
             return;

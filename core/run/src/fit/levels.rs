@@ -300,8 +300,8 @@ impl<'a> Fitting<'a> {
             let mut engine = Engine::new(Arc::clone(self.plan), &part.fitted)?;
             let (stepped, progress) = (&mut self.stepped, &self.progress);
             let (fit, of) = (self.begun, self.fits);
-            let tell = |stepped| progress.tell(FitProgress::Ticks { stepped, fit, of });
-            tell(*stepped);
+            let report = |stepped| progress.report(FitProgress::Ticks { stepped, fit, of });
+            report(*stepped);
             let (truths, counted) = (&self.truths, &mut self.counted);
             *counted = Counted::default();
             let passed = pass(&mut engine, self.recording, |engine, event, _| {
@@ -316,7 +316,7 @@ impl<'a> Fitting<'a> {
                     counted.tick(truths.iter().any(came));
                     *stepped += 1;
                     if stepped.is_multiple_of(4096) {
-                        tell(*stepped);
+                        report(*stepped);
                     }
                 }
             })?;

@@ -50,10 +50,10 @@ impl FitOptions {
 /// Trains every estimator of a plan that needs it.
 ///
 /// The plan is stepped over the recording; at every new truth each estimator's row is the one that it saw at its last run
-/// at or before `τ − ahead`. `progress` is told from time to time how far it has come.
+/// at or before `τ − ahead`. `progress` is called from time to time with how far it has come.
 ///
 /// # Errors
-/// When the recording cannot be read. An estimator that cannot be fitted is told of in the report.
+/// When the recording cannot be read. An estimator that cannot be fitted stands in the report.
 pub fn fit(
     plan: &Arc<Plan>,
     recording: &dyn Recording,

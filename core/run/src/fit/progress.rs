@@ -1,4 +1,4 @@
-//! Decides what is told of a fit while it goes on; not how it is shown.
+//! What a fit reports while it goes on.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -25,7 +25,7 @@ pub enum FitProgress<'a> {
     },
 }
 
-/// Whom to tell, from any of the threads.
+/// Takes progress from any of the threads.
 pub(super) struct Listener<'a>(Mutex<&'a mut (dyn FnMut(FitProgress<'_>) + Send)>);
 
 impl<'a> Listener<'a> {
@@ -33,7 +33,7 @@ impl<'a> Listener<'a> {
         Self(Mutex::new(listener))
     }
 
-    pub(super) fn tell(&self, progress: FitProgress<'_>) {
+    pub(super) fn report(&self, progress: FitProgress<'_>) {
         let mut listener = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         listener(progress);
     }

@@ -1,4 +1,4 @@
-//! Decides what a fit tells about itself.
+//! What a fit reports about itself.
 
 use std::fmt;
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
 use super::collect::{Collector, Sink, Trainee};
-use super::doubt::{Lacking, Truths, tell_constant};
+use super::doubt::{Lacking, Truths, note_constant};
 use super::progress::{FitProgress, Listener};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
@@ -23,7 +23,7 @@ pub(super) struct Making {
     /// The candidates that were left out since they stay the same.
     constant: Vec<usize>,
     may_leave_out: MayLeaveOut,
-    /// Whether the estimator is told truths while it runs.
+    /// Whether the estimator sees truths while it runs.
     learns: bool,
     row: Vec<f64>,
     all: Vec<f64>,
@@ -104,7 +104,7 @@ impl Sink for Making {
     }
 }
 
-/// A fit, and what there is to tell about it.
+/// A fit, and its report.
 pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 
 /// Starts the fit of one estimator, now that it is known which candidates have values, and which of them stay the same.
@@ -217,7 +217,7 @@ pub(super) fn end(
             Some(error) => Err(error),
             None => {
                 let node = &node.instance();
-                let mut order = |nth, of| progress.tell(FitProgress::Order { node, nth, of });
+                let mut order = |nth, of| progress.report(FitProgress::Order { node, nth, of });
                 making.trainer.finish_telling(&mut order)
             }
         }
@@ -235,8 +235,8 @@ pub(super) fn end(
             mut report,
         }) => {
             let constant = making.constant.iter();
-            tell_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
-            making.lacking.tell(truths.rows, &mut report);
+            note_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
+            making.lacking.note(truths.rows, &mut report);
             let asked = (regressors.len(), making.learns);
             truths.doubt(predictor.as_ref(), asked, &mut report);
             (Outcome::Fitted(report), Some(predictor))

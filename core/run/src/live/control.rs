@@ -137,7 +137,7 @@ pub(super) fn pair(engine: Engine, replica: Engine, options: LiveOptions) -> (St
 }
 
 impl Control {
-    /// Takes in the ticks that have been stepped since the last call, and tells what happened. Call it often enough that
+    /// Takes in the ticks that have been stepped since the last call, and returns what happened. Call it often enough that
     /// the ring does not fill: at least once in [`LiveOptions::mirrored`] ticks.
     pub fn pump(&mut self) -> Vec<Notice> {
         let mut notices = Vec::new();

@@ -1,7 +1,7 @@
-//! Decides how a graph is run from a [`Source`](crate::recording::Source) to a [`Sink`], and how a running one is replaced: staged, watched in the shadow,
-//! handed over between two ticks, taken back; not where samples come from or go.
+//! A graph at work. A [`Session`] keeps its state, goes on after a restart, watches its sensors and outputs, and lets the graph be
+//! replaced: staged, compared in the shadow, handed over between two ticks, taken back.
 //!
-//! [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
+//! Below it, [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
 //! a hand-over. The **control thread** (or the same one, for recorded data) owns a [`Control`], to which every tick is
 //! mirrored through a bounded ring. It steps a replica of what runs, to the same bits, so that states are copied, candidates
 //! warmed and compared, and old graphs kept warm without the engine thread noticing.
@@ -16,24 +16,29 @@
 
 mod control;
 mod handover;
+pub mod monitor;
 mod refit;
 mod retained;
 mod run;
+pub mod session;
 mod shadow;
 mod sink;
 mod stage_error;
 mod staged;
 mod stepper;
+pub mod store;
 
 pub use control::{Control, Notice};
 pub use handover::Feed;
 pub use refit::Refit;
-pub use run::{RunError, run, run_keeping};
+pub use run::{RunError, run};
+pub use session::{Replacement, Report, Reporter, Session, SessionOptions};
 pub use shadow::{Compared, Shadow, Verdict};
 pub use sink::{Frame, Sink, SinkError};
 pub use stage_error::StageError;
 pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};
+pub use store::{StateError, StateStore};
 
 use std::sync::Arc;
 

@@ -25,17 +25,17 @@ impl Refit {
     /// Fits a model's graph anew on given data.
     #[must_use]
     pub fn on(model: &Model, data: impl Recording + Send + 'static, options: FitOptions) -> Self {
-        let (tell, outcome) = bounded(1);
+        let (sender, outcome) = bounded(1);
         let mut model = model.clone();
         let thread = std::thread::spawn(move || {
             let fitted = fit(&model.plan, &data, &options, &mut |_| {}).map(|(fitted, report)| {
                 model.fitted = fitted;
-                // The card tells of data that the new fit has not seen.
+                // The card is of data that the new fit has not seen.
                 model.card = None;
                 (model, report)
             });
             // Nobody may be waiting any more.
-            let _ = tell.send(fitted);
+            let _ = sender.send(fitted);
         });
         Self {
             outcome,

@@ -1,15 +1,14 @@
-//! Decides how an engine is run from a source to a sink on one thread; where both are is theirs.
+//! An engine from a source to a sink, on one thread, without a session.
 
 use std::fmt;
 
-use super::{Frame, Sink, SinkError};
-use crate::engine::{Engine, EngineError};
+use super::{Frame, Sink, SinkError, StageError, StateError};
+use crate::engine::{Engine, EngineError, RestoreError};
 use crate::recording::{Event, Source, SourceError, drive};
 
 /// Steps an engine through all that a source gives, and puts out what comes of it.
 ///
-/// Each tick is put out before the next samples are asked for. Ticks that the engine refuses, because their time is not
-/// after the last one, are counted by it and passed over.
+/// Each row is answered before the next is read. Rows whose timestamp does not increase are skipped and counted.
 ///
 /// # Errors
 /// When the source, the sink or the engine fails.
@@ -18,34 +17,8 @@ pub fn run(
     source: &mut dyn Source,
     sink: &mut dyn Sink,
 ) -> Result<(), RunError> {
-    run_keeping(engine, source, sink, &mut |_, _| Ok(()))
-}
-
-/// The same, with a look at the engine after each tick that has been put out: to keep a
-/// [`snapshot`](Engine::snapshot) now and then, from which another run goes on. The sink is to be [flushed](Sink::flush) before.
-///
-/// # Errors
-/// When the source, the sink, the engine or `keep` fails.
-pub fn run_keeping(
-    engine: &mut Engine,
-    source: &mut dyn Source,
-    sink: &mut dyn Sink,
-    keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
-) -> Result<(), RunError> {
-    let ended = run_to_the_end(engine, source, sink, keep);
-    // Also after an error: what was put out until then is not to be lost.
-    let finished = sink.finish().map_err(RunError::Sink);
-    ended.and(finished)
-}
-
-fn run_to_the_end(
-    engine: &mut Engine,
-    source: &mut dyn Source,
-    sink: &mut dyn Sink,
-    keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
-) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
-    drive(engine, source, |engine, event, samples| {
+    let ended = drive(engine, source, |engine, event, samples| {
         let Event::Row(time) = event else {
             return Ok(());
         };
@@ -55,10 +28,11 @@ fn run_to_the_end(
             revision: &revision,
             outputs: engine.outputs(),
         };
-        sink.put(&frame).map_err(RunError::Sink)?;
-        keep(engine, sink).map_err(RunError::Keep)
-    })
-    .map(drop)
+        sink.put(&frame).map_err(RunError::Sink)
+    });
+    // Also after an error: what was put out until then is not to be lost.
+    let finished = sink.finish().map_err(RunError::Sink);
+    ended.and(finished)
 }
 
 /// Why a run ended before its source did.
@@ -70,15 +44,22 @@ pub enum RunError {
     Engine(EngineError),
     /// The outputs cannot be put out.
     Sink(SinkError),
-    /// What the engine knows cannot be kept.
-    Keep(SinkError),
+    /// A graph cannot take over.
+    Stage(StageError),
+    /// The state cannot be used.
+    State(StateError),
+    /// A node does not take its own state back, so that the engine cannot be copied.
+    Copy(RestoreError),
 }
 
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Source(error) | Self::Sink(error) | Self::Keep(error) => error.fmt(f),
+            Self::Source(error) | Self::Sink(error) => error.fmt(f),
             Self::Engine(error) => error.fmt(f),
+            Self::Stage(error) => error.fmt(f),
+            Self::State(error) => error.fmt(f),
+            Self::Copy(error) => error.fmt(f),
         }
     }
 }
@@ -94,5 +75,23 @@ impl From<SourceError> for RunError {
 impl From<EngineError> for RunError {
     fn from(error: EngineError) -> Self {
         Self::Engine(error)
+    }
+}
+
+impl From<StageError> for RunError {
+    fn from(error: StageError) -> Self {
+        Self::Stage(error)
+    }
+}
+
+impl From<StateError> for RunError {
+    fn from(error: StateError) -> Self {
+        Self::State(error)
+    }
+}
+
+impl From<RestoreError> for RunError {
+    fn from(error: RestoreError) -> Self {
+        Self::Copy(error)
     }
 }

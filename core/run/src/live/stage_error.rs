@@ -51,7 +51,7 @@ pub enum StageError {
 }
 
 impl StageError {
-    /// Why a plan cannot take over from another, as far as the two of them tell.
+    /// Why a plan cannot take over from another, as far as the two of them show.
     #[must_use]
     pub fn between(running: &Plan, new: &Plan) -> Option<Self> {
         if new.time != running.time {

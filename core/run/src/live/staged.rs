@@ -1,4 +1,4 @@
-//! A graph that is ready to take over, and what is told of it; decides nothing of when it does.
+//! A graph that is ready to take over.
 
 use std::fmt;
 

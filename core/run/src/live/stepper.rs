@@ -32,6 +32,8 @@ pub struct Stepper {
 /// What came of a tick.
 #[derive(Debug)]
 pub struct Stepped<'a> {
+    /// How many graphs have taken over so far.
+    pub generation: u64,
     /// The revision of the graph that made the outputs. Graphs of one revision compute the same, but may give it in another order.
     pub revision: &'a str,
     /// Its plan, in whose order the outputs are.
@@ -106,6 +108,7 @@ impl Stepper {
             engine, revision, ..
         } = &*self.seated;
         Ok(Stepped {
+            generation: self.generation,
             revision,
             plan: engine.plan(),
             outputs: engine.outputs(),

@@ -83,11 +83,11 @@ impl fmt::Display for ModelError {
                     "{path}: what was fitted cannot be used as it stands there"
                 )?;
                 for (node, mistakes) in &refused[..refused.len().min(MOST)] {
-                    let told = mistakes.iter().map(|mistake| match &mistake.help {
+                    let texts = mistakes.iter().map(|mistake| match &mistake.help {
                         Some(help) => format!("{} ({help})", mistake.message),
                         None => mistake.message.clone(),
                     });
-                    write!(f, "\n  `{node}`: {}", told.collect::<Vec<_>>().join("; "))?;
+                    write!(f, "\n  `{node}`: {}", texts.collect::<Vec<_>>().join("; "))?;
                 }
                 let more = refused.len().saturating_sub(MOST);
                 if more > 0 {

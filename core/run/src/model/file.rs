@@ -266,7 +266,7 @@ impl Model {
         }
     }
 
-    /// Between which values the samples of each measured channel lay in the data of the fit, as far as the card tells.
+    /// Between which values the samples of each measured channel lay in the data of the fit, as far as the card knows.
     #[must_use]
     pub fn sample_ranges(&self) -> &[SampleRange] {
         self.card.as_ref().map_or(&[], |card| &card.ranges)
@@ -324,6 +324,12 @@ impl Model {
     /// When what was fitted does not belong to the graph.
     pub fn engine(&self) -> Result<Engine, ModelError> {
         Ok(Engine::new(Arc::clone(&self.plan), &self.fitted)?)
+    }
+
+    /// The revision of a model that can be run.
+    #[must_use]
+    pub fn revision(&self) -> Option<String> {
+        Some(self.engine().ok()?.revision().to_owned())
     }
 
     /// The model as text: JSON, readable and the same for the same model.

@@ -1,4 +1,4 @@
-//! Decides which combiners are told of as going by too few truths to do what they are for.
+//! Combiners that go by too few truths to do what they are for.
 
 use serde::Serialize;
 
@@ -15,7 +15,8 @@ pub struct Lack {
     /// The combiner: `guard.Z1`.
     pub node: String,
     /// How many truths came.
-    pub told: u64,
+    #[serde(rename = "told")]
+    pub came: u64,
     /// How many it takes.
     pub needed: f64,
     /// The most that counted at a tick.
@@ -27,12 +28,12 @@ pub struct Lack {
 }
 
 impl Lack {
-    /// A sentence for each; for members of a node of which the same is to be told, one.
+    /// A sentence for each; one for all members of a node of which the same is true.
     #[must_use]
     pub fn warnings(lacks: &[Self]) -> Vec<String> {
         let mut groups: Vec<(&Self, usize)> = Vec::new();
         for lack in lacks {
-            match groups.iter_mut().find(|(told, _)| told.is_like(lack)) {
+            match groups.iter_mut().find(|(of, _)| of.is_like(lack)) {
                 Some((_, more)) => *more += 1,
                 None => groups.push((lack, 0)),
             }
@@ -51,7 +52,7 @@ impl Lack {
     /// What it lacks, whichever combiner it is.
     fn what(&self) -> String {
         let Self {
-            told,
+            came,
             needed,
             most,
             enough,
@@ -65,27 +66,27 @@ impl Lack {
                 "{needs} had as many at only {share:.0}% of the ticks since it first did; {remedy} lets more count"
             );
         }
-        let came = count(told);
-        if (*told as f64) < *needed {
-            return format!("{needs} the data have {came} for it, so it acted on none");
+        let in_all = count(came);
+        if (*came as f64) < *needed {
+            return format!("{needs} the data have {in_all} for it, so it acted on none");
         }
         let most = match (most * 10.0).round() / 10.0 {
             0.0 => "any".to_owned(),
             most => format!("more than {}", count(most)),
         };
         format!(
-            "{needs} never had {most} of the {came} that came, so it acted on none; {remedy} lets more count"
+            "{needs} never had {most} of the {in_all} that came, so it acted on none; {remedy} lets more count"
         )
     }
 
-    /// Whether another member of the same node is to be told of in the same words.
+    /// Whether another member of the same node lacks the same.
     fn is_like(&self, other: &Self) -> bool {
         let names = [self, other].map(|lack| lack.node.split('.').next());
         names[0] == names[1] && self.what() == other.what()
     }
 }
 
-/// What is to be told of all combiners.
+/// What the combiners lack.
 pub(super) fn lacks(tallies: &[Tally]) -> Vec<Lack> {
     tallies.iter().filter_map(Tally::lack).collect()
 }
@@ -101,34 +102,35 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// One for each combiner that is told truths.
+    /// One for each combiner that sees truths.
     pub(super) fn all(plan: &Plan) -> Vec<Self> {
         let nodes = plan.nodes.iter().enumerate();
-        let told = nodes
+        let seeing = nodes
             .filter(|(_, node)| matches!(node.role, PlannedRole::Combiner { truth: Some(_), .. }));
-        told.map(|(node, planned)| Self {
-            node,
-            lack: Lack {
-                node: planned.instance(),
-                told: 0,
-                needed: 0.0,
-                most: 0.0,
-                enough: 0.0,
-                remedy: "",
-            },
-            ticks: 0,
-            enough: 0,
-        })
-        .collect()
+        seeing
+            .map(|(node, planned)| Self {
+                node,
+                lack: Lack {
+                    node: planned.instance(),
+                    came: 0,
+                    needed: 0.0,
+                    most: 0.0,
+                    enough: 0.0,
+                    remedy: "",
+                },
+                ticks: 0,
+                enough: 0,
+            })
+            .collect()
     }
 
     /// Looks at what a tick did.
     pub(super) fn look(&mut self, engine: &Engine) {
-        let Some((told, evidence)) = engine.evidence(self.node) else {
+        let Some((came, evidence)) = engine.evidence(self.node) else {
             return;
         };
         let lack = &mut self.lack;
-        (lack.told, lack.needed, lack.remedy) = (told, evidence.needed, evidence.remedy);
+        (lack.came, lack.needed, lack.remedy) = (came, evidence.needed, evidence.remedy);
         lack.most = lack.most.max(evidence.truths);
         let enough = evidence.truths >= evidence.needed;
         if enough || self.ticks > 0 {
@@ -137,10 +139,10 @@ impl Tally {
         }
     }
 
-    /// What is to be told of it, if anything.
+    /// What it lacks, if anything.
     fn lack(&self) -> Option<Lack> {
         let enough = self.enough as f64 / self.ticks.max(1) as f64;
-        let lacks = self.lack.told > 0 && enough < MOSTLY;
+        let lacks = self.lack.came > 0 && enough < MOSTLY;
         lacks.then(|| Lack {
             enough,
             ..self.lack.clone()

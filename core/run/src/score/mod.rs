@@ -40,7 +40,7 @@ pub struct ScoreOptions {
 ///
 /// A truth at `τ` is compared with the output of the predicting node's last run at or before `τ − ahead`. Estimators that
 /// learn do so on the way, each truth after its prediction has been made: test, then train. `progress` is
-/// told the number of ticks stepped so far.
+/// called with the number of ticks stepped so far.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the plan.

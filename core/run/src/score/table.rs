@@ -62,7 +62,7 @@ pub struct Score {
     pub r2_zero: Option<f64>,
     /// 1 − SSE / Σ (y − ȳ)².
     pub r2_mean: Option<f64>,
-    /// How much of the truth's spread is told, in percent: 100 (1 − √(SSE / Σ (y − ȳ)²)) (Ljung 1999, section 16.4).
+    /// How much of the truth's spread is predicted, in percent: 100 (1 − √(SSE / Σ (y − ȳ)²)) (Ljung 1999, section 16.4).
     pub fit: Option<f64>,
     /// Mean error.
     pub bias: Option<f64>,
@@ -157,7 +157,7 @@ pub(super) fn table(
 }
 
 /// For each node how much earlier than in one step the truths lie that it goes by, itself or through what it is made of; none where
-/// it goes by its own predictions of them. Steps from truth to truth are told as long as they typically are.
+/// it goes by its own predictions of them. Steps from truth to truth are given as long as they typically are.
 fn earlier(plan: &Plan, engine: &Engine, truths: &[Truth], mode: Mode) -> Vec<Option<Duration>> {
     let between = |node: &PlannedNode| {
         let slot = node.role.truth()?.slot;
@@ -249,7 +249,7 @@ fn scores(
             let mean = mean(truths());
             let mut range = Extremes::NONE;
             truths().for_each(|y| range.include(y));
-            // What differs by rounding alone has no spread that could be told.
+            // What differs by rounding alone has no spread that could be predicted.
             let about_mean = mean.filter(|_| !range.is_one_value());
             let about_mean =
                 about_mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());

@@ -1,4 +1,4 @@
-//! Decides what is told of truths and predictions one by one, for whoever works out more than a score.
+//! Truths and predictions one by one, for whoever works out more than a score.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -58,7 +58,7 @@ pub struct PredictionTrace {
     pub values: Vec<f64>,
 }
 
-/// Steps a plan over a recording, cold, and writes down every truth with its predictions. `look` is told of each tick and each
+/// Steps a plan over a recording, cold, and writes down every truth with its predictions. `look` sees each tick and each
 /// segment break.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Decides what is told of a prediction of which nothing is scored; not in what words.
+//! Why nothing of a prediction is scored.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! Decides how a graph corrects a simulated machine: what it is told, what it asks for, when that acts; not what is right to ask.
+//! A graph that corrects a simulated machine: what it sees, what it asks for, when that acts.
 
 use super::recording::unit_of;
 use super::{Machine, MachineError, Row, Simulation};
@@ -11,7 +11,7 @@ use crate::unit::Unit;
 ///
 /// At every row the graph sees what was measured and, as the signal `applied`, the correction that was in force while it
 /// was. Its outputs `correction.AXIS` are then asked of the machine, which may clip them; what it applies acts until
-/// the next row. An axis of which the graph says nothing keeps its correction.
+/// the next row. An axis without such an output keeps its correction.
 pub struct ClosedLoop {
     simulation: Box<dyn Simulation>,
     engine: Engine,

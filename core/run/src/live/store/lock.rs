@@ -1,54 +1,27 @@
-//! Decides that of two runs no more than one writes a file: by a lock beside it, which goes with the program however it ends. Not what is
-//! written.
+//! Locks: of two runs no more than one writes a file. The lock goes with the program, however it ends.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::terminal::Failure;
-
-/// How long one may take that has just been told to end.
+/// How long a run may take to end after its signal.
 const ENDS: Duration = Duration::from_secs(1);
 
 /// A file that no other run writes for as long as this lives; any, where there are no locks.
-pub struct Held {
+#[derive(Debug)]
+pub struct FileLock {
     lock: Option<(PathBuf, File)>,
 }
 
-impl Held {
-    /// Holds a state.
-    ///
-    /// # Errors
-    /// When another run does.
-    pub fn state(path: &Path) -> Result<Self, Failure> {
-        Self::of(path).ok_or_else(|| {
-            Failure::Outside(format!(
-                "{}: another run keeps there what it knows: end that one first, or name another file with `--state`",
-                path.display()
-            ))
-        })
-    }
-
-    /// Holds an output, where it is a file.
-    ///
-    /// # Errors
-    /// When another run does.
-    pub fn output(path: &Path) -> Result<Self, Failure> {
+impl FileLock {
+    /// Locks a file by an empty one beside it, `FILE.held`, which stays where it is when the file is replaced. None where another
+    /// run holds it for more than a second. A path that cannot be written, or is no file, is not locked.
+    #[must_use]
+    pub fn acquire(path: &Path) -> Option<Self> {
         let is_file = fs::metadata(path).map_or(path.as_os_str() != "-", |of| of.is_file());
         if !is_file {
-            return Ok(Self { lock: None });
+            return Some(Self { lock: None });
         }
-        Self::of(path).ok_or_else(|| {
-            Failure::Outside(format!(
-                "{}: another run writes it: end that one first, or name another file with `--output`",
-                path.display()
-            ))
-        })
-    }
-
-    /// Holds a file by one beside it, which nobody reads and which stays where it is when the file is put in place of another; none
-    /// where somebody else does.
-    fn of(path: &Path) -> Option<Self> {
         let mut beside = fs::canonicalize(path)
             .unwrap_or_else(|_| path.to_owned())
             .into_os_string();
@@ -61,7 +34,7 @@ impl Held {
                 .create(true)
                 .truncate(false)
                 .open(&beside);
-            // A file that cannot be written, as on a disk that is full, is told of by who writes it.
+            // Whoever writes the file reports why it cannot be written, as on a full disk.
             let Ok(file) = opened else {
                 return Some(Self { lock: None });
             };
@@ -83,10 +56,10 @@ impl Held {
     }
 }
 
-impl Drop for Held {
+impl Drop for FileLock {
     fn drop(&mut self) {
         if let Some((beside, file)) = self.lock.take() {
-            // While it is held, so that nobody else's is removed; nor one with something in it, which is no lock of a run.
+            // While it is locked, so that nobody else's is removed; nor one with something in it, which is no lock of a run.
             if file.metadata().is_ok_and(|of| of.len() == 0) {
                 let _ = fs::remove_file(beside);
             }
@@ -116,22 +89,22 @@ mod tests {
     fn a_file_is_held_by_one_alone_until_it_lets_go_and_nothing_is_left_beside_it() {
         let name = format!("athermal-held-{}", std::process::id());
         let path = std::env::temp_dir().join(name);
-        let held = Held::state(&path).unwrap();
+        let held = FileLock::acquire(&path).unwrap();
         let beside = path.with_extension("held");
         assert!(beside.exists());
-        let refused = Held::state(&path).err().unwrap();
-        assert!(matches!(refused, Failure::Outside(_)));
+        assert!(FileLock::acquire(&path).is_none());
         // One that is just ending is waited for.
         let ending = std::thread::spawn(move || {
             std::thread::sleep(Duration::from_millis(100));
             drop(held);
         });
-        let next = Held::state(&path).unwrap();
+        let next = FileLock::acquire(&path).unwrap();
         ending.join().unwrap();
-        assert!(beside.exists() && Held::output(&path).is_err());
+        assert!(beside.exists() && FileLock::acquire(&path).is_none());
         drop(next);
         assert!(!beside.exists());
-        assert!(Held::output(Path::new("-")).unwrap().lock.is_none());
-        assert!(Held::state(&path.join("nowhere")).unwrap().lock.is_none());
+        assert!(FileLock::acquire(Path::new("-")).unwrap().lock.is_none());
+        let nowhere = path.join("nowhere");
+        assert!(FileLock::acquire(&nowhere).unwrap().lock.is_none());
     }
 }

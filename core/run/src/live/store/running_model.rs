@@ -1,17 +1,16 @@
-//! Decides with which graph a watched run goes on: the file that is given, or what ran last, which is kept beside the state. Not what
-//! it knows.
+//! The graph that runs, in a file beside the state.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use athermal::Model;
-use athermal::core::engine::EngineState;
-
-use crate::command::aside::whole_aside;
+use super::write_whole;
+use crate::engine::EngineState;
+use crate::model::Model;
 
 /// The graph that runs, in a file beside the state, which is of use with it alone.
-pub struct Ran {
+#[derive(Debug)]
+pub(super) struct RunningModel {
     path: PathBuf,
     /// Where the graph before is until the state of the one after it is written: at no time is a state without its graph.
     before: PathBuf,
@@ -19,9 +18,9 @@ pub struct Ran {
     holds: Option<String>,
 }
 
-impl Ran {
+impl RunningModel {
     /// That of this state.
-    pub fn beside(state: &Path) -> Self {
+    pub(super) fn beside(state: &Path) -> Self {
         let with = |ending: &str| {
             let mut path = state.as_os_str().to_owned();
             path.push(ending);
@@ -35,23 +34,23 @@ impl Ran {
     }
 
     /// The files.
-    pub fn paths(&self) -> [&Path; 2] {
-        [&self.path, &self.before]
+    pub(super) fn paths(&self) -> [PathBuf; 2] {
+        [self.path.clone(), self.before.clone()]
     }
 
     /// The graph that a state belongs to; none where there is no such state or graph.
-    pub fn of_state(&self, state: &Path) -> Option<Model> {
+    pub(super) fn of_state(&self, state: &Path) -> Option<Model> {
         let state = EngineState::from_bytes(&fs::read(state).ok()?).ok()?;
-        let of_state = |model: &Model| revision(model).as_deref() == Some(state.revision());
+        let of_state = |model: &Model| model.revision().as_deref() == Some(state.revision());
         let models = self.paths().map(|path| Model::load(path).ok());
         models.into_iter().flatten().find(of_state)
     }
 
-    /// Keeps what runs, where it is not there yet.
+    /// Saves what runs, where it is not there yet.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn keep(&mut self, model: &Model, revision: &str) -> io::Result<()> {
+    pub(super) fn save(&mut self, model: &Model, revision: &str) -> io::Result<()> {
         if self.holds.as_deref() == Some(revision) {
             return Ok(());
         }
@@ -60,20 +59,15 @@ impl Ran {
             if self.path.exists() && !self.before.exists() {
                 fs::rename(&self.path, &self.before)?;
             }
-            whole_aside(&self.path, text.as_bytes())?;
+            write_whole(&self.path, text.as_bytes())?;
         }
         self.holds = Some(revision.to_owned());
         Ok(())
     }
 
-    /// Lets go of the graph before, once no state belongs to it.
-    pub fn let_go(&self) {
+    /// Removes the graph before, once no state belongs to it.
+    pub(super) fn remove_before(&self) {
         // What is left of it is of no use, and no harm.
         let _ = fs::remove_file(&self.before);
     }
-}
-
-/// The revision of a model that can be run.
-pub fn revision(model: &Model) -> Option<String> {
-    Some(model.engine().ok()?.revision().to_owned())
 }

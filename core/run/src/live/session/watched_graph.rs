@@ -1,14 +1,13 @@
-//! Decides when a graph has changed on disk, in its own file, in one that it extends or takes modules from, or in the model that it
-//! names; not what is done then.
+//! When a graph has changed on disk: in its own file, in one that it extends or takes modules from, or in the model that it names.
 
 use std::cell::RefCell;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{self, Disk, FileReader};
-use athermal::run::model::named_model;
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::{self, Disk, FileReader};
+use crate::model::named_model;
 
 /// When a file was written, and how long it is; none where there is no file.
 type Written = Option<(SystemTime, u64)>;
@@ -22,29 +21,31 @@ pub(super) enum Went {
 }
 
 /// A graph on disk, as it was when it was last looked at.
-pub(super) struct Watched {
+#[derive(Debug)]
+pub struct WatchedGraph {
     /// Its own file.
-    pub(super) path: PathBuf,
+    path: PathBuf,
     files: Vec<(PathBuf, Written)>,
     /// How files that have changed were at the last look.
     changing: Option<Vec<Written>>,
     /// Whether something else ran when it was first looked at.
-    pub(super) is_unlike: bool,
+    is_unlike: bool,
     /// A file that was not there at the last look.
     gone: Option<PathBuf>,
-    /// One of which that has been told.
-    told_gone: Option<PathBuf>,
+    /// One that has been reported.
+    reported_gone: Option<PathBuf>,
 }
 
-impl Watched {
+impl WatchedGraph {
     /// The graph or model in a file, as it is now.
-    pub(super) fn of(path: &Path) -> Self {
+    #[must_use]
+    pub fn of(path: &Path) -> Self {
         let noting = Noting::default();
         if path
             .extension()
             .is_some_and(|extension| extension == "toml")
         {
-            // Mistakes are told when the graph is taken over; its files are watched all the same.
+            // Mistakes are reported when the graph is staged; its files are watched all the same.
             let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
             let read = document::load(path, &noting, &mut sources, &mut diagnostics);
             let model = read.and_then(|read| named_model(&read.tree, &sources));
@@ -60,17 +61,30 @@ impl Watched {
             changing: None,
             is_unlike: false,
             gone: None,
-            told_gone: None,
+            reported_gone: None,
         }
     }
 
     /// The same where something else runs, so that it has changed as soon as it is there.
-    pub(super) fn unlike(mut self) -> Self {
+    #[must_use]
+    pub fn unlike(mut self) -> Self {
         for (_, seen) in &mut self.files {
             *seen = None;
         }
         self.is_unlike = true;
         self
+    }
+
+    /// Its own file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether something else ran when it was first looked at.
+    #[must_use]
+    pub fn is_unlike(&self) -> bool {
+        self.is_unlike
     }
 
     /// Whether a file has been written since, and none is being written: they are as they were at the last look. Half of a graph
@@ -97,11 +111,11 @@ impl Watched {
         let gone = files.find(|(path, seen)| seen.is_some() && written(path).is_none());
         let gone = gone.map(|(path, _)| path.clone());
         let before = std::mem::replace(&mut self.gone, gone.clone());
-        if gone != before || gone == self.told_gone {
+        if gone != before || gone == self.reported_gone {
             return None;
         }
-        let told = std::mem::replace(&mut self.told_gone, gone.clone());
-        gone.map(Went::Away).or(told.map(Went::Back))
+        let reported = std::mem::replace(&mut self.reported_gone, gone.clone());
+        gone.map(Went::Away).or(reported.map(Went::Back))
     }
 
     fn now(&self) -> Vec<Written> {
@@ -158,7 +172,7 @@ mod tests {
         let name = format!("athermal-watched-{}.toml", std::process::id());
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, "schema = 1\n").unwrap();
-        let mut watched = Watched::of(&path);
+        let mut watched = WatchedGraph::of(&path);
         assert!(!watched.changed());
         std::fs::write(&path, "schema = 1\nname = \"half").unwrap();
         assert!(!watched.changed(), "it may be half of it");
@@ -178,7 +192,7 @@ mod tests {
         let (graph, model) = (file("toml"), file("json"));
         let text = format!("schema = 1\nmodel = {:?}\n", model.file_name().unwrap());
         std::fs::write(&graph, text).unwrap();
-        let mut watched = Watched::of(&graph);
+        let mut watched = WatchedGraph::of(&graph);
         assert!(!watched.changed() && !watched.changed());
         std::fs::write(&model, "{}").unwrap();
         assert!(!watched.changed(), "it may be half of it");

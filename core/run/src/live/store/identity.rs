@@ -1,12 +1,11 @@
-//! Decides whether an output still stands where it was begun, and what is told where it does not; not where it is written.
+//! Whether an output file still stands where it was begun.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::terminal::Terminal;
-
 /// An output file that has been begun.
-pub struct Standing {
+#[derive(Debug)]
+pub struct OutputIdentity {
     path: PathBuf,
     /// Which file it is; none where it is no file, or that cannot be known.
     place: Option<Place>,
@@ -15,9 +14,10 @@ pub struct Standing {
 /// A device and a number on it, which is not given again while the file is open.
 type Place = (u64, u64);
 
-impl Standing {
+impl OutputIdentity {
     /// The output that has just been opened at a path.
-    pub fn at(path: &Path) -> Self {
+    #[must_use]
+    pub fn of(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
             place: Some(path)
@@ -26,17 +26,13 @@ impl Standing {
         }
     }
 
-    /// Tells, once, that the file is no longer the one that its name leads to.
-    pub fn look(&mut self, terminal: &Terminal) {
+    /// Its path, once, when the file there is no longer the one that was opened.
+    pub(crate) fn moved(&mut self) -> Option<&Path> {
         if self.place.is_none() || place(&self.path) == self.place {
-            return;
+            return None;
         }
         self.place = None;
-        terminal.warning(format_args!(
-            "{} was removed, moved or replaced while it is written: rows go on into the file that was there, and none into what is there \
-             now; end the run before it is moved, or copy it and cut it to nothing",
-            self.path.display()
-        ));
+        Some(&self.path)
     }
 }
 

@@ -1,0 +1,296 @@
+//! Which graphs take over during a run, and when.
+
+use std::path::{Path, PathBuf};
+
+use super::watched_graph::Went;
+use super::{
+    Refusal, Replacement, Report, Reporter, Swap, SwapTime, WatchedGraph, load_replacement,
+};
+use crate::live::{Control, StageError, Staged};
+use crate::model::Model;
+use crate::time::{Duration, Instant};
+
+/// How often a watched file is looked at, however fast or slowly rows come.
+const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(200);
+
+/// So few values of an output may be missing in the past by chance.
+const FEW: f64 = 10.0;
+
+/// Which graphs take over during a run, and when.
+#[derive(Debug)]
+pub(super) struct SwapSchedule {
+    /// Latest first, once there has been a row.
+    waiting: Vec<Swap>,
+    first: Option<Instant>,
+    running: Model,
+    staged: Option<(Model, PathBuf)>,
+    watched: Option<WatchedGraph>,
+    shadow: Option<Duration>,
+    margin: f64,
+    looked: std::time::Instant,
+    /// The outputs that are put out.
+    columns: Vec<String>,
+    /// At how many rows each of them had a value, of whichever graph.
+    gave: Vec<u64>,
+    rows: u64,
+}
+
+impl SwapSchedule {
+    pub(super) fn new(running: Model, replacement: Replacement) -> Self {
+        Self {
+            waiting: replacement.swaps,
+            first: None,
+            running,
+            staged: None,
+            watched: replacement.watched,
+            shadow: replacement.shadow,
+            margin: replacement.margin,
+            looked: std::time::Instant::now(),
+            columns: Vec::new(),
+            gave: Vec::new(),
+            rows: 0,
+        }
+    }
+
+    /// The graph that runs, once the row has been stepped before which it took over.
+    pub(super) fn running(&self) -> &Model {
+        &self.running
+    }
+
+    /// The outputs that are put out.
+    pub(super) fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Puts out these outputs.
+    pub(super) fn set_columns(&mut self, columns: Vec<String>) {
+        self.gave = vec![0; columns.len()];
+        self.columns = columns;
+    }
+
+    /// Counts which columns have a value at a row.
+    pub(super) fn count(&mut self, values: &[f64]) {
+        for (gave, value) in self.gave.iter_mut().zip(values) {
+            *gave += u64::from(!value.is_nan());
+        }
+    }
+
+    /// Adds a graph that takes over as soon as it may, after those added before.
+    pub(super) fn add(&mut self, path: PathBuf, model: Model) {
+        let at = SwapTime::After(Duration::ZERO);
+        let is_due =
+            |swap: &Swap| matches!(swap.at, SwapTime::After(time) if time == Duration::ZERO);
+        let nth = self.first.and(self.waiting.iter().position(is_due));
+        let nth = nth.unwrap_or(self.waiting.len());
+        self.waiting.insert(nth, Swap { at, path, model });
+    }
+
+    /// Does what is due before the row at `now`.
+    ///
+    /// # Errors
+    /// When a graph named at the start cannot take over.
+    pub(super) fn before(
+        &mut self,
+        control: &mut Control,
+        now: Instant,
+        reporter: &dyn Reporter,
+    ) -> Result<(), StageError> {
+        self.rows += 1;
+        let first = *self.first.get_or_insert_with(|| {
+            // Of two for the same time, the first named takes over first.
+            self.waiting.reverse();
+            self.waiting
+                .sort_by_key(|swap| std::cmp::Reverse(swap.at.instant(now)));
+            now
+        });
+        let next = self.waiting.last();
+        let due = next.is_some_and(|swap| swap.at.instant(first) <= now);
+        let look = self.watched.is_some() && self.looked.elapsed() >= LOOK_EVERY;
+        if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
+            return Ok(());
+        }
+        pump(control, reporter);
+        if look {
+            self.look(control, now, reporter);
+        }
+        // One at a time: what is committed takes over with this row, and only then may the next be staged.
+        if self.staged.is_some() {
+            return match self.judge(control, reporter) {
+                Err(error) if self.watched.is_some() => {
+                    self.refuse(control, &error, reporter);
+                    Ok(())
+                }
+                judged => judged,
+            };
+        }
+        if due
+            && let Some(Swap {
+                path, mut model, ..
+            }) = self.waiting.pop()
+        {
+            model.take_fits_of(&self.running);
+            return self.stage(control, model, path, now, reporter);
+        }
+        Ok(())
+    }
+
+    /// Stages the watched file where it has changed; with a mistake in it, what runs goes on. What is in the shadow goes when it
+    /// stands in the file no more.
+    fn look(&mut self, control: &mut Control, now: Instant, reporter: &dyn Reporter) {
+        self.looked = std::time::Instant::now();
+        let Some(watched) = &mut self.watched else {
+            return;
+        };
+        let path = watched.path().to_owned();
+        if !watched.changed() {
+            match watched.went() {
+                Some(Went::Away(away)) => {
+                    reporter.report(Report::FileGone(&away));
+                    if self.staged.is_some() {
+                        self.withdraw(control, &path, Refusal::Gone, reporter);
+                    }
+                }
+                Some(Went::Back(back)) => reporter.report(Report::FileBack(&back)),
+                None => {}
+            }
+            return;
+        }
+        *watched = WatchedGraph::of(&path);
+        let loaded = load_replacement(&path, std::iter::once(&self.running), reporter);
+        if self.staged.is_some() {
+            let revision = loaded.as_ref().ok().and_then(Model::revision);
+            let staged = control.staged().map(Staged::revision);
+            if revision.is_some() && revision.as_deref() == staged {
+                self.staged = loaded.ok().zip(Some(path));
+                return;
+            }
+            self.withdraw(control, &path, Refusal::Changed, reporter);
+            if revision.is_some() && revision == self.running.revision() {
+                reporter.report(Report::RunsAlready(&path));
+                return;
+            }
+        }
+        let refused = |reason| {
+            let path = &path;
+            reporter.report(Report::NotTakenOver { path, reason });
+        };
+        let model = match loaded {
+            Ok(model) => model,
+            Err(error) => return refused(Refusal::Unusable(error)),
+        };
+        let mut outputs = model.plan.outputs.iter();
+        let is_new = |name: &String| !self.columns.contains(name);
+        if let Some(new) = outputs.find(|output| is_new(&output.name)) {
+            refused(Refusal::NoColumn(&new.name));
+        } else if let Err(error) = self.stage(control, model, path, now, reporter) {
+            self.refuse(control, &error, reporter);
+        }
+    }
+
+    /// Lets go of what is in the shadow, since its file is no more what it was.
+    fn withdraw(
+        &mut self,
+        control: &mut Control,
+        path: &Path,
+        reason: Refusal<'_>,
+        reporter: &dyn Reporter,
+    ) {
+        self.staged = None;
+        control.discard();
+        reporter.report(Report::NotTakenOver { path, reason });
+    }
+
+    /// Lets go of the watched file as it has become.
+    fn refuse(&mut self, control: &mut Control, error: &StageError, reporter: &dyn Reporter) {
+        if let Some(path) = self.watched.as_ref().map(|of| of.path().to_owned()) {
+            self.withdraw(control, &path, Refusal::Stage(error), reporter);
+        }
+    }
+
+    fn stage(
+        &mut self,
+        control: &mut Control,
+        model: Model,
+        path: PathBuf,
+        now: Instant,
+        reporter: &dyn Reporter,
+    ) -> Result<(), StageError> {
+        let staged = control.stage(&model, false)?;
+        let (past, mut silent) = staged.silent();
+        // What runs seldom gives any either, as a settle time, which there is when the set point has changed.
+        silent.retain(|name| !self.gives_seldom(name, now, past));
+        let has = |name: &str| model.plan.outputs.iter().any(|output| output.name == name);
+        let running = self.running.plan.outputs.iter();
+        let running = running.map(|output| output.name.clone());
+        let lacking: Vec<String> = running.filter(|name| !has(name)).collect();
+        reporter.report(Report::Staged {
+            path: &path,
+            staged,
+            lacking: &lacking,
+            silent: (past, &silent),
+        });
+        self.staged = Some((model, path));
+        match self.shadow {
+            Some(duration) => control.shadow(duration, self.margin),
+            None => self.commit(control),
+        }
+    }
+
+    /// Whether what runs has an output of which no more than a few values are to be expected in so long a past.
+    fn gives_seldom(&self, name: &str, now: Instant, past: Duration) -> bool {
+        let mut columns = self.columns.iter().zip(&self.gave);
+        let mut outputs = self.running.plan.outputs.iter();
+        let gave = columns.find_map(|(column, gave)| (column == name).then_some(*gave));
+        let ran = self.first.map_or(Duration::ZERO, |first| now - first);
+        outputs.any(|output| output.name == name)
+            && gave
+                .is_some_and(|gave| gave as f64 * past.as_ns() as f64 <= FEW * ran.as_ns() as f64)
+    }
+
+    fn judge(&mut self, control: &mut Control, reporter: &dyn Reporter) -> Result<(), StageError> {
+        let Some(verdict) = control.verdict().filter(|verdict| verdict.over) else {
+            return Ok(());
+        };
+        // A file that is being written is read first.
+        if self.watched.as_ref().is_some_and(WatchedGraph::differs) {
+            return Ok(());
+        }
+        reporter.report(Report::Shadow(&verdict));
+        let reason = match verdict.passes {
+            Some(true) => return self.commit(control),
+            None => Refusal::NothingToCompare,
+            Some(false) => Refusal::LargerError,
+        };
+        if let Some((_, path)) = self.staged.take() {
+            let path = &path;
+            reporter.report(Report::NotTakenOver { path, reason });
+        }
+        control.discard();
+        Ok(())
+    }
+
+    fn commit(&mut self, control: &mut Control) -> Result<(), StageError> {
+        control.commit()?;
+        if let Some((model, _)) = self.staged.take() {
+            self.running = model;
+        }
+        Ok(())
+    }
+
+    /// Reports, once the data have ended, what has happened since and what has not.
+    pub(super) fn end(&self, control: &mut Control, reporter: &dyn Reporter) {
+        pump(control, reporter);
+        let shadowed = self.staged.iter().map(|(_, path)| path);
+        let waiting = self.waiting.iter().rev().map(|swap| &swap.path);
+        for path in shadowed.chain(waiting) {
+            let reason = Refusal::DataEnded;
+            reporter.report(Report::NotTakenOver { path, reason });
+        }
+    }
+}
+
+fn pump(control: &mut Control, reporter: &dyn Reporter) {
+    for notice in control.pump() {
+        reporter.report(Report::Swap(notice));
+    }
+}

@@ -1,0 +1,215 @@
+//! The words of a replacement: what a graph takes over, and why it does not.
+
+use std::fmt::{self, Write as _};
+use std::path::Path;
+
+use athermal::Duration;
+use athermal::core::engine::Carry;
+use athermal::run::live::session::{Refusal, WatchedGraph};
+use athermal::run::live::{Notice, StageError, Staged, Verdict};
+use serde_json::{Value, json};
+
+use crate::message::Message;
+use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::{count, counted, length, number, seconds};
+
+/// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
+const ANOTHER_RUN: &str =
+    "a run that begins with other files for `--output` and `--state` takes it";
+
+/// A graph that is ready to take over: what it lacks, what becomes of its nodes, and what it gives no value of.
+pub fn ready(
+    terminal: &Terminal,
+    path: &Path,
+    of: &Staged,
+    lacking: &[String],
+    (past, silent): (Duration, &[&str]),
+) {
+    let quoted = |name: &str| format!("`{name}`");
+    if !lacking.is_empty() {
+        let (what, are) = match lacking.len() {
+            1 => ("output", "whose column is empty"),
+            _ => ("outputs", "whose columns are empty"),
+        };
+        let names: Vec<_> = lacking.iter().map(|name| quoted(name)).collect();
+        terminal.warning(format_args!(
+            "{} has no {what} {}, {are} while it runs",
+            path.display(),
+            names.join(", ")
+        ));
+    }
+    terminal.note(staged(path, of));
+    if !silent.is_empty() {
+        let names: Vec<_> = silent.iter().map(|name| quoted(name)).collect();
+        terminal.warning(format_args!(
+            "{} gives no {} over the past {} that it was warmed by: are its sensors those of this machine?",
+            path.display(),
+            names.join(", "),
+            length(past)
+        ));
+    }
+}
+
+/// What becomes of each node of a graph that is ready to take over.
+fn staged(path: &Path, staged: &Staged) -> Message {
+    let all = staged.carry();
+    let carried = all
+        .iter()
+        .filter(|node| node.outcome == Carry::Carried)
+        .count();
+    let mut text = format!(
+        "{} (revision {}): {carried} of {} nodes go on as they were",
+        path.display(),
+        staged.revision(),
+        all.len()
+    );
+    for node in all {
+        let (word, why) = match &node.outcome {
+            Carry::Carried => continue,
+            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
+            Carry::Migrated { from } => ("goes on", format!("from a state of the form {from}")),
+            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
+            Carry::Cold { reason } => ("cold", reason.clone()),
+        };
+        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
+    }
+    let (past, endless) = staged.endless();
+    if !endless.is_empty() {
+        let _ = write!(
+            text,
+            "\n  {}: goes by all of its past, of which {} is known",
+            endless.join(", "),
+            length(past)
+        );
+    }
+    if let Some((past, wanted)) = staged.too_short_a_past() {
+        let _ = write!(
+            text,
+            "\n  the past to warm it by is {}, and it looks back as far as {}: until then it may give less than it will",
+            length(past),
+            length(wanted)
+        );
+    }
+    let facts =
+        json!({ "graph": path.display().to_string(), "revision": staged.revision(), "nodes": all });
+    Message::new("staged", facts, text)
+}
+
+/// How a graph did in the shadow of what runs.
+pub fn shadow(verdict: &Verdict) -> Message {
+    let mut text = "in the shadow:".to_owned();
+    for output in &verdict.outputs {
+        let _ = write!(
+            text,
+            "\n  {}: RMSE {} running, {} new, in {}, over {}",
+            output.output,
+            number(output.running_rmse),
+            number(output.candidate_rmse),
+            output.unit,
+            counted(output.n as u64, "instant")
+        );
+    }
+    if let Some(ratio) = verdict.ratio {
+        let _ = write!(text, "\n  new to running: {ratio:.3}");
+    }
+    let facts = json!({ "outputs": verdict.outputs, "ratio": verdict.ratio });
+    Message::new("shadow", facts, text)
+}
+
+/// A graph that does not take over, and why.
+pub fn not_taken_over(terminal: &Terminal, path: &Path, reason: Refusal<'_>) {
+    let with = |reason, words: fmt::Arguments<'_>| {
+        terminal.warning(message(path, reason, words));
+    };
+    match reason {
+        Refusal::Unusable(error) => {
+            terminal.setback(&error.into());
+            unusable(terminal, path, "what runs goes on");
+        }
+        Refusal::Stage(error) => {
+            terminal.setback(&Failure::Request(format!("{}: {error}", path.display())));
+            match error {
+                StageError::MissingChannels { .. }
+                | StageError::OtherTime { .. }
+                | StageError::OtherUnit { .. } => {
+                    unusable(terminal, path, &format!("what runs goes on; {ANOTHER_RUN}"));
+                }
+                _ => unusable(terminal, path, "what runs goes on"),
+            }
+        }
+        Refusal::NoColumn(name) => with(
+            "no_column",
+            format_args!(
+                "has the output `{name}`, for which there is no column; what runs goes on; {ANOTHER_RUN}"
+            ),
+        ),
+        Refusal::Changed => with(
+            "changed",
+            format_args!("has changed: as it was in the shadow until now, it does not take over"),
+        ),
+        Refusal::Gone => with(
+            "changed",
+            format_args!("is gone: as it was in the shadow until now, it does not take over"),
+        ),
+        Refusal::LargerError => with(
+            "larger_error",
+            format_args!("does not take over: its error is larger"),
+        ),
+        Refusal::NothingToCompare => with(
+            "nothing_to_compare",
+            format_args!("does not take over: there was nothing to compare"),
+        ),
+        Refusal::DataEnded => with(
+            "data_ended",
+            format_args!("did not take over: the data ended before"),
+        ),
+    }
+}
+
+/// What stands in a file is no graph that can be run, and what goes on.
+pub fn unusable(terminal: &Terminal, path: &Path, goes_on: &str) {
+    let words = format_args!("is not taken over; {goes_on}");
+    terminal.warning(message(path, "refused", words));
+}
+
+/// The reason in a word for programs, in a sentence for people.
+fn message(path: &Path, reason: &str, words: fmt::Arguments<'_>) -> Message {
+    let facts = json!({ "graph": path.display().to_string(), "reason": reason });
+    let words = format_args!("{} {words}", path.display());
+    Message::new("not_taken_over", facts, words)
+}
+
+/// Why an input cannot be read: where it is not the watched graph that runs, that may be the one for it.
+pub fn not_read(failure: Failure, watched: Option<&WatchedGraph>) -> Failure {
+    match (failure, watched) {
+        (Failure::Request(why), Some(watched)) if watched.is_unlike() => Failure::Request(format!(
+            "{why} (that is what the graph reads that ran last and would go on; {} holds another: {ANOTHER_RUN})",
+            watched.path().display()
+        )),
+        (other, _) => other,
+    }
+}
+
+/// What happened at a hand-over.
+pub fn notice(terminal: &Terminal, notice: Notice) {
+    match notice {
+        Notice::TookOver {
+            revision,
+            tick,
+            time,
+        } => {
+            let words = format!("revision {revision} took over before tick {}", count(tick));
+            let facts = json!({ "revision": revision, "tick": tick, "time_s": seconds(time) });
+            terminal.note(Message::new("took_over", facts, words));
+        }
+        Notice::SentBack => {
+            let words = "the new graph came too late and was sent back";
+            terminal.warning(Message::new("sent_back", Value::Null, words));
+        }
+        Notice::Missed { ticks } => {
+            let were = if ticks == 1 { "was" } else { "were" };
+            let words = format!("{} {were} missed", counted(ticks, "tick"));
+            terminal.warning(Message::new("missed", json!({ "ticks": ticks }), words));
+        }
+    }
+}
