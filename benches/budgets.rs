@@ -1,7 +1,7 @@
 //! The figures that the project promises, beside what this machine gives: one run, one table.
 //!
 //! `cargo bench --bench budgets` measures ticks one by one, and the program as a user starts it, on a simulated die tester.
-//! Times of the program are the best of five; a tick's are told with the clock's own cost of some 25 ns in them.
+//! Times of the program are the best of five; a tick's include the clock's own cost of some 25 ns.
 
 mod die_tester;
 
@@ -32,7 +32,7 @@ fn main() {
     program();
 }
 
-fn tell(work: &str, measured: &str, budget: &str) {
+fn print_line(work: &str, measured: &str, budget: &str) {
     println!("{work:<52}{measured:>14}{budget:>14}");
 }
 
@@ -61,19 +61,19 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, by_hand: ByHand<'_>) {
     ] {
         let of = |times: &[Duration]| Quantiles::of(times, &measured, truth);
         let engine = of(&engine);
-        tell(&format!("{name}, median"), &us(engine.median), budgets[0]);
-        tell(&format!("{name}, 99.9 %"), &us(engine.rare), budgets[1]);
+        print_line(&format!("{name}, median"), &us(engine.median), budgets[0]);
+        print_line(&format!("{name}, 99.9 %"), &us(engine.rare), budgets[1]);
         let by_hand = of(&by_hand);
-        tell(&format!("{name}, by hand, median"), &us(by_hand.median), "");
+        print_line(&format!("{name}, by hand, median"), &us(by_hand.median), "");
         let ratio = engine.median.as_secs_f64() / by_hand.median.as_secs_f64();
-        tell(
+        print_line(
             &format!("{name}, engine by hand"),
             &format!("{ratio:.2}"),
             budgets[2],
         );
     }
     let rate = measured.len() as f64 / seconds;
-    tell(
+    print_line(
         "ticks from memory per second, each timed",
         &format!("{rate:.0}"),
         "500000",
@@ -129,15 +129,15 @@ fn program() {
         "-o",
         path(&fitted),
     ]);
-    tell("fit a week, whole process", &ms(run.time), "400 ms");
-    tell("its memory", &run.memory(), "50 MB");
+    print_line("fit a week, whole process", &ms(run.time), "400 ms");
+    print_line("its memory", &run.memory(), "50 MB");
     let run = best(&["evaluate", path(&fitted), "--data", path(&test)]);
-    tell(
+    print_line(
         "evaluate two days and a half, whole process",
         &ms(run.time),
         "150 ms",
     );
-    tell("its memory", &run.memory(), "50 MB");
+    print_line("its memory", &run.memory(), "50 MB");
     let predicted = file("predicted.csv");
     let week = best(&[
         "run",
@@ -148,14 +148,14 @@ fn program() {
         path(&predicted),
     ]);
     let rate = 60_480.0 / week.time.as_secs_f64();
-    tell(
+    print_line(
         "run from CSV to CSV, rows per second",
         &format!("{rate:.0}"),
         "150000",
     );
-    tell("its memory", &week.memory(), "");
+    print_line("its memory", &week.memory(), "");
     let start = best(&["--version"]);
-    tell("start to first output", &ms(start.time), "20 ms");
+    print_line("start to first output", &ms(start.time), "20 ms");
     std::fs::remove_dir_all(&folder).expect("the folder was made above");
 }
 
@@ -170,7 +170,7 @@ fn ms(time: Duration) -> String {
 
 struct Run {
     time: Duration,
-    /// The most memory that was seen in use, where the system tells.
+    /// The most memory that was seen in use, where the system reports it.
     peak_kb: Option<u64>,
 }
 

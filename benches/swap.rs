@@ -48,32 +48,32 @@ fn main() {
     let mut commits = of(&times, |tick| tick.takes_over);
     let mut others = of(&times, |tick| !tick.takes_over);
     let mut more = extra(&times);
-    tell("a tick, median", &us(quantile(&mut others, 0.5)), "");
-    tell(
+    print_line("a tick, median", &us(quantile(&mut others, 0.5)), "");
+    print_line(
         "the tick of a commit, median",
         &us(quantile(&mut commits, 0.5)),
         "",
     );
-    tell(
+    print_line(
         "more than its neighbours, median",
         &us(quantile(&mut more, 0.5)),
         "20 µs",
     );
-    tell(
+    print_line(
         "more than its neighbours, 95 %",
         &us(quantile(&mut more, 0.95)),
         "20 µs",
     );
-    tell(
+    print_line(
         "more than its neighbours, at most",
         &us(quantile(&mut more, 1.0)),
         "",
     );
-    tell("allocations of all ticks", &total.to_string(), "0");
+    print_line("allocations of all ticks", &total.to_string(), "0");
     assert_eq!(total, 0, "the engine thread neither allocates nor frees");
 }
 
-fn tell(work: &str, measured: &str, budget: &str) {
+fn print_line(work: &str, measured: &str, budget: &str) {
     println!("{work:<40}{measured:>14}{budget:>10}");
 }
 

@@ -1,5 +1,5 @@
 //! The arithmetic of the die tester's graph as one would write it for this machine alone: fixed arrays, no absence but
-//! that of positions, no graph. It gives the same bits, and what the engine costs is told by the ratio to it.
+//! that of positions, no graph. It gives the same bits, and the ratio to it is what the engine costs.
 
 mod learner;
 

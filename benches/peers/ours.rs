@@ -1,4 +1,4 @@
-//! Our side of the comparison with peers: one task on rows that `peers.py` has written, timed here, told as JSON.
+//! Our side of the comparison with peers: one task on rows that `peers.py` has written, timed here, written as JSON.
 //!
 //! `ours TASK FILE WIDTH`: the file holds 64-bit floats, row by row, `WIDTH` regressors and a target.
 

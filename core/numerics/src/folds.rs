@@ -220,11 +220,12 @@ mod tests {
     #[test]
     fn a_refusal_tells_whether_rows_or_blocks_or_what_is_left_out_are_the_cause() {
         let three = Folds::contiguous(3);
-        let told = |refused: Result<Vec<FoldRows>, NumericsError>| refused.unwrap_err().to_string();
+        let refusal =
+            |refused: Result<Vec<FoldRows>, NumericsError>| refused.unwrap_err().to_string();
         assert!(
-            told(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
+            refusal(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
         );
-        let blocks = told(three.of_blocks(12, 256));
+        let blocks = refusal(three.of_blocks(12, 256));
         assert!(blocks.contains("12 rows") && blocks.contains("in blocks of 256 rows"));
         let wide = Folds::Blocked {
             folds: 3,
@@ -232,7 +233,7 @@ mod tests {
             embargo: 7,
         };
         for size in [1, 4] {
-            let apart = told(wide.of_blocks(12, size));
+            let apart = refusal(wide.of_blocks(12, size));
             assert_eq!(
                 apart,
                 "of 12 rows none is left to train on where rows 1 to 4 are tested, with a gap of 2 rows and an embargo of 7"

@@ -281,7 +281,7 @@ impl Gram {
     }
 
     /// The population variances of the regressors and, last, of the target: exactly 0 where what is left after taking
-    /// the mean out cannot be told from rounding.
+    /// the mean out cannot be distinguished from rounding.
     pub fn variances(&self) -> Vec<f64> {
         self.mean_offsets()
             .iter()
@@ -343,7 +343,7 @@ fn add(to: &mut [f64], added: &[f64]) {
 }
 
 /// Writes the products of centred rows with themselves, or adds them, to the lower triangle of the column-major `products`;
-/// what is above it is not told.
+/// what is above it is not reported.
 fn multiply(centred: &[f64], order: usize, accum: Accum, products: &mut [f64]) {
     let centred = MatRef::from_column_major_slice(centred, order, centred.len() / order);
     let mut products = MatMut::from_column_major_slice_mut(products, order, order);

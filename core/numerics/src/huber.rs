@@ -213,7 +213,7 @@ impl<'a> Descent<'a> {
             return Ok(Step::Stuck);
         }
         if let Some(direction) = last {
-            // Too near for the objective to tell, and so near that Newton's step ends there; but where rows hardly determine a
+            // Too near for the objective to resolve, and so near that Newton's step ends there; but where rows hardly determine a
             // direction, a step that promises nothing may be so long that it leads up.
             let most = self.objective * (1.0 + NEAR);
             self.go_where(&direction, |reached| reached <= most);

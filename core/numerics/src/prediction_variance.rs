@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Without a penalty this is the textbook's prediction variance (Draper and Smith 1998, section 3.1). With one it is that of
 /// the Bayesian model of which ridge is the posterior mean: coefficients with a prior variance of `s²/α` (Hastie,
 /// Tibshirani and Friedman 2009, section 3.4.1); `tr H` is then the effective number of coefficients. Rows whose errors hang
-/// together tell less than their number says: the first term stands, the others are too small.
+/// together inform less than their number suggests: the first term stands, the others are too small.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PredictionVariance {
@@ -46,7 +46,7 @@ impl PredictionVariance {
 
     /// The standard errors of the intercept, where there is one, and of the coefficients, in the order of the fit's columns:
     /// without a penalty `s √(n⁻¹ + |Wx̄|²)` and `s |We_j|`; with one those of the posterior. NaN for a column that the rows
-    /// do not tell of.
+    /// do not determine.
     #[must_use]
     pub fn standard_errors(&self) -> Vec<f64> {
         let mut squares = Vec::new();
@@ -60,10 +60,10 @@ impl PredictionVariance {
             of_intercept += along * along;
         }
         let intercept = (!self.centre.is_empty()).then_some(of_intercept);
-        let told = squares
+        let sums = squares
             .into_iter()
             .map(|square| if square > 0.0 { square } else { f64::NAN });
-        let all = intercept.into_iter().chain(told);
+        let all = intercept.into_iter().chain(sums);
         all.map(|square| (self.noise * square).sqrt()).collect()
     }
 

@@ -85,7 +85,7 @@ impl TryFrom<Saved> for Rls {
         let width = coefficients.len();
         check_length("coefficients", width.max(1), width)?;
         check_length("covariance", width * width, covariance.len())?;
-        // Its diagonal may be what rounding left of 0, where a row told all that was to be known.
+        // Its diagonal may be what rounding left of 0, where a row determined all of it.
         if !finite_and_symmetric(&coefficients, &covariance) {
             return Err(NumericsError::NotFinite);
         }

@@ -90,7 +90,7 @@ impl Bench {
     /// The same, fitted on rows: times in s, and the samples of all ports, in the order in which the kind declares them; NaN for none.
     ///
     /// # Panics
-    /// Where the graph is refused or the fit fails, with what a user would be told.
+    /// Where the graph is refused or the fit fails, with what a user would read.
     #[must_use]
     pub fn fitted_on<S: AsRef<[f64]>>(mut self, rows: impl IntoIterator<Item = (f64, S)>) -> Self {
         let mut table = Table::default();
@@ -113,7 +113,7 @@ impl Bench {
     /// Steps through rows: times in s, and the samples of all ports, in the order in which the kind declares them; NaN for none.
     ///
     /// # Panics
-    /// Where the graph is refused, with what a user would be told; where times do not rise or are none, or a row is too short or
+    /// Where the graph is refused, with what a user would read; where times do not rise or are none, or a row is too short or
     /// long.
     pub fn feed<S: AsRef<[f64]>>(&mut self, rows: impl IntoIterator<Item = (f64, S)>) -> &mut Self {
         for (seconds, samples) in rows {
@@ -174,7 +174,7 @@ impl Bench {
 
     fn fixture(&self) -> Fixture {
         let given = self.case.given(self.kind);
-        Fixture::new(self.kind, &self.parameters, &given).unwrap_or_else(|told| panic!("{told}"))
+        Fixture::new(self.kind, &self.parameters, &given).unwrap_or_else(|why| panic!("{why}"))
     }
 }
 

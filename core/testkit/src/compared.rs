@@ -1,4 +1,4 @@
-//! Decides what of a run is compared, and how a difference is told.
+//! Decides what of a run is compared, and how a difference is worded.
 
 use super::fixture::Fixture;
 use crate::channel::is_cold;
@@ -78,8 +78,8 @@ impl Course {
                     return Some(format!(
                         "at tick {nth} ({now} s) `{}` is {} in one run and {} in the other",
                         fixture.plan.channels[slot].name,
-                        told(*one),
-                        told(*two)
+                        worded(*one),
+                        worded(*two)
                     ));
                 }
             }
@@ -103,7 +103,7 @@ fn alike(one: Given, two: Given) -> bool {
     }
 }
 
-fn told(given: Given) -> String {
+fn worded(given: Given) -> String {
     match given {
         None => "not given".to_owned(),
         Some((value, _)) if is_cold(value) => "absent (`COLD`)".to_owned(),

@@ -47,13 +47,13 @@ fn learns(subject: &Subject<'_>) -> Option<bool> {
     let Role::Estimator(estimator) = subject.fixture.plan.nodes[0].spec.role() else {
         return None;
     };
-    let unless_told = match estimator.learns() {
+    let by_default = match estimator.learns() {
         Learns::Never { .. } => return None,
-        Learns::WhenTold => false,
-        Learns::UnlessTold => true,
+        Learns::OnRequest => false,
+        Learns::ByDefault => true,
     };
-    let told = subject.parameters.get("learn");
-    Some(told.map_or(unless_told, |told| told.as_bool() != Some(false)))
+    let learn = subject.parameters.get("learn");
+    Some(learn.map_or(by_default, |learn| learn.as_bool() != Some(false)))
 }
 
 /// Parameters with `learn` as stated.
@@ -103,19 +103,19 @@ pub(super) fn of_ports(kind: &Kind, stated: &[Subject<'_>]) -> Option<Case> {
 /// The case with these ports too, if a graph with it can be compiled.
 fn connected(kind: &Kind, subject: &Subject<'_>, left_out: &[&InputPort]) -> Option<Case> {
     let mut case = subject.case.clone();
-    let mut told = Vec::new();
+    let mut connected_ports = Vec::new();
     for port in left_out {
         let given = candidates(port, &subject.given).into_iter().find(|given| {
             let mut with = case.clone();
             with.inputs.push(given.clone());
             Fixture::new(kind, &subject.parameters, &with.given(kind)).is_ok()
         })?;
-        told.push(format!("`{}` in {}", port.name, given.unit));
+        connected_ports.push(format!("`{}` in {}", port.name, given.unit));
         case.inputs.push(given);
     }
-    let told = told.join(", ");
+    let connected_ports = connected_ports.join(", ");
     case.parameters = format!(
-        "# with what a graph may leave out: {told}\n{}",
+        "# with what a graph may leave out: {connected_ports}\n{}",
         case.parameters.trim()
     );
     Some(case)

@@ -24,7 +24,7 @@ impl Fixture {
     /// The graph of a node with these parameters.
     ///
     /// # Errors
-    /// All that is wrong with it, as a user would be told.
+    /// All that is wrong with it, as a user would read it.
     pub(super) fn new(
         kind: &Kind,
         parameters: &toml::Table,

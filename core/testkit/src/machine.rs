@@ -194,19 +194,19 @@ fn described(machine: &dyn Machine) -> Result<(), String> {
 }
 
 fn wrong_unit(channel: &Channel) -> Option<String> {
-    let told = |what: &str| {
+    let wrong = |what: &str| {
         let (reference, unit) = (channel.reference(), channel.unit);
         Some(format!(
             "the channel `{reference}` is in `{unit}`, which is {what}"
         ))
     };
     let Ok(unit) = Unit::parse(channel.unit) else {
-        return told("no unit");
+        return wrong("no unit");
     };
     let nm = Unit::parse("nm").ok()?;
     match channel.signal {
-        "position" if !unit.measures_same(&nm) => told("no length"),
-        "temperature" if !unit.is_temperature_point() => told("no temperature"),
+        "position" if !unit.measures_same(&nm) => wrong("no length"),
+        "temperature" if !unit.is_temperature_point() => wrong("no temperature"),
         _ => None,
     }
 }

@@ -151,7 +151,7 @@ impl Rule {
             }
             Self::Segments => {
                 "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay, and its instants \
-                 move by the shift that `segment` is told"
+                 move by the shift that `segment` is given"
             }
             Self::Wanted => {
                 "count the places of outputs over all ports in their order, those that `wanted` says nobody reads included, and leave these \

@@ -1,4 +1,4 @@
-//! Decides in what order rules are tried, and how broken ones are told.
+//! In what order rules are tried, and how broken ones are reported.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -47,8 +47,8 @@ pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     let shared = rules::shared(kind);
     if !shared.is_empty() {
         // No graph with it can be compiled.
-        let told = shared.into_iter();
-        return told
+        let shared = shared.into_iter();
+        return shared
             .map(|found| broken_in(Rule::Names, None, found))
             .collect();
     }
@@ -114,12 +114,12 @@ fn broken_in(rule: Rule, case: Option<&Case>, found: String) -> Broken {
 pub fn assert_conforms<T: NodeSpec>(cases: &[Case]) {
     let broken = broken::<T>(cases);
     if !broken.is_empty() {
-        let told: Vec<_> = broken.iter().map(ToString::to_string).collect();
+        let texts: Vec<_> = broken.iter().map(ToString::to_string).collect();
         panic!(
             "`{}` breaks {} of the rules that every node keeps\n\n{}\n",
             T::kind_name(),
             broken.len(),
-            told.join("\n\n")
+            texts.join("\n\n")
         );
     }
 }

@@ -13,9 +13,9 @@ use super::shape;
 use super::table::SimulationTable;
 use crate::compile::{Part, Plan, Reference, SourceChannel};
 use crate::diagnostic::{Diagnostics, Place, Problem, Sources};
+use crate::document::problem::{EmptyList, MissingKey, WrongType};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt,
-    known_keys, unreadable,
+    Data, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt, known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
 use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine};
@@ -169,7 +169,7 @@ impl Declaring<'_> {
             }
             None if misspelt("name") => None,
             None => {
-                let problem = DocumentProblem::MissingKey {
+                let problem = MissingKey {
                     key: "name".to_owned(),
                     what: "a test".to_owned(),
                     advice: Some("describe in a sentence what it shows: name = \"…\"".to_owned()),
@@ -229,9 +229,7 @@ impl Declaring<'_> {
     ) -> Option<Vec<T>> {
         let Some(list) = value.as_list() else {
             let mut problem = wrong_type(key, "a list of tables", value);
-            if let DocumentProblem::WrongType { hint, .. } = &mut problem {
-                *hint = Hint::for_tables(&value.data);
-            }
+            problem.hint = Hint::for_tables(&value.data);
             self.diagnostics.report(value.place, problem);
             return None;
         };
@@ -250,7 +248,7 @@ impl Declaring<'_> {
             Data::List(files) if files.iter().all(|file| file.as_text().is_some()) => {
                 if files.is_empty() {
                     let what = format!("the list of files for \"{key}\"");
-                    let problem = DocumentProblem::EmptyList { what };
+                    let problem = EmptyList { what };
                     self.diagnostics.report(value.place, problem);
                     return None;
                 }
@@ -420,7 +418,7 @@ impl Declaring<'_> {
             self.range(value, "from", spec.from.to_string(), "0 or later");
         }
         if let Some(lasting) = spec.lasting.filter(|lasting| *lasting <= Duration::ZERO) {
-            self.range(value, "for", lasting.to_string(), "longer than 0");
+            self.range(value, "for", lasting.to_string(), "greater than 0");
         }
         if spec.size.is_some() && !spec.kind.has_size() {
             let problem = problem::ExcludedKeys {
@@ -541,8 +539,8 @@ fn unknown_machine(unknown: UnknownMachine) -> Box<dyn Problem> {
     }
 }
 
-fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
-    DocumentProblem::WrongType {
+fn wrong_type(key: &str, expected: &str, value: &Value) -> WrongType {
+    WrongType {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),

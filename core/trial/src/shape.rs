@@ -4,7 +4,8 @@ use super::problem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
 use crate::diagnostic::Diagnostics;
-use crate::document::{DocumentProblem, Value, decode};
+use crate::document::problem::MissingKey;
+use crate::document::{Value, decode};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -33,7 +34,7 @@ pub(super) fn read(
         shaping.range("noise", noise.to_string(), "0 or more");
     }
     if table.every <= Duration::ZERO {
-        shaping.range("every", table.every.to_string(), "longer than 0");
+        shaping.range("every", table.every.to_string(), "greater than 0");
     }
     (diagnostics.error_count() == before).then_some(Series {
         every: table.every,
@@ -137,7 +138,7 @@ impl Shaping<'_> {
         match table.length {
             None => self.diagnostics.report(
                 self.value.place,
-                DocumentProblem::MissingKey {
+                MissingKey {
                     key: "for".to_owned(),
                     what: "the input".to_owned(),
                     advice: Some("say how long it lasts, e.g. for = \"20min\"".to_owned()),
@@ -159,7 +160,7 @@ impl Shaping<'_> {
             self.range("delay", delay.to_string(), "0 or longer");
         }
         if curve.period <= Duration::ZERO {
-            self.range("period", curve.period.to_string(), "longer than 0");
+            self.range("period", curve.period.to_string(), "greater than 0");
         }
     }
 

@@ -22,7 +22,7 @@ use crate::share::{raise, shrink};
 /// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
 /// much, at the cost of the larger ones.
 ///
-/// Where all voters tell their standard deviation, the port `std_dev` is that of
+/// Where all voters have a standard deviation, the port `std_dev` is that of
 /// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
 /// small, since it takes one of the voters to be right.
 ///
@@ -124,7 +124,7 @@ struct Weigher {
     last: RefCell<Weighed>,
 }
 
-/// The weights of votes, which are the same until a truth is told or another vote drops out.
+/// The weights of votes, which are the same until a truth comes or another vote drops out.
 struct Weighed {
     /// Of each vote; NaN where there was none.
     weights: Vec<f64>,

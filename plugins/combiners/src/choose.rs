@@ -13,7 +13,7 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 /// The vote of the voter with the smallest recent root mean square error.
 ///
 /// A voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose vote it is,
-/// and the port `std_dev` its standard deviation where all voters tell theirs.
+/// and the port `std_dev` its standard deviation where all voters have one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Best {
@@ -24,7 +24,7 @@ pub struct Best {
 }
 
 /// The first vote that is there, in the order of the voters. The port `weights` shows whose it is, and the port
-/// `std_dev` its standard deviation where all voters tell theirs.
+/// `std_dev` its standard deviation where all voters have one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fallback {}

@@ -22,7 +22,7 @@ use crate::mean::mean;
 /// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths. Where more is asked for than any error in
 /// memory, the interval reaches as far as the largest, and not to infinity as in the source: what is missed then is not all made
 /// up for. A miss of an interval that reaches as far as that takes `α` no lower than `min(α, −gain)`, and a truth on one that is only
-/// the prediction takes it no higher than `max(α, 1 + gain)`. `athermal evaluate` tells how often intervals held.
+/// the prediction takes it no higher than `max(α, 1 + gain)`. `athermal evaluate` shows how often intervals held.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Conformal {

@@ -1,4 +1,4 @@
-//! Decides which errors of voters are remembered, and how a combiner that goes by them is told of truths; what follows from them
+//! Decides which errors of voters are remembered, and how a combiner that goes by them gets truths; what follows from them
 //! is the combiner's rule.
 
 use std::collections::VecDeque;
@@ -171,8 +171,8 @@ impl Errors {
     pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
         let square = (vote - truth) * (vote - truth);
         // A truth beyond all sizes says nothing of who was nearer to it; a vote beyond them was wrong.
-        let is_told = truth * truth <= LARGEST;
-        if is_told && !square.is_nan() {
+        let counts = truth * truth <= LARGEST;
+        if counts && !square.is_nan() {
             self.remember(voter, arrived, square.min(LARGEST));
         }
     }

@@ -14,7 +14,7 @@ use crate::memory::Memory;
 /// Otherwise it predicts zero, which is what a machine without a model does. Before `min_truths` truths have been compared,
 /// nothing is known to do harm and the prediction passes. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
 /// passes since too little is known. The port `weights` says 0 while it is held back. Of several predictions the mean of those that are
-/// there is guarded, and held back when one of them does harm on the truths that it predicted. Where all tell their standard deviation, the port `std_dev` passes it on, or that of
+/// there is guarded, and held back when one of them does harm on the truths that it predicted. Where all have a standard deviation, the port `std_dev` passes it on, or that of
 /// their mixture; while the prediction is held back there is none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -31,7 +31,7 @@ use crate::share::raise;
 ///
 /// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
 /// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
-/// Where all voters tell their standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
+/// Where all voters have a standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hedge {

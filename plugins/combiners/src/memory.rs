@@ -76,7 +76,7 @@ impl TryFrom<Table> for Tabled {
 }
 
 impl Memory {
-    /// Whether no time can be told after which nothing counts: so many truths may take as long as they please.
+    /// Whether there is no time after which nothing counts: so many truths may take as long as they please.
     pub(crate) fn is_endless(&self) -> bool {
         matches!(self, Self::Truths(_))
     }

@@ -17,7 +17,7 @@ use crate::choose::all_on;
 ///
 /// Where the voter of the state is absent, the next one in order that has a vote speaks, then those before it; where the state is not known, the first. The port
 /// `reason` says: 0 the voter of the state speaks, 1 another since that one is absent, 2 the state is not known. The port `weights` shows whose
-/// vote it is, and the port `std_dev` its standard deviation where all voters tell theirs.
+/// vote it is, and the port `std_dev` its standard deviation where all voters have one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateGate {

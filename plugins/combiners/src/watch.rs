@@ -39,11 +39,11 @@ macro_rules! reasons {
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in no fewer with a
 /// `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much
-/// room: a bias as large as the usual error is told in some hours, one of half that size hardly ever.
+/// room: a bias as large as the usual error is found in some hours, one of half that size hardly ever.
 ///
 /// What is usual goes on being learned, the course of a day too, so that a change that comes soon after the start, or after an alarm,
 /// is taken for usual. The mean takes a bias `b` in as it grows: of `n` truths before it `g` comes to no more than
-/// `n (b ln(b/δ) − b + δ)`, and less as the usual error grows with it. With the defaults a bias as large as the usual error is told
+/// `n (b ln(b/δ) − b + δ)`, and less as the usual error grows with it. With the defaults a bias as large as the usual error is found
 /// from a day of truths on, one of 2.5 times that from half a day on. Where it matters sooner, `adwin` compares the truths with
 /// each other and tells more of them.
 ///
@@ -272,7 +272,7 @@ trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeO
     fn clear(&mut self);
 
     /// Goes on with the parameters of another.
-    fn told_by(self, other: &Self) -> Self;
+    fn set_as(self, other: &Self) -> Self;
 }
 
 impl Detector for numerics::PageHinkley {
@@ -284,7 +284,7 @@ impl Detector for numerics::PageHinkley {
         self.clear();
     }
 
-    fn told_by(self, other: &Self) -> Self {
+    fn set_as(self, other: &Self) -> Self {
         self.with(other.options())
     }
 }
@@ -298,7 +298,7 @@ impl Detector for numerics::Adwin {
         self.clear();
     }
 
-    fn told_by(self, other: &Self) -> Self {
+    fn set_as(self, other: &Self) -> Self {
         self.with(other.options())
     }
 }
@@ -451,7 +451,7 @@ where
                 Restored::cold("what is watched of the errors differs")
             }
             Ok(mut known) => {
-                known.detector = known.detector.told_by(&self.seen.detector);
+                known.detector = known.detector.set_as(&self.seen.detector);
                 known.usual.reserve();
                 self.seen = known;
                 Restored::Accepted

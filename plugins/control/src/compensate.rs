@@ -344,7 +344,7 @@ struct Compensating {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     last: Option<Instant>,
-    /// The unit of the correction; none in a state that was written before it was told.
+    /// The unit of the correction; none in a state that was written before it was kept.
     #[serde(default)]
     unit: Option<Unit>,
     axes: Vec<Axis>,

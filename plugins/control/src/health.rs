@@ -363,7 +363,7 @@ impl Sensor {
         }
     }
 
-    /// Goes from what was found to what is told: a channel in order again is waited for.
+    /// Goes from what was found to what is given: a channel in order again is waited for.
     fn conclude(&mut self, found: u8, recover: Duration, now: Instant) -> u8 {
         if found != reason::HEALTHY {
             self.in_order_since = None;

@@ -203,7 +203,7 @@ struct Guarding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     last: Option<Instant>,
-    /// The unit of each channel; none in a state that was written before they were told.
+    /// The unit of each channel; none in a state that was written before they were kept.
     #[serde(default)]
     units: Vec<Unit>,
     channels: Vec<Output>,

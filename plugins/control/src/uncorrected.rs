@@ -13,7 +13,7 @@ use crate::limit;
 /// The measured position minus the correction applied at its instant: what the machine would have done on its own.
 ///
 /// `uncorrected(t) = position(t) − applied(t)`, channel by channel. What was applied is a signal that the machine reports,
-/// since it may clip or refuse what it is told. Drift, features and learning take this position, so that a model never
+/// since it may clip or refuse what it is asked for. Drift, features and learning take this position, so that a model never
 /// learns its own correction. Where it is not known what was applied, there is no value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -22,8 +22,8 @@ use crate::order::Order;
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
 /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
 /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded; what those that are missing were is told from the truths that follow too,
-/// as in a Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and
+/// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
+/// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
 /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
 /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
 /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
@@ -78,7 +78,7 @@ impl Arimax {
             nk: Some(self.nk.clone()),
             differences: self
                 .differences
-                .map_or(Differences::Told, Differences::Given),
+                .map_or(Differences::Chosen, Differences::Given),
             penalty: self.penalty,
             every: self.every,
             order: self.order,
@@ -122,7 +122,7 @@ mod tests {
             nb: Some(PerInput::one()),
             nc: Some(1),
             nk: Some(PerInput::none()),
-            differences: Differences::Told,
+            differences: Differences::Chosen,
             order,
             places: vec![0],
             ..Asked::default()
@@ -163,7 +163,7 @@ mod tests {
             let found = asked(differences).identify(&samples, 1, &mut report, &mut |_, _| {});
             found.unwrap()
         };
-        let (told, given) = (fit(Differences::Told), fit(Differences::Given(0)));
+        let (told, given) = (fit(Differences::Chosen), fit(Differences::Given(0)));
         assert_eq!((told.model.differences, told.rows), (0, given.rows));
         assert_eq!(told.squared_errors, given.squared_errors);
     }

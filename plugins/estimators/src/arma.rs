@@ -17,15 +17,15 @@ use crate::order::Order;
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
 /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
 /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded; what those that are missing were is told from the truths that follow too,
-/// as in a Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and
+/// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
+/// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
 /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
 /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
 /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
 /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that had
 /// always been; with `learn = false` it stays at the level of the fit. The port `std_dev` is the standard deviation
 /// of the truth about its prediction, larger after truths that are missing. Where rows tell the level less well than
-/// one of them does by itself, it is taken to be their mean, which is told. Since the answer changes with time alone,
+/// one of them does by itself, it is taken to be their mean, which the fit reports. Since the answer changes with time alone,
 /// the node runs at every tick.
 ///
 /// The limit of `learn.outliers` keeps spikes out, and with them the beginning of what really changes within a truth or two, by which

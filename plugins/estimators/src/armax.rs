@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::identified::{Asked, PerInput, identified};
 use crate::order::Order;
 
-/// ARX whose noise is a moving average: what was not foreseen of the truth is told from what the features bring about.
+/// ARX whose noise is a moving average of past innovations.
 ///
 /// `A(q) (y − μ) = Σ B_i(q) u_i(t − nk) + C(q) e` (Åström and Bohlin 1965; Ljung 1999, section 4.2). The sum of squared
 /// one-step prediction errors is made least by damped Gauss–Newton steps, starting where Hannan and Rissanen (1982) end;
@@ -17,8 +17,8 @@ use crate::order::Order;
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
 /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
 /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded; what those that are missing were is told from the truths that follow too,
-/// as in a Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and
+/// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
+/// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
 /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
 /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
 /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
@@ -27,7 +27,7 @@ use crate::order::Order;
 /// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
 /// port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that are missing.
 /// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Where rows tell
-/// the level less well than one of them does by itself, it is taken to be their mean, which is told. Since the answer
+/// the level less well than one of them does by itself, it is taken to be their mean, which the fit reports. Since the answer
 /// changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

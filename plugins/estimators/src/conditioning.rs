@@ -1,4 +1,4 @@
-//! Decides how columns that say nothing new are told; what is made of them is each estimator's.
+//! Decides how columns that say nothing new are reported; what is made of them is each estimator's.
 
 use athermal_core::node::{Figure, TrainingReport};
 use athermal_numerics::{Gram, LeastSquares, LinearFit, Standardization};

@@ -255,13 +255,13 @@ impl NarxTrainer {
         let ratios: Vec<String> = ratios
             .map(|(name, ratio)| format!("{name} {ratio:.3e}"))
             .collect();
-        let told = if ratios.is_empty() {
+        let note = if ratios.is_empty() {
             "no term explains as much as `tolerance` asks for, so the prediction is the mean of the rows".to_owned()
         } else {
             format!("error-reduction ratios: {}", ratios.join(", "))
         };
         TrainingReport {
-            notes: vec![told],
+            notes: vec![note],
             figures: Figures::from([("error_reduction_ratios".to_owned(), by_name)]),
             selection: found
                 .terms

@@ -27,7 +27,7 @@ use crate::order::Order;
 /// they are first, or where such features leave filters on average, and how unsure that is, is known from the fit. Truths
 /// then tell where the filters are, as in a Kalman filter of the model (Harvey 1989, section 3.2): the better that is
 /// known, the less a truth moves them, until they go by the features alone. So does what comes after as many steps without
-/// features; a free run is told as many truths as the filters have past values. With `learn = false` it stays at rest. The
+/// features; a free run takes as many truths as the filters have past values. With `learn = false` it stays at rest. The
 /// port `std_dev` is the standard deviation of the truth about its prediction, larger until it is known where the filters
 /// are. It goes by the errors that are left in the fit: where noise is coloured and pieces are short, what filters gave before takes
 /// slow noise up too, and the deviation is too small. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer

@@ -300,7 +300,7 @@ impl OnlineLearner {
             match &mut self.state.recursion {
                 Recursion::Sgd(sgd) => sgd.shift(by),
                 Recursion::Rls { rls, noise } => {
-                    // Whether it stays there is told by the next truth.
+                    // Whether it stays there shows at the next truth.
                     let variance = (by / *noise).powi(2).min(WIDEST);
                     rls.shift(regressors.len(), by, variance);
                 }

@@ -1,4 +1,4 @@
-//! Decides how a user asks for orders to be compared, and how the comparison is told; not how a model of an order is fitted.
+//! Decides how a user asks for orders to be compared, and how it is reported; not how a model of an order is fitted.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -102,18 +102,18 @@ pub(crate) struct Tried {
 
 /// An order as a report tells it.
 fn named(letters: &[(&str, usize)]) -> String {
-    let told = letters
+    let texts = letters
         .iter()
         .map(|(letter, order)| format!("{letter} {order}"));
-    told.collect::<Vec<_>>().join(", ")
+    texts.collect::<Vec<_>>().join(", ")
 }
 
 /// The same for programs.
 fn numbered(letters: &[(&str, usize)]) -> BTreeMap<String, usize> {
-    let told = letters
+    let texts = letters
         .iter()
         .map(|&(letter, order)| (letter.to_owned(), order));
-    told.collect()
+    texts.collect()
 }
 
 /// An order that may be compared: its letter.
@@ -220,7 +220,7 @@ impl Order {
             .filter(|(_, tried)| found(tried) + LEFT_OVER <= rows)
             .collect();
         let places: Vec<usize> = ranked.iter().map(|(place, _)| *place).collect();
-        let told = ranked.into_iter().map(|(_, tried)| TriedOrder {
+        let texts = ranked.into_iter().map(|(_, tried)| TriedOrder {
             order: named(&tried.letters),
             letters: numbered(&tried.letters),
             coefficients: tried.coefficients,
@@ -229,7 +229,7 @@ impl Order {
             bic: tried.figures.bic,
             fpe: tried.figures.fpe,
         });
-        let tried: Vec<_> = told.collect();
+        let tried: Vec<_> = texts.collect();
         let worth = tried.iter().map(|tried| tried.figure(self.by)).enumerate();
         let best = worth
             .filter(|(_, worth)| worth.is_finite())

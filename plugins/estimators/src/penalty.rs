@@ -20,7 +20,7 @@ pub enum Penalty {
     Chosen(Choice),
 }
 
-/// How the best penalty of a logarithmic range is told.
+/// How the best penalty of a logarithmic range is found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Choice {
@@ -42,7 +42,7 @@ pub enum Choice {
         #[schemars(range(min = 1, max = 1000))]
         per_decade: u32,
     },
-    /// By the error of leaving out each row in turn, told from all rows at once (Golub, Heath and Wahba 1979). It takes
+    /// By the error of leaving out each row in turn, worked out from all rows at once (Golub, Heath and Wahba 1979). It takes
     /// rows for independent, which those of a drift are not: it tends to penalties that are too small.
     GeneralisedCrossValidation {
         /// The smallest penalty tried, above 0.
@@ -137,7 +137,7 @@ impl Settled {
             }
             Choice::GeneralisedCrossValidation { .. } => "generalised cross-validation",
         };
-        let told = r2.map_or_else(String::new, |r2| {
+        let score = r2.map_or_else(String::new, |r2| {
             report.figure("penalty_r2", r2);
             format!(", R² {r2:.4}")
         });
@@ -147,7 +147,7 @@ impl Settled {
             _ => "",
         };
         report.notes.push(format!(
-            "penalty {:.3e} chosen by {how} from {tried} between {smallest:e} and {largest:e}{told}{edge}",
+            "penalty {:.3e} chosen by {how} from {tried} between {smallest:e} and {largest:e}{score}{edge}",
             self.alpha
         ));
     }

@@ -181,7 +181,7 @@ impl LinearTrainer {
         }
     }
 
-    /// Stochastic gradients on standardised regressors and centred truths, told on the scale of the data.
+    /// Stochastic gradients on standardised regressors and centred truths, given on the scale of the data.
     fn descend(
         &self,
         options: SgdOptions,

@@ -139,7 +139,7 @@ impl Estimator for Rls {
     }
 
     fn learns(&self) -> Learns {
-        Learns::UnlessTold
+        Learns::ByDefault
     }
 
     fn has_std_dev(&self) -> bool {

@@ -1,4 +1,4 @@
-//! Decides how a user asks for a selection of regressors, and how it is run and told.
+//! Decides how a user asks for a selection of regressors, and how it is run and reported.
 
 use athermal_core::node::{CandidateScore, Figure, Regressor, SelectionStep, TrainingReport};
 use athermal_numerics::{
@@ -252,15 +252,15 @@ fn tried(
     candidates: &[athermal_numerics::CandidateScore],
     name: &impl Fn(usize) -> String,
 ) -> Vec<CandidateScore> {
-    let told = candidates.iter().filter(|tried| tried.mean.is_finite());
-    let mut told: Vec<CandidateScore> = told
+    let scored = candidates.iter().filter(|tried| tried.mean.is_finite());
+    let mut scored: Vec<CandidateScore> = scored
         .map(|tried| CandidateScore {
             name: name(tried.candidate),
             score: tried.mean,
         })
         .collect();
-    told.sort_by(|a, b| b.score.total_cmp(&a.score));
-    told
+    scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+    scored
 }
 
 fn stepwise(

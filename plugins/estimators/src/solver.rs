@@ -82,7 +82,7 @@ impl Solver {
     /// Whether estimators go on learning with it.
     pub(crate) fn learns(&self) -> Learns {
         match self {
-            Self::Sgd { .. } => Learns::WhenTold,
+            Self::Sgd { .. } => Learns::OnRequest,
             Self::Ridge { .. } | Self::Ols {} => Learns::Never {
                 help: Some("write `solver = { type = \"sgd\" }`, or use `type = \"rls\"`"),
             },

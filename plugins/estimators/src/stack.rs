@@ -102,13 +102,13 @@ impl Trainer for Stacking {
         }
         let squares = sums.left(weights);
         let named = stacked.saved.regressors.iter().zip(weights.iter().copied());
-        let told: Vec<String> = named
+        let texts: Vec<String> = named
             .clone()
             .map(|(name, weight)| format!("{name} {weight:.3}"))
             .collect();
         let mut report = TrainingReport {
             in_sample_rmse: Some((squares / total.count() as f64).sqrt()),
-            notes: vec![format!("weights: {}", told.join(", "))],
+            notes: vec![format!("weights: {}", texts.join(", "))],
             ..TrainingReport::default()
         };
         report.figure("weights", Figure::named(named));

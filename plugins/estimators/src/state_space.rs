@@ -1,4 +1,4 @@
-//! The estimator whose states are told from the past.
+//! The estimator whose states are found from the past.
 
 use std::ops::RangeInclusive;
 
@@ -38,7 +38,7 @@ const LARGEST_PAST: usize = 1000;
 /// a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by
 /// default the span of the truth, since truths whose windows overlap share their noise; where several come within a step,
 /// each begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded. Running, it is told each truth that the embargo lets through; what those that
+/// series counts as so many steps, rounded. Running, it takes each truth that the embargo lets through; what those that
 /// are missing were is told from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
 /// missing in the fit, windows end and begin again. A segment begins with its first truth, as if that and the features had
 /// always been what they are, and so does what comes after more steps without features than ten, or than the model reaches
@@ -48,7 +48,7 @@ const LARGEST_PAST: usize = 1000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {
-    /// How many states, 1 to 20; or how that is told from the singular values, such as
+    /// How many states, 1 to 20; or how that is found from the singular values, such as
     /// `{ by = "threshold", share = 0.25 }`.
     #[serde(default)]
     pub states: States,
@@ -58,7 +58,7 @@ pub struct StateSpace {
     #[serde(default)]
     #[schemars(range(min = 2, max = 100))]
     pub horizon: Option<usize>,
-    /// How future truths are weighed before their singular values are told.
+    /// How future truths are weighed before their singular values are found.
     #[serde(default)]
     pub weighting: Weighting,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
@@ -73,11 +73,11 @@ pub struct StateSpace {
 pub enum States {
     /// So many.
     Given(#[schemars(range(min = 1, max = 20))] usize),
-    /// As many as the singular values tell.
-    Told(By),
+    /// As many as the singular values show.
+    Chosen(By),
 }
 
-/// How the number of states is told from the singular values.
+/// How the number of states is found from the singular values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum By {
@@ -92,7 +92,7 @@ pub enum By {
     },
 }
 
-/// How future truths are weighed before their singular values are told.
+/// How future truths are weighed before their singular values are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
@@ -111,7 +111,7 @@ fn quarter() -> f64 {
 
 impl Default for States {
     fn default() -> Self {
-        Self::Told(By::Threshold { share: quarter() })
+        Self::Chosen(By::Threshold { share: quarter() })
     }
 }
 
@@ -119,7 +119,7 @@ impl<'de> Deserialize<'de> for States {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Forms::new("a whole number or a table such as `{ by = \"gap\" }`")
             .whole(Self::Given)
-            .table(Self::Told)
+            .table(Self::Chosen)
             .read(deserializer)
     }
 }
@@ -177,11 +177,11 @@ impl StateSpace {
         Box::new(IdentifiedTrainer::new(setup, self.clone()))
     }
 
-    /// The horizons that may be taken: what is told of fewer steps than there are states does not tell them.
+    /// The horizons that may be taken: fewer steps than there are states do not show them.
     fn horizons(&self) -> RangeInclusive<usize> {
         let states = match self.states {
             States::Given(states) => states,
-            States::Told(_) => 0,
+            States::Chosen(_) => 0,
         };
         let shortest = self.horizon.unwrap_or(2).max(states);
         shortest..=self.horizon.unwrap_or(USUAL).max(shortest)
@@ -192,7 +192,7 @@ impl StateSpace {
         match self.states {
             _ if horizon <= 2 => None,
             States::Given(states) if states >= horizon => Some(Shortened::ByStates),
-            States::Given(_) | States::Told(_) => Some(Shortened::ByHorizon),
+            States::Given(_) | States::Chosen(_) => Some(Shortened::ByHorizon),
         }
     }
 
@@ -206,8 +206,8 @@ impl StateSpace {
             },
             order: match self.states {
                 States::Given(states) => StateOrder::Given(states),
-                States::Told(By::Gap {}) => StateOrder::LargestGap,
-                States::Told(By::Threshold { share }) => StateOrder::Threshold(share),
+                States::Chosen(By::Gap {}) => StateOrder::LargestGap,
+                States::Chosen(By::Threshold { share }) => StateOrder::Threshold(share),
             },
             alike: series,
             feedthrough: true,

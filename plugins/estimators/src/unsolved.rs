@@ -1,4 +1,4 @@
-//! How what numbers do not allow is told as an error of training.
+//! How what numbers do not allow becomes an error of training.
 
 use athermal_core::node::TrainingError;
 use athermal_numerics::NumericsError;

@@ -17,7 +17,7 @@ pub(crate) fn max_age(stated: Option<Duration>, of: &Channel) -> Result<Duration
     })
 }
 
-/// What is wrong with how old values may be; told once, however many channels it is true of.
+/// What is wrong with how old values may be; reported once, however many channels it is true of.
 pub(crate) fn max_age_mistake(stated: Option<Duration>, channels: &[Channel]) -> Option<Mistake> {
     channels
         .iter()

@@ -18,7 +18,7 @@ use athermal_trial::machine::{
 /// The chuck heats the holders by radiation and through the air, and the stages through their mounts; the room heats and cools everything;
 /// motors heat the stages during alignment bursts, after which the axes creep. Z follows mostly the holder, X and Y stage and frame.
 ///
-/// Unless told otherwise the chuck goes through the levels of the published settle times, 20, 30 and 50 °C, four hours each.
+/// By default the chuck goes through the levels of the published settle times, 20, 30 and 50 °C, four hours each.
 pub struct DieTester;
 
 const CHANNELS: [Channel; 12] = [

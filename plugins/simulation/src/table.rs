@@ -73,7 +73,7 @@ fn push_number(line: &mut Vec<u8>, value: f64, decimals: u32) {
     }
     let scale = 10_i64.pow(decimals);
     let scaled = (value * scale as f64).round();
-    // Beyond 2⁵³ neighbouring integers are not told apart.
+    // Beyond 2⁵³ neighbouring integers are not distinct.
     let exact = scaled.abs() < (1_u64 << 53) as f64 && scaled / scale as f64 == value;
     if exact {
         push_fixed(line, scaled as i64, decimals);

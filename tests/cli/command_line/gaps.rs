@@ -62,7 +62,7 @@ hartbeat = "1s"
     ];
     assert_told("command-line-deployment", &text, &expected);
     let text = text.replace("heartbeat = 1\nhartbeat = \"1s\"", "heartbeat = \"0s\"");
-    let expected = [&expected[..2], &[(24, "longer than 0")]].concat();
+    let expected = [&expected[..2], &[(24, "greater than 0")]].concat();
     assert_told("command-line-heartbeat", &text, &expected);
     let text = "schema = 1\nsource = \"a.csv\"\nruntime = 3\nmodel = 4\n";
     let expected = [

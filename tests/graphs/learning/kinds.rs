@@ -51,7 +51,7 @@ impl Estimator for Told {
     }
 
     fn learns(&self) -> Learns {
-        Learns::WhenTold
+        Learns::OnRequest
     }
 
     fn trainer(&self, _setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -1,4 +1,4 @@
-//! Decides which channels are predictions, and which may stand for the same quantity.
+//! Which channels are predictions, and which may stand for the same quantity.
 
 use super::conversion::{factor, mismatch};
 use super::instance::Declared;
@@ -21,8 +21,10 @@ impl Resolver<'_> {
             let Ok(Found::Slots(slots)) = self.scopes.look_up(text) else {
                 continue;
             };
-            let mut told_of = slots.iter().map(|&slot| (slot, self.told_of(slot)));
-            let Some((slot, Some(prediction))) = told_of.find(|(_, of)| of.is_some()) else {
+            let mut beside = slots
+                .iter()
+                .map(|&slot| (slot, self.prediction_beside(slot)));
+            let Some((slot, Some(prediction))) = beside.find(|(_, of)| of.is_some()) else {
                 continue;
             };
             let reference = Reference::parse(text);
@@ -40,7 +42,7 @@ impl Resolver<'_> {
     }
 
     /// The prediction beside which an estimator or combiner gives this slot.
-    pub(super) fn told_of(&self, slot: usize) -> Option<usize> {
+    pub(super) fn prediction_beside(&self, slot: usize) -> Option<usize> {
         let node = &self.nodes[self.channels[slot].node?];
         let (_, predictions) = node.ports.first()?;
         let predicts = !matches!(node.role, PlannedRole::Feature { .. });

@@ -1,4 +1,4 @@
-//! Decides whether the columns of a signal are named for another unit than the signal's; what a log holds is not looked at.
+//! Whether the columns of a signal are named for another unit than the signal's.
 
 use crate::unit::Unit;
 
@@ -28,21 +28,21 @@ mod tests {
     use super::other_than;
     use crate::unit::Unit;
 
-    fn told(unit: &str, column: &str) -> Option<String> {
+    fn other(unit: &str, column: &str) -> Option<String> {
         let unit = Unit::parse(unit).expect("a unit");
         other_than(&unit, column).map(|named| named.to_string())
     }
 
     #[test]
-    fn columns_that_are_named_for_another_unit_of_the_same_kind_are_told() {
-        assert_eq!(told("nm", "{channel}_um").as_deref(), Some("um"));
-        assert_eq!(told("K", "T_{channel}_degC").as_deref(), Some("Cel"));
-        assert_eq!(told("Cel", "{channel}_K").as_deref(), Some("K"));
-        assert_eq!(told("um", "Z [mm]").as_deref(), Some("mm"));
-        assert_eq!(told("1", "{channel} (%)").as_deref(), Some("%"));
-        assert_eq!(told("1", "{channel}_pct").as_deref(), Some("%"));
-        assert_eq!(told("C", "{channel}_degC").as_deref(), Some("Cel"));
-        assert_eq!(told("F", "{channel}_degF").as_deref(), Some("[degF]"));
+    fn columns_that_are_named_for_another_unit_of_the_same_kind_are_found() {
+        assert_eq!(other("nm", "{channel}_um").as_deref(), Some("um"));
+        assert_eq!(other("K", "T_{channel}_degC").as_deref(), Some("Cel"));
+        assert_eq!(other("Cel", "{channel}_K").as_deref(), Some("K"));
+        assert_eq!(other("um", "Z [mm]").as_deref(), Some("mm"));
+        assert_eq!(other("1", "{channel} (%)").as_deref(), Some("%"));
+        assert_eq!(other("1", "{channel}_pct").as_deref(), Some("%"));
+        assert_eq!(other("C", "{channel}_degC").as_deref(), Some("Cel"));
+        assert_eq!(other("F", "{channel}_degF").as_deref(), Some("[degF]"));
     }
 
     #[test]
@@ -57,7 +57,7 @@ mod tests {
             ("V", "heater_degC"),
             ("nm", "position"),
         ] {
-            assert_eq!(told(unit, column), None, "{column} in {unit}");
+            assert_eq!(other(unit, column), None, "{column} in {unit}");
         }
     }
 }

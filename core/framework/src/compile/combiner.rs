@@ -1,4 +1,4 @@
-//! Decides which predictions a combiner may put together.
+//! Which predictions a combiner may put together.
 
 use super::estimator::std_dev_of;
 use super::instance::Instance;
@@ -100,7 +100,7 @@ impl Resolver<'_> {
     }
 
     /// Notes what may see the answer beside predictions, which have been looked at with the nodes that make them: what else
-    /// votes, and what tells a state.
+    /// votes, and what gives a state.
     fn suspect(
         &mut self,
         instance: &Instance<'_>,
@@ -200,7 +200,7 @@ impl Resolver<'_> {
         voters.iter().map(weight).collect()
     }
 
-    /// A channel of plain numbers that tell of a vote, held as long as the vote is.
+    /// A channel of plain numbers about a vote, held as long as the vote is.
     fn beside(&self, slot: usize, name: String) -> Channel {
         Channel {
             name,

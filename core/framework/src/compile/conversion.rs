@@ -1,4 +1,4 @@
-//! Decides where a value is given to a node in another unit than it has: by a factor, never by an offset.
+//! Where a value is given to a node in another unit than it has: by a factor, never by an offset.
 //!
 //! A conversion is inserted where what is meant is not in doubt:
 //!
@@ -6,7 +6,7 @@
 //! - an input port that declares a unit is given its channels in it;
 //! - what a loop-closing node reads is given in the unit that it says.
 //!
-//! Points on a temperature scale (`Cel`) and differences (`K`) are told apart: neither is taken for the other, and no
+//! Points on a temperature scale (`Cel`) and differences (`K`) are different things: neither is taken for the other, and no
 //! scale is turned into another, since that takes an offset.
 
 use super::plan::Conversion;

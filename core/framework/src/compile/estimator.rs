@@ -1,4 +1,4 @@
-//! Decides what an estimator learns from and what it gives; what its rows are made of is decided by [`row`](super::row).
+//! What an estimator learns from and what it gives. [`row`](super::row) has what its rows are made of.
 
 use std::collections::BTreeSet;
 
@@ -200,7 +200,7 @@ impl Resolver<'_> {
                 .report(instance.input_place("truth"), problem);
             return None;
         }
-        if let Some(prediction) = self.told_of(truth) {
+        if let Some(prediction) = self.prediction_beside(truth) {
             let name = |slot: usize| self.channels[slot].name.clone();
             let problem = problem::TruthOfPrediction {
                 channel: name(truth),

@@ -1,4 +1,4 @@
-//! Decides what a feature of a graph is given and what it gives.
+//! What a feature of a graph is given and what it gives.
 
 use super::instance::Instance;
 use super::kind_fault::KindFault;
@@ -105,7 +105,7 @@ impl Resolver<'_> {
         self.add(instance, outputs, role, behind, None)
     }
 
-    /// The rows that a feature is fitted on; `None` when an error about them has been told.
+    /// The rows that a feature is fitted on; `None` when an error about them has been reported.
     fn fit(
         &mut self,
         instance: &Instance<'_>,

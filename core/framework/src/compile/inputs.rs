@@ -1,4 +1,4 @@
-//! Decides which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
+//! Which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
 
 use std::collections::HashSet;
 
@@ -90,7 +90,7 @@ impl Resolver<'_> {
         twice.is_none()
     }
 
-    /// Tells that an input is missing, unless it is there under a name that is told to be none.
+    /// Reports that an input is missing, unless it stands under a name that is reported as unknown.
     pub(super) fn missing_input(&mut self, instance: &Declared<'_>, port: &InputPort) {
         let is_meant = |given: &str| meant_input(instance, given) == Some(port.name);
         let parameters = instance.decl.parameters.as_table();
@@ -128,7 +128,7 @@ impl Resolver<'_> {
         self.one_of(instance, port, &slots)
     }
 
-    /// The one of these slots; where there are several or none, that is told.
+    /// The one of these slots; several or none are reported.
     pub(super) fn one_of(
         &mut self,
         instance: &Declared<'_>,
@@ -178,7 +178,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// How long a held value of each slot counts at an input; `None` where nothing says it of one, which is told once for each signal
+    /// How long a held value of each slot counts at an input; `None` where that is not known of one, which is reported once for each signal
     /// and node.
     pub(super) fn max_ages(
         &mut self,
@@ -192,11 +192,11 @@ impl Resolver<'_> {
             .map(|(age, _)| age);
         let age = |slot: &usize| stated.or_else(|| self.channels[*slot].channel.default_max_age());
         let ages: Vec<Option<Duration>> = slots.iter().map(age).collect();
-        let mut told = HashSet::new();
+        let mut reported = HashSet::new();
         for (&slot, _) in slots.iter().zip(&ages).filter(|(_, age)| age.is_none()) {
             let channel = self.channels[slot].name.clone();
             let of = Reference::parse(&channel).whole_node().into_owned();
-            if !told.insert(of) {
+            if !reported.insert(of) {
                 continue;
             }
             let mut behind = self.provenance[slot].sources();
@@ -251,7 +251,7 @@ impl Resolver<'_> {
         Some(self.gathers.insert_full(gather).0)
     }
 
-    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
+    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been reported.
     pub(super) fn conversions(
         &mut self,
         instance: &Declared<'_>,

@@ -8,9 +8,8 @@ use super::keys::EstimatorKeys;
 use super::misplaced::{INPUTS, misplaced};
 use super::problem;
 use crate::diagnostic::{Diagnostics, Place};
-use crate::document::{
-    Data, DocumentProblem, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode,
-};
+use crate::document::problem::InputAsKey;
+use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
 
 /// A node whose kind and parameters have been read.
@@ -94,7 +93,7 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
     ReadNode { kind, instances }
 }
 
-/// The kind of a name; `None` when an error about it has been told.
+/// The kind of a name; `None` when an error about it has been reported.
 fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'static Kind> {
     match kinds().get(name).map(Vec::as_slice) {
         Some([kind]) => {
@@ -209,7 +208,7 @@ fn take_inputs(kind: &Kind, parameters: &mut Value, diagnostics: &mut Diagnostic
             && let Some(entry) = table.remove(&key)
         {
             let (what, input) = ("the node".to_owned(), input.to_owned());
-            let problem = DocumentProblem::InputAsKey { key, what, input };
+            let problem = InputAsKey { key, what, input };
             diagnostics.report(entry.key, problem);
             is_whole = false;
         }

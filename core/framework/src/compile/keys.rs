@@ -1,4 +1,4 @@
-//! Decides which keys of an estimator's table the framework reads itself, and what they may be; not what is made of them.
+//! The keys of an estimator's table that the framework reads itself, and what they may be.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
@@ -53,7 +53,7 @@ pub(crate) enum Learn {
 pub(crate) struct LearnLimits {
     /// Truths that miss their prediction by more than this multiple of the recent root mean square error, above 1; what the fit
     /// was off by stands for the first, but for kinds that go on from the last truths, such as `kalman`. Errors of a kind that
-    /// tells how unsure it is are in units of its `std_dev`, so that after a gap it may be off by more. A truth that is left
+    /// states how unsure it is are in units of its `std_dev`, so that after a gap it may be off by more. A truth that is left
     /// out counts as one at the limit, so that a change that stays is learned after a few, and so is a burst that goes on for
     /// as long.
     #[schemars(extend("exclusiveMinimum" = 1.0))]

@@ -1,4 +1,4 @@
-//! Decides which features see the future: those that are made of what the truth is made of, too little delayed.
+//! Which features see the future: those that are made of what the truth is made of, too little delayed.
 //!
 //! It looks at the graph once all of it is known, since feedback through a delay brings what comes later in the order.
 

@@ -1,4 +1,4 @@
-//! Decides whether an estimator goes on learning while it runs, and what it never learns from.
+//! Whether an estimator goes on learning while it runs, and what it never learns from.
 
 use super::instance::Instance;
 use super::keys::{Learn, LearnLimits};
@@ -11,7 +11,7 @@ use crate::time::Duration;
 use crate::unit::Unit;
 
 impl Resolver<'_> {
-    /// Whether an estimator learns while it runs, and how; `None` when an error about it has been told.
+    /// Whether an estimator learns while it runs, and how; `None` when an error about it has been reported.
     pub(super) fn learning(
         &mut self,
         instance: &Instance<'_>,
@@ -19,7 +19,7 @@ impl Resolver<'_> {
     ) -> Option<Option<PlannedLearning>> {
         let learns = estimator.learns();
         let limits = match (instance.read.estimator.learn, learns) {
-            (None, Learns::UnlessTold) => Some(LearnLimits::default()),
+            (None, Learns::ByDefault) => Some(LearnLimits::default()),
             (None, _) | (Some(Learn::Switch(false)), _) => None,
             (Some(_), Learns::Never { help }) => {
                 let kind = instance.kind.name;
@@ -61,7 +61,7 @@ impl Resolver<'_> {
     }
 }
 
-/// The port that tells what became of the newest truth.
+/// The port of the outcome of the newest truth.
 pub(super) fn port(of: &Channel) -> OutputPort {
     OutputPort {
         name: "learning",

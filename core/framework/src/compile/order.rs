@@ -1,4 +1,4 @@
-//! Decides the order in which nodes are resolved and run; any order is checked by the references themselves.
+//! The order in which nodes are resolved and run. The [gate](super::gate) checks it.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -18,7 +18,7 @@ pub(crate) struct Order {
     pub(crate) nodes: Vec<usize>,
     /// Nodes that take inputs from nodes after them.
     pub(crate) closing: BTreeSet<usize>,
-    /// Nodes in a loop that nothing breaks; an error has been told.
+    /// Nodes in a loop that nothing breaks; an error has been reported.
     pub(crate) looping: BTreeSet<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! Decides what a compiled graph is: slots, gathers, nodes and the order of steps; not when it runs.
+//! What a compiled graph is: slots, gathers, nodes and the order of steps.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Decides which channels of a port a name or a pattern picks out; which port is meant is decided by who asks.
+//! Which channels of a port a name or a pattern picks out.
 
 use std::cell::OnceCell;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Decides from which measured channels, and how much delayed, a value is made; the leak check stands on it.
+//! From which measured channels, and how much delayed, a value is made; the leak check stands on it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

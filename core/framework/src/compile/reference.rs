@@ -1,4 +1,4 @@
-//! Decides what a reference such as `gradients:stderr.plate?@150s` means as text; not what there is to refer to.
+//! What a reference such as `gradients:stderr.plate?@150s` means as text.
 
 use std::borrow::Cow;
 

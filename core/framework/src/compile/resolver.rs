@@ -1,4 +1,4 @@
-//! Decides what each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
+//! What each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
 
 use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
@@ -190,7 +190,7 @@ impl<'g> Resolver<'g> {
         }
     }
 
-    /// Resolves one instance; `None` when an error about it has been told.
+    /// Resolves one instance; `None` when an error about it has been reported.
     fn instance(&mut self, instance: &Instance<'_>, closes: bool) -> Option<()> {
         self.known_inputs(instance);
         self.idle_ages(instance);
@@ -291,7 +291,7 @@ impl<'g> Resolver<'g> {
             debug_assert!(
                 instance.kind.role == RoleName::Feature
                     || instance.kind.outputs().contains(&port.name),
-                "the ports of estimators and combiners are those that are told of them"
+                "the ports of estimators and combiners are those that their kinds declare"
             );
             let first = self.channels.len();
             let single = port.channels.len() == 1;
@@ -309,7 +309,7 @@ impl<'g> Resolver<'g> {
                     channel,
                     node: Some(index),
                     history: None,
-                    // Only what a node gives first is a prediction; the other ports tell of it.
+                    // Only what a node gives first is a prediction; the other ports describe it.
                     predicts: predicts.filter(|_| ranges.is_empty()),
                 });
                 let behind = behind.next().unwrap_or_default();

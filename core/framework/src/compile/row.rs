@@ -1,4 +1,4 @@
-//! Decides what the rows of an estimator are made of, features and past truths at their lags, and that none of it sees the future.
+//! What the rows of an estimator are made of, features and past truths at their lags, and that none of it sees the future.
 
 use super::instance::Instance;
 use super::plan::TruthLink;

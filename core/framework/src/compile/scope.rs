@@ -1,4 +1,4 @@
-//! Decides which slots a reference names.
+//! Which slots a reference names.
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ pub(crate) struct Scopes {
 pub(crate) struct Scope {
     /// Ports by name; the first is the default.
     pub(crate) ports: IndexMap<&'static str, PortChannels>,
-    /// Set when an error has been told of it, so that references to it say nothing more.
+    /// Set when an error of it has been reported, so that references to it say nothing more.
     pub(crate) broken: bool,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Scope {
 pub(crate) enum Found {
     /// Slots in the producer's order.
     Slots(Vec<usize>),
-    /// Nothing, and the reason has been told where the producer stands.
+    /// Nothing, and the reason has been reported where the producer stands.
     Broken,
 }
 

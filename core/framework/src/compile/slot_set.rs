@@ -1,4 +1,4 @@
-//! Decides how a set of slots is kept: a mark for each, since most slots of a graph are in most sets.
+//! A set of slots: a mark for each, since most slots of a graph are in most sets.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Decides the steps of a tick, which ports are computed at all, and what nobody uses.
+//! The steps of a tick, which ports are computed at all, and what nobody uses.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;

@@ -12,7 +12,7 @@ use crate::time::Duration;
 /// is a term, and the 1 that `A`, `C`, `D` and `F` begin with is not.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Coefficients {
-    /// The terms, in the order in which they are told.
+    /// The terms, in the order in which they are listed.
     pub terms: Vec<Term>,
     /// How large the noises are that it takes for granted.
     pub noises: Vec<Noise>,

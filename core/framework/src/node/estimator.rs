@@ -145,11 +145,11 @@ pub struct Regressors {
     pub truth_lags: TruthLags,
     /// Whether the answer changes with time alone, so that the node runs at every tick.
     pub every_tick: bool,
-    /// Which runs its trainer is told of.
+    /// Which runs its trainer gets.
     pub runs: Runs,
 }
 
-/// Which runs a trainer is told of.
+/// Which runs a trainer gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Runs {
     /// Those that truths belong to, as rows.
@@ -202,7 +202,7 @@ pub struct TrainingSetup {
     /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out, and those
     /// that stay the same in all of them, unless it [needs](Estimator::needs_constants) them.
     pub places: Vec<usize>,
-    /// The unit of errors, for what is told of the fit: that of the truth, or K where that is a temperature.
+    /// The unit of errors, for what is reported of the fit: that of the truth, or K where that is a temperature.
     pub error_unit: String,
     /// How many bytes of rows the trainer may keep.
     pub memory: usize,
@@ -229,8 +229,8 @@ pub trait Trainer: Send {
     /// A run between the last row and the next: its regressors, all of them present, and the instant whose truth it predicts, from
     /// which nothing is learned. That truth has not been measured, lies outside of the limits of the fit, or never comes.
     ///
-    /// Only trainers are told that ask for it ([`Runs::BetweenTruths`]), and only where rows are further apart than usual: of the
-    /// runs between them, some in each such distance. Nothing is told of the part of the data that a fold leaves out, nor where
+    /// Only trainers that ask for it are called ([`Runs::BetweenTruths`]), and only where rows are further apart than usual: of the
+    /// runs between them, some in each such distance. Not called for the part of the data that a fold leaves out, nor where
     /// rows alone fill the memory of the fit.
     fn run_at(&mut self, _of: Instant, _regressors: &[f64]) {}
 

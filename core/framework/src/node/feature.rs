@@ -80,7 +80,7 @@ pub trait Feature: Debug + Send + Sync {
     where
         Self: Sized;
 
-    /// All output ports that [`outputs`](Self::outputs) may give, in that order, as they are told of the kind. Without them a node
+    /// All output ports that [`outputs`](Self::outputs) may give, in that order. Without them a node
     /// of several ports has to name them in its documentation.
     fn ports() -> &'static [PortSummary]
     where
@@ -100,7 +100,7 @@ pub trait Feature: Debug + Send + Sync {
     /// Every mistake in how the inputs fit the parameters; those of `mistakes` need not be there, and do no harm.
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>>;
 
-    /// What can be used and is probably not meant, told as warnings; asked for only where there is no mistake.
+    /// What can be used and is probably not meant, reported as warnings; asked for only where there is no mistake.
     fn warnings(&self, _inputs: &Inputs) -> Vec<Mistake> {
         Vec::new()
     }

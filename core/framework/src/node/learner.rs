@@ -18,9 +18,9 @@ pub enum Learns {
         help: Option<&'static str>,
     },
     /// With `learn = true`.
-    WhenTold,
+    OnRequest,
     /// Unless the graph says `learn = false`.
-    UnlessTold,
+    ByDefault,
 }
 
 /// A fitted estimator that goes on learning; a [`Predictor`](super::Predictor) makes it.
@@ -28,7 +28,7 @@ pub enum Learns {
 /// The predictor stays as it was fitted and may be shared; what is learned since is the learner's own. The engine hands over
 /// each run's regressors with the truth that belongs to them, once the embargo lets it through, and asks for a prediction
 /// first: learning is test-then-train. It hands over nothing while learning is frozen. A whole learner, which predicts the
-/// last truth that it was told:
+/// last truth that it learned:
 ///
 /// ```
 /// use athermal_core::node::prelude::*;
@@ -102,16 +102,16 @@ pub trait Learner: Debug + Send {
         f64::NAN
     }
 
-    /// The root mean square by which the truths of the fit missed their predictions, for a kind that tells no deviation; NaN where
+    /// The root mean square by which the truths of the fit missed their predictions, for a kind without a standard deviation; NaN where
     /// it is not known. The first truths that miss by much more are not handed over.
     fn usual_error(&self) -> f64 {
         f64::NAN
     }
 
     /// Takes the regressors of a run, NaN where one is absent, which predicts the truth that will be measured at `of`; every
-    /// truth that arrived up to `told` has been handed over, if it was to be. For learners whose state goes on without a
+    /// truth that arrived up to `arrived` has been handed over, if it was to be. For learners whose state goes on without a
     /// truth; `of` never goes back, and nothing is allocated here once the number of runs within the horizon is known.
-    fn run(&mut self, _regressors: &[f64], _of: Instant, _told: Instant) {}
+    fn run(&mut self, _regressors: &[f64], _of: Instant, _arrived: Instant) {}
 
     /// Whether truths only move a state, and nothing of the model: they are then handed over while learning is frozen on
     /// command too.

@@ -4,11 +4,11 @@ use super::recent_error::RecentError;
 use super::{Learner, TrainedRange};
 use crate::time::Instant;
 
-/// What a learner is not told of: the key `learn` of an estimator.
+/// What a learner does not learn from: the key `learn` of an estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LearningLimits {
     /// A truth that misses its prediction by more than this multiple of the recent error is not learned from; both in units of
-    /// the learner's deviation, where it tells one.
+    /// the learner's deviation, where it has one.
     pub outliers: f64,
     /// By which multiple of its width a regressor may lie outside its range in the fit.
     pub margin: f64,

@@ -15,7 +15,7 @@ pub enum Read {
     Truth,
 }
 
-/// An output port of a kind, as it is told before there is a node.
+/// An output port of a kind, known before there is a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PortSummary {
     /// The name after a colon in a reference: `stderr` of `drift:stderr`.
@@ -202,7 +202,7 @@ impl Mistake {
             .collect()
     }
 
-    /// Names another parameter on which the mistake rests (`solver.alpha`, or `inputs.PORT`): nothing is told of it where that one
+    /// Names another parameter on which the mistake rests (`solver.alpha`, or `inputs.PORT`): it is not reported where that one
     /// cannot be read, since the mistake may go with that one's.
     #[must_use]
     pub fn rests_on(mut self, parameter: impl Into<String>) -> Self {

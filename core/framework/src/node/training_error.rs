@@ -1,4 +1,4 @@
-//! Decides in which words a fit that gave nothing is told; whether it gave nothing is decided by who fits.
+//! Why a fit gave nothing, in words.
 
 use crate::diagnostic::{count, counted};
 use crate::time::Duration;
@@ -182,7 +182,7 @@ impl std::fmt::Display for TrainingError {
     }
 }
 
-/// At most so many names are told.
+/// At most so many names are listed.
 const MOST: usize = 6;
 
 fn names(of: &[String]) -> String {

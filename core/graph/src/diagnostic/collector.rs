@@ -138,8 +138,17 @@ impl Diagnostics {
         place: impl Into<Option<Place>>,
         problem: impl Into<Box<dyn Problem>>,
     ) {
+        self.report_borrowed(place, &*problem.into());
+    }
+
+    /// As [`Diagnostics::report`], of what is kept.
+    pub(crate) fn report_borrowed(
+        &mut self,
+        place: impl Into<Option<Place>>,
+        problem: &dyn Problem,
+    ) {
         let context = self.scope.clone();
-        self.note(context, place.into(), &*problem.into());
+        self.note(context, place.into(), problem);
     }
 
     /// Notes a problem unless another is known at its place, from which it may follow.

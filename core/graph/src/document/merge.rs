@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::problem::DocumentProblem;
+use super::problem;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Names};
 
@@ -110,7 +110,7 @@ fn merge_named(
             if inherited.remove(&name).is_none() {
                 diagnostics.report(
                     over.key,
-                    DocumentProblem::NothingToRemove {
+                    problem::NothingToRemove {
                         role,
                         name,
                         inherited: Arc::clone(&names),

@@ -30,7 +30,6 @@ pub use graph_file::{
 pub use hint::Hint;
 pub use json::JsonError;
 pub use pattern::Pattern;
-pub use problem::DocumentProblem;
 pub use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};
 pub use tree::{Data, Entry, Table, Value};

@@ -6,10 +6,10 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::merge::merge;
-use super::problem::DocumentProblem;
+use super::problem;
 use super::toml_text;
 use super::tree::{Data, Entry, Table, Value};
-use crate::diagnostic::{Diagnostics, Names, Place, SourceId, Sources};
+use crate::diagnostic::{Diagnostics, Names, Place, Problem, SourceId, Sources};
 
 /// The largest file that is read, in bytes.
 const LARGEST: usize = 16_000_000;
@@ -215,7 +215,7 @@ impl Chain<'_> {
             let source = self.sources.add(shown, "");
             self.diagnostics.report(
                 Place::new(source, 0, 0),
-                DocumentProblem::TooLarge { limit: LARGEST },
+                problem::TooLarge { limit: LARGEST },
             );
             return None;
         }
@@ -226,10 +226,10 @@ impl Chain<'_> {
             Some(value) if value.as_integer() == Some(1) => {}
             None => self
                 .diagnostics
-                .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
+                .report(Place::new(source, 0, 0), problem::SchemaMissing {}),
             Some(value) => {
                 let found = value.found();
-                self.fail(value.place, DocumentProblem::SchemaUnknown { found });
+                self.fail(value.place, problem::SchemaUnknown { found });
             }
         }
         let mut base = match table.remove("extends") {
@@ -290,7 +290,7 @@ impl Chain<'_> {
                     .entry(file.to_owned())
                     .or_insert_with(|| Arc::new(of_file.keys().map(str::to_owned).collect()));
                 let (name, known) = (wanted, Arc::clone(known));
-                self.fail(place, DocumentProblem::UnknownModule { name, known });
+                self.fail(place, problem::UnknownModule { name, known });
                 continue;
             };
             if let Some(entry) = lent.entry("modules")
@@ -331,7 +331,7 @@ impl Chain<'_> {
             );
             self.fail(
                 place,
-                DocumentProblem::WrongType {
+                problem::WrongType {
                     key,
                     expected,
                     found: extends.found(),
@@ -348,13 +348,13 @@ impl Chain<'_> {
                 .chain([&wanted])
                 .map(|path| path.display().to_string())
                 .collect();
-            self.fail(place, DocumentProblem::ExtendsLoop { chain });
+            self.fail(place, problem::ExtendsLoop { chain });
             return None;
         }
         if self.paths.len() >= LONGEST_CHAIN {
             self.fail(
                 place,
-                DocumentProblem::LongChain {
+                problem::LongChain {
                     limit: LONGEST_CHAIN,
                 },
             );
@@ -369,7 +369,7 @@ impl Chain<'_> {
         }
     }
 
-    fn fail(&mut self, place: Place, problem: DocumentProblem) {
+    fn fail(&mut self, place: Place, problem: impl Into<Box<dyn Problem>>) {
         self.failed = true;
         self.diagnostics.report(place, problem);
     }
@@ -381,13 +381,13 @@ fn not_read(
     error: &io::Error,
     reader: &dyn FileReader,
     being_read: &[PathBuf],
-) -> DocumentProblem {
+) -> problem::Unreadable {
     let mut beside = match error.kind() {
         io::ErrorKind::NotFound => reader.beside(path),
         _ => Vec::new(),
     };
     beside.retain(|name| !being_read.contains(&normal(&path.with_file_name(name))));
-    DocumentProblem::Unreadable {
+    problem::Unreadable {
         path: path.display().to_string(),
         reason: unreadable(error),
         beside,

@@ -6,9 +6,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
 use super::foreign_syntax;
-use super::problem::DocumentProblem;
+use super::problem;
 use super::tree::{Data, Entry, Table, Value};
-use crate::diagnostic::{Diagnostics, Place, SourceId};
+use crate::diagnostic::{Diagnostics, Place, Problem, SourceId};
 
 /// How deep keys may nest; the stack of a thread bears several times as much.
 const DEEPEST: usize = 64;
@@ -40,7 +40,7 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
     });
     for (bytes, error) in errors {
         let reason = error.message().to_owned();
-        let problem = DocumentProblem::Syntax {
+        let problem = problem::Syntax {
             bare: bare(text, &bytes).filter(|_| reason != DUPLICATE_KEY),
             foreign: foreign_syntax::of(text, &bytes),
             reason,
@@ -92,7 +92,7 @@ fn value(
 ) -> Option<Value> {
     let place = at(source, &spanned.span());
     let mut too_large = |number: String| {
-        diagnostics.report(place, DocumentProblem::NumberTooLarge { number });
+        diagnostics.report(place, problem::NumberTooLarge { number });
         None
     };
     let data = match spanned.into_inner() {
@@ -123,7 +123,7 @@ fn value(
 
 /// The first byte of what is too much to be parsed: a key with more parts than may be nested, since the parser does not limit them
 /// and everything behind it is recursive; or a list with more values than any may have.
-fn too_much(text: &str) -> Option<(usize, DocumentProblem)> {
+fn too_much(text: &str) -> Option<(usize, Box<dyn Problem>)> {
     let bytes = text.as_bytes();
     let mut dots = 0;
     let (mut list, mut values) = (0, 0);
@@ -150,11 +150,11 @@ fn too_much(text: &str) -> Option<(usize, DocumentProblem)> {
             _ => {}
         }
         if dots >= DEEPEST {
-            return Some((at_byte, DocumentProblem::TooDeep { limit: DEEPEST }));
+            return Some((at_byte, problem::TooDeep { limit: DEEPEST }.into()));
         }
         if values > LONGEST_LIST {
             let limit = LONGEST_LIST;
-            return Some((list, DocumentProblem::LongList { limit }));
+            return Some((list, problem::LongList { limit }.into()));
         }
         at_byte += 1;
     }

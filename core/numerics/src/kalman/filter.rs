@@ -2,7 +2,7 @@
 //! decide which variances the model has.
 
 use super::Structural;
-use super::matrix::{NOTHING_NEW, Told, carry, diagonal, product, rank, shrink};
+use super::matrix::{NOTHING_NEW, Observation, carry, diagonal, product, rank, shrink};
 use crate::NumericsError;
 use crate::checks::{check_length, check_parameter};
 use crate::scratch::Scratch;
@@ -248,7 +248,7 @@ impl Kalman {
     }
 
     /// Takes an observation with its regressors, without allocating; NaN is none. The answer is empty where the observation
-    /// was not used: it is missing, a number is not finite, or nothing is uncertain that it could tell of.
+    /// was not used: it is missing, a number is not finite, or it says nothing about what is uncertain.
     ///
     /// # Panics
     /// When `x` has not one value per coefficient.
@@ -293,7 +293,7 @@ impl Kalman {
         self.take(x, error, share, states)
     }
 
-    /// Makes a state more uncertain by a variance of its own, as of a leap that nothing else tells of. One that is no number, or
+    /// Makes a state more uncertain by a variance of its own, as of a leap that nothing else shows. One that is no number, or
     /// not above 0, adds nothing; the largest number is the most.
     ///
     /// # Panics
@@ -363,13 +363,13 @@ impl Kalman {
             *state += share * step;
         }
         if explained > UNSURE * own {
-            let told = Told {
+            let observation = Observation {
                 states,
                 variance: own * (explained / variance),
                 shared: |i: usize| shared[i] * (own / root),
                 left: |i: usize, j: usize, value: f64| value - shared[i] * shared[j],
             };
-            told.settle(&mut self.covariance, &self.model, x, &mut rest[..order]);
+            observation.settle(&mut self.covariance, &self.model, x, &mut rest[..order]);
         } else {
             let rows = self.covariance.chunks_exact_mut(order);
             for (i, (row, a)) in rows.zip(&*shared).enumerate() {
@@ -454,7 +454,7 @@ impl Kalman {
     pub fn restart_level(&mut self, known: &[(f64, f64)]) {
         assert!(
             self.can_restart(known),
-            "level and trend are told together, and what is known of them is finite"
+            "level and trend are found together, and what is known of them is finite"
         );
         let order = self.state.len();
         self.forget_level();
@@ -520,7 +520,7 @@ impl Kalman {
         terms.fold(mean, |sum, (nth, coefficient)| sum + coefficient * x(nth))
     }
 
-    /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
+    /// Takes an observation of something that nothing is known of; none where all that it shows is known.
     fn learn_of_the_unknown(&mut self, x: &[f64], error: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
         let (of_diffuse, rest) = self.room.0.split_at_mut(order);
@@ -541,13 +541,13 @@ impl Kalman {
             value + (a * b * finite - (a * shared[j] + b * shared[i]))
         };
         if explained > UNSURE * own {
-            let told = Told {
+            let observation = Observation {
                 states: order,
                 variance: own,
                 shared: |i: usize| of_diffuse[i] / variance * own,
                 left,
             };
-            told.settle(&mut self.covariance, &self.model, x, rest);
+            observation.settle(&mut self.covariance, &self.model, x, rest);
         } else {
             for (at, value) in self.covariance.iter_mut().enumerate() {
                 *value = left(at / order, at % order, *value);

@@ -260,7 +260,7 @@ pub fn follow(model: Structural, series: &Series<'_>) -> Result<Followed, Numeri
 ///
 /// Where observations share noise, the coefficients are those of all, each counted for its share, and the variances those of
 /// observations so far apart that they share none, less what the coefficients explain of them; each goes by the other until
-/// they agree. The likelihood and the errors told are of those far apart.
+/// they agree. The likelihood and the errors are of those far apart.
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] when fewer observations can be predicted than there are variances;

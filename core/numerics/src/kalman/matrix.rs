@@ -75,8 +75,8 @@ pub(super) fn product(matrix: &[f64], model: &Structural, x: &[f64], to: &mut [f
     terms.fold(to[0], |sum, (value, x)| sum + value * x)
 }
 
-/// What an observation tells of the sum `z = (1, 0, x)ᵀs` of the states `s`.
-pub(super) struct Told<Shared, Left> {
+/// An observation of the sum `z = (1, 0, x)ᵀs` of the states `s`.
+pub(super) struct Observation<Shared, Left> {
     /// How many of the states it moves; what the others have in common stays.
     pub(super) states: usize,
     /// The variance of `z` after it.
@@ -87,7 +87,7 @@ pub(super) struct Told<Shared, Left> {
     pub(super) left: Left,
 }
 
-impl<Shared: Fn(usize) -> f64, Left: Fn(usize, usize, f64) -> f64> Told<Shared, Left> {
+impl<Shared: Fn(usize) -> f64, Left: Fn(usize, usize, f64) -> f64> Observation<Shared, Left> {
     /// Leaves of a covariance what an observation leaves of it, where nearly nothing of a large variance is left.
     ///
     /// The usual difference `P − PhhᵀP / F` rounds as much as `P` is large, and may come out negative (Bierman 1977, section

@@ -136,7 +136,7 @@ mod tests {
         }
         let start = Start {
             values: vec![0.0],
-            told: 0.0,
+            determined: 0.0,
         };
         let [filtered, known] = &beginnings(&model, &samples, &[start])[..] else {
             panic!("one for each input");

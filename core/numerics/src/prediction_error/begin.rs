@@ -208,7 +208,7 @@ impl PredictionError {
 
 /// The orders with a coefficient less from whose best model a search begins too, since none of its other starts may be near the
 /// least error: of filters with more than one pole, where poles that stand in for each other hold a search that begins with only
-/// some of them right, and of noise that is told from values of which some are missing.
+/// some of them right, and of noise that is found from values of which some are missing.
 fn shorter(orders: &Orders, samples: &Samples) -> Option<Orders> {
     let mut shorter = orders.clone();
     let longest = longest_filter(orders);

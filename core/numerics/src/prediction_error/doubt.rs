@@ -274,7 +274,7 @@ impl Doubt {
         }
         let of_past = product(&self.next, shared);
         if !of_past.is_finite() {
-            // A model that grows without end, after a gap in which it did: nothing of before can be told from it.
+            // A model that grows without end, after a gap in which it did: nothing of before can be found from it.
             shared.fill(0.0);
             self.forget();
             return 1.0;
@@ -287,7 +287,7 @@ impl Doubt {
             }
         }
         // The value is known, and the noise is what it leaves once past values and filters are allowed for.
-        let told = |kind: &Kind| match kind.of {
+        let leading = |kind: &Kind| match kind.of {
             Of::Values | Of::Innovations => (0..0, 0.0),
             Of::Filter => (kind.leads.clone(), 1.0),
             Of::Noise => (0..kind.places.start, -1.0),
@@ -302,14 +302,14 @@ impl Doubt {
                 both.for_each(|(with, shared)| *with = -shared / variance);
                 continue;
             }
-            let (leads, sign) = told(kind);
+            let (leads, sign) = leading(kind);
             let rows = self.covariance.chunks_exact(count);
             for (row, with) in rows.zip(with) {
                 *with = sign * product(&self.next[leads.clone()], &row[leads.clone()]);
             }
         }
         let innovation = 1.0 - 1.0 / variance;
-        self.among_newest(told, |of, other| {
+        self.among_newest(leading, |of, other| {
             let both = [of, other].map(|kind| kind.of == Of::Innovations);
             if both == [true, true] {
                 innovation
@@ -378,17 +378,17 @@ impl Doubt {
     }
 
     /// Works out what the newest of each kind have in common with each other, of which it is known what they have in common with
-    /// the past: `told` says which places lead to that of a kind and with which sign, and `beside` what is common beside the past.
+    /// the past: `leading` says which places lead to that of a kind and with which sign, and `beside` what is common beside the past.
     fn among_newest(
         &mut self,
-        told: impl Fn(&Kind) -> (Range<usize>, f64),
+        leading: impl Fn(&Kind) -> (Range<usize>, f64),
         beside: impl Fn(&Kind, &Kind) -> f64,
     ) {
         let (count, kinds) = (self.next.len(), &self.kinds);
         for (i, kind) in kinds.iter().enumerate() {
             // An innovation comes last, and nothing leads to it.
             for (j, other) in kinds.iter().enumerate().skip(i) {
-                let (leads, sign) = told(kind);
+                let (leads, sign) = leading(kind);
                 let with = &self.with_past.0[j * count..][..count];
                 let by_past = sign * product(&self.next[leads.clone()], &with[leads]);
                 let beside = if kind.innovates() && other.innovates() {

@@ -1,4 +1,4 @@
-//! Decides what a fit takes, and what is told of the model that it finds; not how that is searched for.
+//! Decides what a fit takes, and what it reports of the model that it finds; not how that is searched for.
 
 use super::anywhere::beginnings;
 use super::begin::Begun;
@@ -76,7 +76,7 @@ impl PredictionError {
             rows,
             first,
             measured,
-            starts: left.told().round() as usize,
+            starts: left.determined().round() as usize,
             start_counts: counted.starts,
             steps: before + steps,
             converged,

@@ -1,7 +1,7 @@
 //! Decides how far a model's one-step predictions are off in a segment of which values are missing, how unsure they are, and how
 //! both change with each coefficient; not which coefficients are best.
 //!
-//! Where the value of a sample is missing, the filters of inputs go on, and what the noise was is told from the values that follow:
+//! Where the value of a sample is missing, the filters of inputs go on, and the noise is found from the values that follow:
 //! what a prediction is off by, and its variance, are those of the Kalman filter of the model (Jones 1980). Before the first that is
 //! counted, as many values are known as the model needs, so that nothing is in doubt there.
 

@@ -13,7 +13,7 @@ impl PredictionError {
     /// penalty those of the posterior, as in ridge. Where values are missing, what variances of predictions tell is in it.
     ///
     /// A polynomial that only the bound of stability holds where it is has none, and its list is empty: the theory is that of a
-    /// minimum, which there lies outside. So it is where samples hardly tell it. Those of the others are told as if it were known, and
+    /// minimum, which there lies outside. So it is where samples hardly determine it. Those of the others are given as if it were known, and
     /// a level that was given has NaN. None at all where the samples do
     /// not determine all coefficients.
     #[must_use]

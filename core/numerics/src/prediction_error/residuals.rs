@@ -99,8 +99,8 @@ impl Left {
     }
 
     /// How many starts the residuals tell.
-    pub(super) fn told(&self) -> f64 {
-        self.starts.iter().map(|start| start.told).sum()
+    pub(super) fn determined(&self) -> f64 {
+        self.starts.iter().map(|start| start.determined).sum()
     }
 
     /// What becomes of a start in the residuals of a segment.

@@ -290,7 +290,7 @@ impl PredictionError {
 }
 
 /// The radius inside of which a filter forgets its start within these samples: from segments of `N` samples a root nearer than
-/// `1/N` to the unit circle is not told from one on it, and through it every error of the model adds up.
+/// `1/N` to the unit circle cannot be distinguished from one on it, and through it every error of the model adds up.
 pub(super) fn remembered(samples: &Samples) -> f64 {
     1.0 - 1.0 / samples.longest().max(2) as f64
 }

@@ -13,7 +13,7 @@ use crate::state_space::pseudo_inverse_above;
 /// What is left of 1 when nothing of it can be seen any more beside numbers about 1.
 pub(super) const OVER: f64 = 1e-20;
 
-/// Of starts that lead to nearly the same, what is less than this share of all that they lead to is not told.
+/// Of starts that lead to nearly the same, what is less than this share of all that they lead to counts as nothing.
 const DISTINCT: f64 = 1e-8;
 
 /// Where the filters of a segment begin.
@@ -23,7 +23,7 @@ pub(super) struct Start {
     /// same of the others.
     pub(super) values: Vec<f64>,
     /// How many of them its residuals tell; the others stay at rest.
-    pub(super) told: f64,
+    pub(super) determined: f64,
 }
 
 /// What becomes of a start in the residuals of a segment: the same in all segments of which no value is missing.
@@ -32,11 +32,11 @@ pub(super) struct FreeResponses {
     /// How the residuals, from the first that is counted until nothing is left of a start, change with each of its values.
     derivatives: Mat<f64>,
     /// What residuals tell of a start, by how many of them change with it.
-    told: BTreeMap<usize, Told>,
+    determined: BTreeMap<usize, Determined>,
 }
 
 #[derive(Debug)]
-struct Told {
+struct Determined {
     /// The products of the derivatives.
     own: Mat<f64>,
     /// The inverse of that with what the start itself counts; none where the filters grow beyond all numbers.
@@ -78,13 +78,14 @@ impl FreeResponses {
             derivatives: Mat::from_fn(longest, responses.len(), |row, nth| {
                 responses[nth].get(row).copied().unwrap_or(0.0)
             }),
-            told: BTreeMap::new(),
+            determined: BTreeMap::new(),
         };
         if free.starts() > 0 && counted.starts.iter().all(|of| of.is_finite()) {
             for rows in residuals {
                 let rows = free.lasting(rows);
-                if !free.told.contains_key(&rows) {
-                    free.told.insert(rows, free.told_by(rows, counted));
+                if !free.determined.contains_key(&rows) {
+                    free.determined
+                        .insert(rows, free.determined_by(rows, counted));
                 }
             }
         }
@@ -113,14 +114,14 @@ impl FreeResponses {
         }
     }
 
-    fn told_by(&self, rows: usize, counted: &Counted) -> Told {
+    fn determined_by(&self, rows: usize, counted: &Counted) -> Determined {
         let derivatives = self.derivatives.subrows(0, rows);
         let own = derivatives.transpose() * derivatives;
         let mut with_start = own.clone();
         for (i, of) in counted.starts.iter().enumerate() {
             with_start[(i, i)] += of;
         }
-        Told {
+        Determined {
             inverse: pseudo_inverse_above(&with_start, &with_start, DISTINCT).ok(),
             own,
         }
@@ -129,8 +130,8 @@ impl FreeResponses {
     /// How much less the squares of the coefficients' derivatives count in a segment of so many residuals since its start
     /// follows them, of which the products with the derivatives of the start are these.
     pub(super) fn followed(&self, across: &Mat<f64>, residuals: usize) -> Option<Mat<f64>> {
-        let told = self.told.get(&self.lasting(residuals))?;
-        Some(across * told.inverse.as_ref()? * across.transpose())
+        let determined = self.determined.get(&self.lasting(residuals))?;
+        Some(across * determined.inverse.as_ref()? * across.transpose())
     }
 
     /// The start with which residuals and start count least together; the residuals are those from rest, and become those from
@@ -139,13 +140,13 @@ impl FreeResponses {
         let count = self.starts();
         let mut start = Start {
             values: vec![0.0; count],
-            told: 0.0,
+            determined: 0.0,
         };
         let rows = self.lasting(residuals.len());
-        let Some(Told {
+        let Some(Determined {
             own,
             inverse: Some(inverse),
-        }) = self.told.get(&rows)
+        }) = self.determined.get(&rows)
         else {
             return start;
         };
@@ -157,8 +158,8 @@ impl FreeResponses {
             *residual -= by_start[(row, 0)];
         }
         start.values = (0..count).map(|i| -values[(i, 0)]).collect();
-        let told = inverse * own;
-        start.told = (0..count).map(|i| told[(i, i)]).sum();
+        let determined = inverse * own;
+        start.determined = (0..count).map(|i| determined[(i, i)]).sum();
         start
     }
 }

@@ -13,7 +13,7 @@ use crate::checks::check_length;
 /// A sample that is missing is at first taken for what was predicted of it, so that predictions several samples ahead are steps
 /// without one (Ljung 1999, section 3.2). How unsure that is, is kept, so that the samples that follow also tell what it was: the
 /// Kalman filter of the model. So do those after a start of what the filters of inputs gave before it, which nothing moves but the
-/// inputs: the better they are known, the less samples count, until they are told by the inputs alone.
+/// inputs: the better they are known, the less samples count, until the inputs alone determine them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Saved")]
 pub struct Stepper {

@@ -5,7 +5,7 @@ use super::{Change, SelectionScore};
 use crate::Split;
 use std::ops::Range;
 
-/// A candidate whose variance, given the chosen ones, is below this share of its own cannot be told from a combination of
+/// A candidate whose variance, given the chosen ones, is below this share of its own cannot be distinguished from a combination of
 /// them.
 const COLLINEAR_SHARE: f64 = 1e-11;
 
@@ -88,7 +88,7 @@ impl FoldState {
         self.own[column] > 0.0
     }
 
-    /// Whether the column cannot be told from a combination of the chosen ones.
+    /// Whether the column cannot be distinguished from a combination of the chosen ones.
     pub(super) fn combines(&self, column: usize) -> bool {
         self.varies(column)
             && !self.chosen[column]
@@ -97,7 +97,7 @@ impl FoldState {
 
     /// The test score as it stands.
     pub(super) fn present_score(&self, score: SelectionScore) -> f64 {
-        self.told(self.test[row(self.order - 1).end - 1], score)
+        self.scaled(self.test[row(self.order - 1).end - 1], score)
     }
 
     /// The test score once these columns are added or taken out; NaN when all to be added are combinations of the chosen
@@ -127,7 +127,7 @@ impl FoldState {
         let slope = self.train[target + column] / pivot;
         let own = self.test[row(column).end - 1];
         let errors = test_target - slope * (2.0 * self.test[target + column] - slope * own);
-        self.told(errors, score)
+        self.scaled(errors, score)
     }
 
     fn score_of_all(&self, columns: &[usize], score: SelectionScore) -> f64 {
@@ -172,10 +172,10 @@ impl FoldState {
             .flat_map(|i| (0..order).map(move |j| (i, j)))
             .map(|(i, j)| combination[i] * combination[j] * test[i * order + j])
             .sum();
-        self.told(errors, score)
+        self.scaled(errors, score)
     }
 
-    fn told(&self, errors: f64, score: SelectionScore) -> f64 {
+    fn scaled(&self, errors: f64, score: SelectionScore) -> f64 {
         let errors = if errors < 0.0 { 0.0 } else { errors };
         match score {
             SelectionScore::NegativeRmse => -(errors / self.test_weight).sqrt(),

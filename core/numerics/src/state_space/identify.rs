@@ -22,18 +22,18 @@ const MOST_STEPS: usize = 10_000;
 
 /// Subspace identification (Van Overschee and De Moor 1996, chapter 4; Ljung 1999, section 10.6).
 ///
-/// The part of the future outputs that the past tells beside the future inputs has a rank: the number of states. Its singular
+/// The part of the future outputs that the past explains beside the future inputs has a rank: the number of states. Its singular
 /// vectors give the states themselves, with which the matrices are least squares; the covariances of what those leave give the
 /// Kalman gain. With `refined`, `B`, `D` and the gain are then found anew, so that one-step forecasts err least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subspace {
     /// How many samples past and future have each, 2 or more.
     pub horizon: usize,
-    /// How future outputs are weighed before their rank is told.
+    /// How future outputs are weighed before their rank is determined.
     pub weighting: Weighting,
     /// How many states.
     pub order: StateOrder,
-    /// How many records tell of the same time, 1 or more: as many as series were interleaved.
+    /// How many records are of the same time, 1 or more: as many as series were interleaved.
     pub alike: usize,
     /// Whether inputs act on the output of the same sample.
     pub feedthrough: bool,
@@ -41,7 +41,7 @@ pub struct Subspace {
     pub refined: bool,
 }
 
-/// How future outputs are weighed before their rank is told.
+/// How future outputs are weighed before their rank is determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weighting {
     /// Not at all.
@@ -64,7 +64,7 @@ pub enum StateOrder {
     Threshold(f64),
 }
 
-/// A model, and what told its order.
+/// A model, and what determined its order.
 #[derive(Debug, Clone)]
 pub struct Identification {
     /// The model.
@@ -119,9 +119,9 @@ impl Subspace {
         let (values, observability) = self.ranked(&projected)?;
         let order = match self.order {
             StateOrder::Given(order) => order,
-            told => {
+            rule => {
                 let most = self.beyond_chance(&projected, lagged.windows, width)?;
-                told.of(&values, self.horizon).min(most)
+                rule.of(&values, self.horizon).min(most)
             }
         };
         let order = order.clamp(1, MOST_STATES.min(values.len()));
@@ -183,7 +183,7 @@ impl Subspace {
         Ok(())
     }
 
-    /// How many canonical correlations are larger than the largest that a past would have with a future of which it tells
+    /// How many canonical correlations are larger than the largest that a past would have with a future about which it says
     /// nothing (Wachter 1980).
     fn beyond_chance(
         &self,
@@ -215,13 +215,13 @@ impl Subspace {
             Weighting::N4sid => &projected.past,
             Weighting::Moesp | Weighting::Cva => &projected.past_left,
         };
-        let told = from * past * from.transpose();
+        let explained = from * past * from.transpose();
         let (squares, shown) = match self.weighting {
-            Weighting::N4sid | Weighting::Moesp => spectrum(&told)?,
+            Weighting::N4sid | Weighting::Moesp => spectrum(&explained)?,
             Weighting::Cva => {
                 let least = projected.least_output;
                 let weight = power(&projected.outputs_left, -0.5, least)?;
-                let (squares, vectors) = spectrum(&(&weight * told * &weight))?;
+                let (squares, vectors) = spectrum(&(&weight * explained * &weight))?;
                 (
                     squares,
                     power(&projected.outputs_left, 0.5, least)? * vectors,

@@ -106,7 +106,7 @@ impl Lagged {
             .to_owned()
     }
 
-    /// What the past tells of the future outputs beside the future inputs, and products of what is left of past and future
+    /// What the past explains of the future outputs beside the future inputs, and products of what is left of past and future
     /// outputs when the future inputs are taken out of them.
     pub(super) fn projected(&self) -> Result<Projected, NumericsError> {
         let past = (0, self.past());

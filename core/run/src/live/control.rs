@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::handover::{Feed, Happening, Mark, Seated};
+use super::handover::{Feed, Happening, LiveEngine, Mark};
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
@@ -25,10 +25,10 @@ pub struct Control {
     options: LiveOptions,
     feed: Arc<[Feed]>,
     ticks: Consumer<f64>,
-    departing: Producer<Box<Seated>>,
-    returning: Consumer<Box<Seated>>,
+    departing: Producer<Box<LiveEngine>>,
+    returning: Consumer<Box<LiveEngine>>,
     /// What runs, to the same bits; none after ticks have been missed.
-    replica: Option<Seated>,
+    replica: Option<LiveEngine>,
     /// The plan of what runs.
     running: Arc<Plan>,
     retained: Retained,
@@ -36,7 +36,7 @@ pub struct Control {
     /// What has been committed, until the engine thread has taken it over or sent it back.
     committed: Option<Committed>,
     /// What the engine thread has sent back after a hand-over that is not yet known here.
-    returned: Option<Box<Seated>>,
+    returned: Option<Box<LiveEngine>>,
     previous: Option<Previous>,
     event: u64,
     last: Option<Instant>,
@@ -48,14 +48,14 @@ pub struct Control {
 
 /// The graph before the last swap, kept warm for a while yet.
 struct Previous {
-    seated: Seated,
+    live: LiveEngine,
     left: Duration,
 }
 
 /// A graph of which a copy is on its way to the engine thread.
 struct Committed {
     /// None once ticks have been missed since.
-    seated: Option<Seated>,
+    live: Option<LiveEngine>,
     revision: String,
     plan: Arc<Plan>,
     origin: Origin,
@@ -106,7 +106,7 @@ pub(super) fn pair(engine: Engine, replica: Engine, options: LiveOptions) -> (St
     }
     let feed: Arc<[Feed]> = feed.into();
     let seat =
-        |engine| Seated::new(engine, &feed, 0).expect("the feed has all channels of the plan");
+        |engine| LiveEngine::new(engine, &feed, 0).expect("the feed has all channels of the plan");
     let record = feed.len() + Mark::WIDTH;
     let (mirror, ticks) = RingBuffer::new(options.mirrored.max(1) * record);
     let (departing, arriving) = RingBuffer::new(ON_THE_WAY);
@@ -177,9 +177,9 @@ impl Control {
     fn made_ready(&self, model: &Model, carry_learned: bool) -> Result<Staged, StageError> {
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
-        let mut seated = Seated::new(engine, &self.feed, 0)
+        let mut live = LiveEngine::new(engine, &self.feed, 0)
             .map_err(|channels| StageError::MissingChannels { channels })?;
-        seated.engine.freeze(self.frozen);
+        live.engine.freeze(self.frozen);
         let mut warmed = false;
         let slots: Vec<usize> = model
             .plan
@@ -190,25 +190,24 @@ impl Control {
         let mut gave = vec![false; slots.len()];
         self.retained.for_each(|time, samples| match time {
             Some(time) => {
-                warmed |= seated.step(time, samples).is_ok();
+                warmed |= live.step(time, samples).is_ok();
                 for (gave, &slot) in gave.iter_mut().zip(&slots) {
-                    *gave |= !seated.engine.value(slot).is_nan();
+                    *gave |= !live.engine.value(slot).is_nan();
                 }
             }
-            None => seated.segment(),
+            None => live.segment(),
         });
         let carry = match &self.replica {
             Some(replica) => {
-                let transfer =
-                    StateTransfer::between(&replica.engine, &seated.engine, carry_learned);
+                let transfer = StateTransfer::between(&replica.engine, &live.engine, carry_learned);
                 let state = replica.engine.state();
-                seated.engine.adopt(&state, &transfer, warmed)
+                live.engine.adopt(&state, &transfer, warmed)
             }
-            None => cold(&seated.engine, warmed),
+            None => cold(&live.engine, warmed),
         };
-        seated.event = self.event;
+        live.event = self.event;
         Ok(Staged {
-            seated,
+            live,
             carry,
             past: self.retained.span(),
             gave,
@@ -226,7 +225,7 @@ impl Control {
         let replica = self.replica.as_ref().ok_or(StageError::NotMirrored)?;
         staged.shadow = Some(Shadow::new(
             &replica.engine,
-            &staged.seated.engine,
+            &staged.live.engine,
             duration,
             margin,
         ));
@@ -258,20 +257,20 @@ impl Control {
         self.pump();
         let mut staged = self.staged.take().ok_or(StageError::NothingStaged)?;
         // A rollback may have come between, to a graph that it was not set against.
-        let unfit = StageError::between(&self.running, staged.seated.engine.plan());
-        if let Err(error) = unfit.map_or_else(|| self.send(&mut staged.seated), Err) {
+        let unfit = StageError::between(&self.running, staged.live.engine.plan());
+        if let Err(error) = unfit.map_or_else(|| self.send(&mut staged.live), Err) {
             self.staged = Some(staged);
             return Err(error);
         }
         let Staged {
-            seated,
+            live,
             carry,
             past,
             gave,
             ..
         } = staged;
         let origin = Origin::Staged { carry, past, gave };
-        self.committed = Some(Committed::new(seated, origin));
+        self.committed = Some(Committed::new(live, origin));
         Ok(())
     }
 
@@ -282,12 +281,12 @@ impl Control {
     pub fn rollback(&mut self) -> Result<(), StageError> {
         self.pump();
         let mut previous = self.previous.take().ok_or(StageError::NothingToTakeBack)?;
-        if let Err(error) = self.send(&mut previous.seated) {
+        if let Err(error) = self.send(&mut previous.live) {
             self.previous = Some(previous);
             return Err(error);
         }
-        let Previous { seated, left } = previous;
-        self.committed = Some(Committed::new(seated, Origin::Previous { left }));
+        let Previous { live, left } = previous;
+        self.committed = Some(Committed::new(live, Origin::Previous { left }));
         Ok(())
     }
 
@@ -324,15 +323,15 @@ impl Control {
     }
 
     /// Sends a copy of a graph to the engine thread.
-    fn send(&mut self, seated: &mut Seated) -> Result<(), StageError> {
+    fn send(&mut self, live: &mut LiveEngine) -> Result<(), StageError> {
         if self.committed.is_some() {
             return Err(StageError::Busy);
         }
-        seated.follow(&self.running);
-        let engine = seated.engine.twin().map_err(StageError::NotCopied)?;
-        let mut copy = Seated::new(engine, &self.feed, seated.event)
+        live.follow(&self.running);
+        let engine = live.engine.twin().map_err(StageError::NotCopied)?;
+        let mut copy = LiveEngine::new(engine, &self.feed, live.event)
             .expect("a twin reads what its twin reads");
-        copy.outputs.clone_from(&seated.outputs);
+        copy.outputs.clone_from(&live.outputs);
         let sent = self.departing.push(Box::new(copy));
         sent.map_err(|_| StageError::Busy)
     }
@@ -362,7 +361,7 @@ impl Control {
     fn segment(&mut self) {
         self.last = None;
         self.retained.segment();
-        self.for_all(Seated::segment);
+        self.for_all(LiveEngine::segment);
         if let Some(shadow) = self
             .staged
             .as_mut()
@@ -374,7 +373,7 @@ impl Control {
 
     fn freeze(&mut self, frozen: bool) {
         self.frozen = frozen;
-        self.for_all(|seated| seated.freeze(frozen));
+        self.for_all(|live| live.freeze(frozen));
     }
 
     fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {
@@ -390,27 +389,27 @@ impl Control {
             self.generation = mark.generation;
             self.took_over(mark, time, notices);
         }
-        self.for_all(|seated| {
+        self.for_all(|live| {
             // A tick that ran there runs here: the engines are the same.
-            let _ = seated.step(time, samples);
+            let _ = live.step(time, samples);
         });
         self.retained.push(time, samples);
         if let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica)
             && let Some(shadow) = &mut staged.shadow
         {
-            shadow.look(&replica.engine, &staged.seated.engine, time, elapsed);
+            shadow.look(&replica.engine, &staged.live.engine, time, elapsed);
         }
     }
 
-    fn for_all(&mut self, act: impl FnMut(&mut Seated)) {
-        let staged = self.staged.iter_mut().map(|staged| &mut staged.seated);
+    fn for_all(&mut self, act: impl FnMut(&mut LiveEngine)) {
+        let staged = self.staged.iter_mut().map(|staged| &mut staged.live);
         let committed = self.committed.iter_mut();
         let previous = self.previous.iter_mut();
         self.replica
             .iter_mut()
             .chain(staged)
-            .chain(committed.filter_map(|committed| committed.seated.as_mut()))
-            .chain(previous.map(|previous| &mut previous.seated))
+            .chain(committed.filter_map(|committed| committed.live.as_mut()))
+            .chain(previous.map(|previous| &mut previous.live))
             .for_each(act);
     }
 
@@ -418,7 +417,7 @@ impl Control {
         self.take_back(notices);
         let returned = self.returned.take();
         let Some(Committed {
-            seated,
+            live,
             revision,
             plan,
             ..
@@ -439,11 +438,11 @@ impl Control {
         });
         self.retained.keep(self.options.retain.max(plan.warm_up));
         self.running = plan;
-        if let (Some(mut seated), Some(old)) = (seated, old) {
-            seated.take_over(&old.engine);
-            self.replica = Some(seated);
+        if let (Some(mut live), Some(old)) = (live, old) {
+            live.take_over(&old.engine);
+            self.replica = Some(live);
             self.previous = Some(Previous {
-                seated: old,
+                live: old,
                 left: self.options.keep_warm,
             });
         }
@@ -458,7 +457,7 @@ impl Control {
             }
             notices.push(Notice::SentBack);
             let Some(Committed {
-                seated: Some(seated),
+                live: Some(live),
                 origin,
                 ..
             }) = self.committed.take()
@@ -468,14 +467,14 @@ impl Control {
             match origin {
                 Origin::Staged { carry, past, gave } => {
                     self.staged = Some(Staged {
-                        seated,
+                        live,
                         carry,
                         past,
                         gave,
                         shadow: None,
                     });
                 }
-                Origin::Previous { left } => self.previous = Some(Previous { seated, left }),
+                Origin::Previous { left } => self.previous = Some(Previous { live, left }),
             }
         }
     }
@@ -488,18 +487,18 @@ impl Control {
         self.previous = None;
         // The engine thread has what was committed, and may yet take it over.
         if let Some(committed) = &mut self.committed {
-            committed.seated = None;
+            committed.live = None;
         }
         self.retained.clear();
     }
 }
 
 impl Committed {
-    fn new(seated: Seated, origin: Origin) -> Self {
+    fn new(live: LiveEngine, origin: Origin) -> Self {
         Self {
-            revision: seated.revision.clone(),
-            plan: Arc::clone(seated.engine.plan()),
-            seated: Some(seated),
+            revision: live.revision.clone(),
+            plan: Arc::clone(live.engine.plan()),
+            live: Some(live),
             origin,
         }
     }

@@ -34,7 +34,7 @@ impl Feed {
 
 /// An engine with all that it needs to take over, made off the engine thread.
 #[derive(Debug)]
-pub(super) struct Seated {
+pub(super) struct LiveEngine {
     pub(super) engine: Engine,
     pub(super) revision: String,
     /// For each channel that the engine reads, where its sample stands among those given.
@@ -49,7 +49,7 @@ pub(super) struct Seated {
     pub(super) refused: bool,
 }
 
-impl Seated {
+impl LiveEngine {
     /// An engine that reads its channels among `feed`; the names of those that are not there otherwise.
     pub(super) fn new(engine: Engine, feed: &[Feed], event: u64) -> Result<Self, Vec<String>> {
         let wanted = Feed::of(engine.plan());

@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use super::handover::Seated;
+use super::handover::LiveEngine;
 use super::shadow::Shadow;
 use crate::engine::{Carry, Engine, NodeCarry};
 use crate::time::Duration;
 
 /// A graph that is ready to take over, and kept so.
 pub struct Staged {
-    pub(super) seated: Seated,
+    pub(super) live: LiveEngine,
     pub(super) carry: Vec<NodeCarry>,
     /// How much of the past it was warmed by.
     pub(super) past: Duration,
@@ -28,13 +28,13 @@ impl Staged {
     /// The revision of the graph.
     #[must_use]
     pub fn revision(&self) -> &str {
-        &self.seated.revision
+        &self.live.revision
     }
 
     /// How much of the past there was to warm it by, and how far it looks back, where something of it was warmed by less than that.
     #[must_use]
     pub fn too_short_a_past(&self) -> Option<(Duration, Duration)> {
-        let wanted = self.seated.engine.plan().warm_up;
+        let wanted = self.live.engine.plan().warm_up;
         let short = self.past < wanted && self.is_warmed();
         short.then_some((self.past, wanted))
     }
@@ -43,7 +43,7 @@ impl Staged {
     /// anywhere in it: they are not likely to have any.
     #[must_use]
     pub fn silent(&self) -> (Duration, Vec<&str>) {
-        let plan = self.seated.engine.plan();
+        let plan = self.live.engine.plan();
         let enough = self.past >= plan.warm_up && self.is_warmed();
         let outputs = plan.outputs.iter().zip(&self.gave);
         let silent = outputs.filter(|(_, gave)| enough && !**gave);
@@ -53,7 +53,7 @@ impl Staged {
     /// How much of the past there was to warm it by, and the nodes warmed by it that go by all of theirs, which no past brings back.
     #[must_use]
     pub fn endless(&self) -> (Duration, Vec<&str>) {
-        let nodes = self.seated.engine.plan().nodes.iter().zip(&self.carry);
+        let nodes = self.live.engine.plan().nodes.iter().zip(&self.carry);
         let endless = nodes.filter(|(node, carry)| node.endless && is_warmed(carry));
         (self.past, endless.map(|(_, carry)| &*carry.node).collect())
     }
@@ -91,7 +91,7 @@ pub(super) fn cold(engine: &Engine, warmed: bool) -> Vec<NodeCarry> {
 impl fmt::Debug for Staged {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Staged")
-            .field("revision", &self.seated.revision)
+            .field("revision", &self.live.revision)
             .finish_non_exhaustive()
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer};
 
-use super::handover::{Feed, Happening, Mark, Seated};
+use super::handover::{Feed, Happening, LiveEngine, Mark};
 use crate::compile::Plan;
 use crate::engine::EngineError;
 use crate::time::Instant;
@@ -16,12 +16,12 @@ const CATCH_UP: u64 = 4;
 
 /// The end of a running graph that the engine thread owns.
 pub struct Stepper {
-    pub(super) seated: Box<Seated>,
+    pub(super) live: Box<LiveEngine>,
     feed: Arc<[Feed]>,
     ticks: Producer<f64>,
-    arriving: Consumer<Box<Seated>>,
-    leaving: Producer<Box<Seated>>,
-    next: Option<Box<Seated>>,
+    arriving: Consumer<Box<LiveEngine>>,
+    leaving: Producer<Box<LiveEngine>>,
+    next: Option<Box<LiveEngine>>,
     recent: Vec<f64>,
     event: u64,
     tick: u64,
@@ -44,15 +44,15 @@ pub struct Stepped<'a> {
 
 impl Stepper {
     pub(super) fn new(
-        seated: Seated,
+        live: LiveEngine,
         feed: Arc<[Feed]>,
         ticks: Producer<f64>,
-        arriving: Consumer<Box<Seated>>,
-        leaving: Producer<Box<Seated>>,
+        arriving: Consumer<Box<LiveEngine>>,
+        leaving: Producer<Box<LiveEngine>>,
     ) -> Self {
         let width = feed.len() + 1;
         Self {
-            seated: Box::new(seated),
+            live: Box::new(live),
             feed,
             ticks,
             arriving,
@@ -81,7 +81,7 @@ impl Stepper {
     /// The engine that runs.
     #[must_use]
     pub fn engine(&self) -> &crate::engine::Engine {
-        &self.seated.engine
+        &self.live.engine
     }
 
     /// Takes the measurements of one instant, in the order of [`feed`](Self::feed), NaN where there is no new value.
@@ -98,15 +98,15 @@ impl Stepper {
             });
         }
         // Only a tick that is taken can be the first of another graph.
-        if self.seated.engine.takes(time) {
+        if self.live.engine.takes(time) {
             self.take_over();
         }
-        self.seated.step(time, samples)?;
+        self.live.step(time, samples)?;
         self.tick += 1;
         self.record(Happening::Tick(time), samples);
-        let Seated {
+        let LiveEngine {
             engine, revision, ..
-        } = &*self.seated;
+        } = &*self.live;
         Ok(Stepped {
             generation: self.generation,
             revision,
@@ -117,13 +117,13 @@ impl Stepper {
 
     /// The next tick belongs to another segment.
     pub fn segment(&mut self) {
-        self.seated.segment();
+        self.live.segment();
         self.record(Happening::Break, &[]);
     }
 
     /// Freezes what estimators learn while they run, or lets it go on; see [`Engine::freeze`](crate::engine::Engine::freeze).
     pub fn freeze(&mut self, frozen: bool) {
-        self.seated.freeze(frozen);
+        self.live.freeze(frozen);
         self.record(Happening::Freeze(frozen), &[]);
     }
 
@@ -156,8 +156,8 @@ impl Stepper {
         if next.event < self.event || self.leaving.is_full() {
             return;
         }
-        next.take_over(&self.seated.engine);
-        std::mem::swap(&mut self.seated, next);
+        next.take_over(&self.live.engine);
+        std::mem::swap(&mut self.live, next);
         self.generation += 1;
         self.release();
     }
@@ -216,7 +216,7 @@ impl Stepper {
 impl std::fmt::Debug for Stepper {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Stepper")
-            .field("revision", &self.seated.revision)
+            .field("revision", &self.live.revision)
             .field("tick", &self.tick)
             .field("generation", &self.generation)
             .finish_non_exhaustive()

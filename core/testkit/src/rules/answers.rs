@@ -25,7 +25,7 @@ pub(super) fn answers(subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), 
             let same = slots.filter(|slot| self::place(other, *slot) == place);
             same.map(move |slot| (other, slot))
         });
-        // What never comes is told once.
+        // What never comes is reported once.
         let is_first = same
             .clone()
             .next()
@@ -51,7 +51,7 @@ fn speaks(subject: &Subject<'_>, slot: usize) -> bool {
     subject.usual().values(number).any(f64::is_finite)
 }
 
-/// The same of any case; of one in which it panics, which is told there, nothing is known.
+/// The same of any case; of one in which it panics, which is reported there, nothing is known.
 fn may_speak(subject: &Subject<'_>, slot: usize) -> bool {
     tried(|| Ok(speaks(subject, slot))).unwrap_or(true)
 }

@@ -1,4 +1,4 @@
-//! Decides whether what a kind names can be told apart from what others name, and be referred to.
+//! Decides whether what a kind names differs from what others name, and be referred to.
 
 use super::Subject;
 use crate::compile::PlannedRole;
@@ -28,7 +28,7 @@ pub(in super::super) fn shared(kind: &Kind) -> Vec<String> {
     found
 }
 
-/// Output ports and channels that no reference could name, and ports of several that a user is not told.
+/// Output ports and channels that no reference could name, and ports of several that no page lists.
 pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
     let node = &subject.fixture.plan.nodes[0];
     let mut found = Vec::new();
@@ -37,15 +37,16 @@ pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
         && let Ok(ports) = feature.outputs(inputs)
     {
         found.extend(unfit("the output port", ports.iter().map(|port| port.name)));
-        let told = (subject.kind.ports)();
+        let listed = (subject.kind.ports)();
         let is_told = |name: &str| {
-            told.iter()
+            listed
+                .iter()
                 .any(|of| of.name == name && !of.summary.is_empty())
         };
         // The only port of a node need not be named by who reads it.
-        let untold = ports.iter().filter(|port| !is_told(port.name));
-        let untold = untold.filter(|_| ports.len() > 1 || !told.is_empty());
-        found.extend(untold.map(|port| {
+        let unlisted = ports.iter().filter(|port| !is_told(port.name));
+        let unlisted = unlisted.filter(|_| ports.len() > 1 || !listed.is_empty());
+        found.extend(unlisted.map(|port| {
             let name = port.name;
             format!(
                 "the output port `{name}` is not among `Feature::ports`, or has no summary there"

@@ -23,7 +23,7 @@ pub(super) fn read_back(subject: &Subject<'_>) -> Result<(), String> {
 fn reads_back(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
     let written = in_full(subject, fixture);
     let again = Fixture::new(subject.kind, &written, &subject.given)
-        .map_err(|told| format!("written out in full, the parameters are refused: {told}"))?;
+        .map_err(|why| format!("written out in full, the parameters are refused: {why}"))?;
     let [before, after] = [fixture, &again].map(|fixture| &fixture.plan.nodes[0].spec);
     if before.parameters() != after.parameters() {
         let (before, after) = (before.parameters(), after.parameters());

@@ -26,18 +26,18 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
     {
         return Ok(());
     }
-    let told: Vec<_> = given
+    let units: Vec<_> = given
         .iter()
         .zip(&subject.given)
         .filter(|(new, old)| new.unit != old.unit)
         .map(|(new, old)| format!("{} in {} rather than {}", new.port, new.unit, old.unit))
         .collect();
-    let told = told.join(", ");
+    let units = units.join(", ");
     let fixture = Fixture::new(subject.kind, &subject.parameters, &given)
-        .map_err(|error| format!("with {told} the graph is refused: {error}"))?;
+        .map_err(|error| format!("with {units} the graph is refused: {error}"))?;
     let table = converted(&subject.table, &subject.given, &given)?;
     let other = subject.fed(given, fixture, table).fitted();
-    let other = other.map_err(|found| format!("with {told}, {found}"))?;
+    let other = other.map_err(|found| format!("with {units}, {found}"))?;
     let (one, two) = (subject.usual(), other.usual());
     for (number, slot) in subject.fixture.slots().enumerate() {
         let unit = &subject.fixture.plan.channels[slot].channel.unit;
@@ -57,14 +57,14 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
             };
             let Some(found) = found else {
                 return Err(format!(
-                    "with {told}, `{}` is in {other_unit} rather than {unit}",
+                    "with {units}, `{}` is in {other_unit} rather than {unit}",
                     subject.name(number)
                 ));
             };
             let close = (expected - found).abs() <= ROUNDING * largest;
             if !(close || (expected.is_nan() && found.is_nan())) {
                 return Err(format!(
-                    "with {told}, `{}` is {found} {unit} rather than {expected} {unit} at {now} s",
+                    "with {units}, `{}` is {found} {unit} rather than {expected} {unit} at {now} s",
                     subject.name(number)
                 ));
             }

@@ -139,7 +139,7 @@ fn of_engine(
     ask(&engine, voters, "once it has learned")
 }
 
-/// Whole numbers, which are easily told.
+/// Whole numbers, which are easily read.
 fn drawn(random: &mut Prng, voters: usize) -> Vec<f64> {
     let votes = (0..voters).map(|_| random.between(-1e2, 1e2).round());
     votes.collect()

@@ -185,7 +185,7 @@ impl Estimator for Guess {
 
     fn learns(&self) -> Learns {
         match self.fault {
-            Fault::NoLearner => Learns::UnlessTold,
+            Fault::NoLearner => Learns::ByDefault,
             _ => Learns::Never { help: None },
         }
     }

@@ -84,7 +84,7 @@ impl Usual {
     fn keep(&mut self, error: f64, first: u64) {
         let most = telling(first);
         if self.newest.len() > most {
-            // It was read back from where more of them told.
+            // It was read back from where more of them were taken.
             self.newest.rotate_left(self.oldest);
             self.newest.drain(..self.newest.len() - most);
             self.oldest = 0;

@@ -14,7 +14,7 @@ use crate::unsolved::unsolved;
 const MOST_WORK: usize = 1000;
 
 impl Asked {
-    /// The model of the orders that are asked for, or of the best of them; told is which of how many is gone to.
+    /// The model of the orders that are asked for, or of the best of them; it calls with which of how many it goes to.
     pub(super) fn fit(
         &self,
         samples: &Samples,
@@ -118,8 +118,8 @@ impl Asked {
         orders: &[usize; 6],
         differences: usize,
     ) -> Vec<(&'static str, usize)> {
-        let told = matches!(self.differences, Differences::Told);
-        let differences = told.then_some(("differences", differences));
+        let chosen = matches!(self.differences, Differences::Chosen);
+        let differences = chosen.then_some(("differences", differences));
         order.letters(orders).chain(differences).collect()
     }
 }

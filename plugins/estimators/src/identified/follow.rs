@@ -31,8 +31,8 @@ struct Followed {
     stepper: Stepper,
     /// The instant of its last sample.
     at: Instant,
-    /// How many truths have been told since the segment began, as far as that counts.
-    told: u32,
+    /// How many truths have come since the segment began, as far as that counts.
+    truths: u32,
 }
 
 /// What is known since the segment began.
@@ -80,7 +80,7 @@ impl Following {
         let followed = Followed {
             stepper: stepper.clone(),
             at: Instant::MIN,
-            told: 0,
+            truths: 0,
         };
         Self {
             known: Known {
@@ -171,12 +171,12 @@ impl Known {
                 .stepper
                 .begin(&input, before, |nth| begins.squares[nth]);
             followed.at = of - *step + part(*step, nth as i64, count);
-            followed.told = 0;
+            followed.truths = 0;
         }
         self.begun = true;
     }
 
-    /// Makes room for the runs that are kept where truths are missing, of which the next may be told so long after its run.
+    /// Makes room for the runs that are kept where truths are missing, of which the next may come so long after its run.
     fn make_room(&mut self, after: Duration) {
         let steps = after.secs() / self.step.secs() + 2.0;
         let runs = (RUNS_PER_STEP as f64 * steps).min(MOST_RUNS) as usize;
@@ -237,7 +237,7 @@ impl Known {
     /// The series whose newest sample is the newest that lies a step before an instant.
     fn nearest(&self, of: Instant) -> &Followed {
         let before = of - part(self.step, 1, 2);
-        let key = |followed: &&Followed| (followed.at <= before, followed.told > 0, followed.at);
+        let key = |followed: &&Followed| (followed.at <= before, followed.truths > 0, followed.at);
         self.series
             .iter()
             .max_by_key(key)
@@ -266,10 +266,10 @@ impl Learner for Following {
         let mut series = self.known.series.iter();
         // As many truths as tell what filters gave, or how far the model looks back.
         let needed = |of: &Stepper| of.model().a.len().max(of.model().starts()).max(1);
-        series.all(|followed| followed.told as usize >= needed(&followed.stepper))
+        series.all(|followed| followed.truths as usize >= needed(&followed.stepper))
     }
 
-    fn run(&mut self, regressors: &[f64], of: Instant, told: Instant) {
+    fn run(&mut self, regressors: &[f64], of: Instant, arrived: Instant) {
         let known = &mut self.known;
         if regressors.iter().any(|value| value.is_nan()) {
             return;
@@ -279,13 +279,13 @@ impl Learner for Following {
         }
         if !known.begun {
             known.begin(regressors, of, &self.begins);
-            known.make_room(of - told);
+            known.make_room(of - arrived);
         }
-        // A truth that has not been told by now never will be.
+        // A truth that has not come by now never will.
         for nth in 0..known.series.len() {
             let Followed { at, .. } = known.series[nth];
             let mut next = at + known.step;
-            let overdue = told - part(known.step, 1, 2);
+            let overdue = arrived - part(known.step, 1, 2);
             if next > overdue {
                 continue;
             }
@@ -319,7 +319,7 @@ impl Learner for Following {
 
     fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
         let followed = self.known.nearest(of);
-        let blind = followed.told == 0 && followed.stepper.model().follows();
+        let blind = followed.truths == 0 && followed.stepper.model().follows();
         if !self.known.begun || blind {
             return f64::NAN;
         }
@@ -335,7 +335,7 @@ impl Learner for Following {
         let followed = self.known.nearest(of);
         let known = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
         let last = self.deviations.len().saturating_sub(1);
-        if followed.told == 0 && followed.stepper.model().follows() {
+        if followed.truths == 0 && followed.stepper.model().follows() {
             return known(last);
         }
         let steps = usize::try_from(self.known.steps(followed.at, of)).unwrap_or(usize::MAX);
@@ -363,7 +363,7 @@ impl Learner for Following {
         if at < soonest {
             return;
         }
-        let (from, is_first) = (followed.at, followed.told == 0);
+        let (from, is_first) = (followed.at, followed.truths == 0);
         let (known, stepper) = (&mut self.known, self.scratch.get_mut());
         std::mem::swap(stepper, &mut known.series[nth].stepper);
         for between in known.between(from, at) {
@@ -378,7 +378,7 @@ impl Learner for Following {
         let followed = &mut known.series[nth];
         std::mem::swap(stepper, &mut followed.stepper);
         followed.at = at;
-        followed.told = followed.told.saturating_add(1);
+        followed.truths = followed.truths.saturating_add(1);
     }
 
     fn segment(&mut self, _shift: Duration) {
@@ -390,7 +390,7 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let known: Known = match state.known() {
+        let known = match state.known::<Known>() {
             Ok(known) => known,
             Err(cold) => return cold,
         };
@@ -411,7 +411,7 @@ impl Learner for Following {
             if !own.stepper.resume(&other.stepper) {
                 return Restored::cold("it was followed with other orders");
             }
-            (own.at, own.told) = (other.at, other.told);
+            (own.at, own.truths) = (other.at, other.truths);
         }
         self.known.series = series;
         self.known.begun = known.begun;

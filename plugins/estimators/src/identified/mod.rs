@@ -1,13 +1,13 @@
-//! What the kinds share that are identified by the prediction error: their orders, and how they are told of mistakes.
+//! What the kinds share that are identified by the prediction error: their orders, and their mistakes.
 
 mod choose;
+mod coefficients;
 mod follow;
 mod model;
 mod per_input;
 mod predictor;
 mod rehearse;
 mod rows;
-mod told;
 mod train;
 
 use athermal_core::diagnostic::counted;
@@ -41,7 +41,7 @@ macro_rules! identified {
             }
 
             fn learns(&self) -> athermal_core::node::Learns {
-                athermal_core::node::Learns::UnlessTold
+                athermal_core::node::Learns::ByDefault
             }
 
             fn keeps_range(&self) -> bool {
@@ -82,7 +82,7 @@ pub(crate) enum Differences {
     /// So often.
     Given(usize),
     /// Once or not at all, whichever is worth more.
-    Told,
+    Chosen,
 }
 
 impl Differences {
@@ -91,7 +91,7 @@ impl Differences {
         match self {
             Self::None => 0..=0,
             Self::Given(differences) => differences..=differences,
-            Self::Told => 0..=1,
+            Self::Chosen => 0..=1,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What an identified model consists of; not how it is told, nor how it is followed.
+//! What an identified model consists of; not how it is reported, nor how it is followed.
 
 use athermal_core::node::numbers;
 use athermal_core::time::Duration;

@@ -3,9 +3,9 @@
 use athermal_core::node::{Coefficients, Learner, Mistake, Predictor};
 use athermal_core::time::Duration;
 
+use super::coefficients;
 use super::follow::Following;
 use super::model::{Identified, MOST_DIFFERENCES, MOST_SERIES};
-use super::told;
 use crate::order::LARGEST;
 
 impl Predictor for Identified {
@@ -40,7 +40,7 @@ impl Predictor for Identified {
             let message = format!("`step` is {} and must be greater than 0", self.step);
             mistakes.push(Mistake::at("step", message));
         }
-        mistakes.extend(told::mistakes(self));
+        mistakes.extend(coefficients::mistakes(self));
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }
@@ -60,7 +60,7 @@ impl Predictor for Identified {
     }
 
     fn coefficients(&self) -> Option<Coefficients> {
-        Some(told::coefficients(self))
+        Some(coefficients::coefficients(self))
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {

@@ -259,10 +259,10 @@ impl Pace {
         report.figure("step_s", self.step.secs());
         report.figure("series", self.series);
         report.figure("truths_within_a_step", self.truths);
-        report.notes.push(self.told());
+        report.notes.push(self.note());
     }
 
-    fn told(self) -> String {
+    fn note(self) -> String {
         let Self {
             step,
             truths,
@@ -301,7 +301,7 @@ mod tests {
         }
         assert_eq!(series, MOST_SERIES);
         let told = "16 interleaved series of the 50 truths within one; the others are not used";
-        assert!(pace.told().ends_with(told), "{}", pace.told());
+        assert!(pace.note().ends_with(told), "{}", pace.note());
     }
 
     /// A second after the first instant, two and so on.

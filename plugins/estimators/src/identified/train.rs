@@ -1,4 +1,4 @@
-//! Decides how rows become the evenly spaced samples that a model is identified from, and what is told of the fit; not which
+//! Decides how rows become the evenly spaced samples that a model is identified from, and what is reported of the fit; not which
 //! orders it has.
 
 use athermal_core::diagnostic::{count, digits};
@@ -34,7 +34,7 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
     }
 
     /// The model, from samples of so many interleaved series; what there is to tell goes into the report. Where orders are
-    /// compared, which of how many is told as each is gone to.
+    /// compared, and calls with which of how many it goes to.
     ///
     /// # Errors
     /// When the samples do not allow one.
@@ -198,7 +198,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         } = self.reach;
         let ahead = steps(earlier, of.step);
         let further = of.model.follows() && ahead > 1;
-        // The fit finds where filters begin, which a run is told by its truths; and a run is kept from truths that miss by too much.
+        // The fit finds where filters begin, which a run learns from its truths; and a run is kept from truths that miss by too much.
         let error = rehearse::error(&self.rows, of, self.reach);
         report.in_sample_rmse = Some(error.unwrap_or(one_step));
         let Some(error) = error else {
@@ -372,7 +372,7 @@ fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingRepo
     ));
 }
 
-/// The share of the rows from which it is told that so many of them tell where filters begin.
+/// The share of the rows from which it is reported that so many of them show where filters begin.
 const STARTS: f64 = 0.1;
 
 /// Tells of rows that go into where filters begin in each piece.

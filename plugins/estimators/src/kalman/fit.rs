@@ -15,8 +15,8 @@ use athermal_numerics::{
     Movement, NumericsError, Passage, Series, Standardizer, Structural, follow, most_likely,
 };
 
+use super::coefficients::Hourly;
 use super::follow::Following;
-use super::told::Hourly;
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
 use crate::scaling::Scaling;
@@ -279,20 +279,20 @@ impl KalmanTrainer {
         if self.parameters.noises.is_none() {
             let unit = self.unit.parse::<Unit>().map(|unit| unit.difference());
             let unit = unit.map_or_else(|_| self.unit.clone(), |unit| unit.to_string());
-            let told = Hourly::of(&model);
-            report.figure("noises", told.figure());
-            let noises = told.as_given(&unit);
+            let hourly = Hourly::of(&model);
+            report.figure("noises", hourly.figure());
+            let noises = hourly.as_given(&unit);
             report
                 .notes
                 .push(format!("most likely are noises = {noises}"));
-            if let Some(all) = told.fades_within(self.typical_gap_s()) {
+            if let Some(all) = hourly.fades_within(self.typical_gap_s()) {
                 report.figure("observation_with_level", all);
                 report.notes.push(format!(
                     "the level is gone before the next truth, so that only what it makes with the observation is known, {} {unit}",
                     digits(all, 3)
                 ));
             }
-            if told.is_still() {
+            if hourly.is_still() {
                 report.notes.push(
                     "the level does not move: the rows are as likely without a noise of it"
                         .to_owned(),
@@ -309,7 +309,7 @@ impl KalmanTrainer {
         gaps.get(gaps.len() / 2).map_or(f64::NAN, |gap| gap.secs())
     }
 
-    /// All that is told of the fit is told of the rows that it goes through.
+    /// All that is reported of the fit is of the rows that it goes through.
     fn tell_thinned(&self, report: &mut TrainingReport) {
         if self.stride == 1 {
             return;
@@ -531,10 +531,10 @@ mod tests {
             returning: 0.25,
             passage: Passage::Continuous,
         };
-        let told = Hourly::of(&model);
-        let all = told.fades_within(420.0).unwrap();
+        let hourly = Hourly::of(&model);
+        let all = hourly.fades_within(420.0).unwrap();
         assert!((all - 0.15).abs() < 1e-12, "{all}");
-        assert_eq!(told.fades_within(10.0), None);
-        assert_eq!(told.fades_within(f64::NAN), None);
+        assert_eq!(hourly.fades_within(10.0), None);
+        assert_eq!(hourly.fades_within(f64::NAN), None);
     }
 }

@@ -118,7 +118,7 @@ impl Following {
             filter.widen(1, variance / (since * since));
         }
         filter.observe_with(states, &self.row, truth - scaling.truth, share);
-        // Whether it stays there is told by the next truth.
+        // Whether it stays there shows at the next truth.
         widen(filter);
         *last = Some(at);
     }
@@ -176,7 +176,7 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let known: Known = match state.known() {
+        let known = match state.known::<Known>() {
             Ok(known) => known,
             Err(cold) => return cold,
         };

@@ -11,9 +11,9 @@ use athermal_numerics::Kalman as Filter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+mod coefficients;
 mod fit;
 mod follow;
-mod told;
 
 use crate::features::too_many;
 use crate::scaling::Scaling;
@@ -139,7 +139,7 @@ impl Estimator for Kalman {
     }
 
     fn learns(&self) -> Learns {
-        Learns::UnlessTold
+        Learns::ByDefault
     }
 
     fn has_std_dev(&self) -> bool {
@@ -259,7 +259,7 @@ impl Predictor for KalmanPredictor {
     }
 
     fn coefficients(&self) -> Option<Coefficients> {
-        Some(told::coefficients(self))
+        Some(coefficients::coefficients(self))
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {

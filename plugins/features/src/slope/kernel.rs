@@ -10,11 +10,11 @@
 mod blocks;
 mod lanes;
 mod layout;
+mod line;
 mod parts;
 mod rows;
 mod saved;
 mod sums;
-mod told;
 mod vectors;
 mod window;
 

@@ -1,4 +1,4 @@
-//! Decides which properties of a plan count, and when two of them mean the same.
+//! Which properties of a plan count, and when two of them mean the same.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::OnceLock;

@@ -1,4 +1,4 @@
-//! Decides what differs in meaning between two plans, node by node; not how it is shown, nor what is done about it.
+//! What differs in meaning between two plans, node by node.
 //!
 //! Plans are compared as resolved: comments, order, spelling, and how a duration or unit is written make no difference. A
 //! node is unchanged when its kind, its parameters with their defaults, and what its inputs read are; that a node further

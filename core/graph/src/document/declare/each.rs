@@ -3,7 +3,7 @@
 use super::reading::one_or_more;
 use super::sets::Sets;
 use crate::diagnostic::Diagnostics;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
 
 /// The most instances that a graph may have.
@@ -51,7 +51,7 @@ pub(super) fn own_each<'a>(
         let members = sets.find(&name, place, diagnostics);
         own.sound &= members.is_some();
         if own.sets.iter().any(|(taken, _)| *taken == name) {
-            let problem = DocumentProblem::DuplicateName {
+            let problem = problem::DuplicateName {
                 role: "set",
                 name,
                 first_role: "set",
@@ -91,7 +91,7 @@ pub(super) fn room_for<'a>(
         .unwrap_or(usize::MAX);
     let instances = total.instances.saturating_add(count);
     if instances > MOST_INSTANCES {
-        let problem = DocumentProblem::TooManyInstances {
+        let problem = problem::TooManyInstances {
             node: name.to_owned(),
             instances,
             limit: MOST_INSTANCES,
@@ -105,7 +105,7 @@ pub(super) fn room_for<'a>(
     if values > MOST_VALUES {
         diagnostics.report(
             entry.key,
-            DocumentProblem::TooLargeExpanded {
+            problem::TooLargeExpanded {
                 node: name.to_owned(),
                 limit: MOST_VALUES,
             },
@@ -146,7 +146,7 @@ pub(super) fn room_for<'a>(
         let (role, name) = ("member", twice.name.clone());
         diagnostics.report(
             entry.key,
-            DocumentProblem::DuplicateName {
+            problem::DuplicateName {
                 role,
                 name,
                 first_role: role,

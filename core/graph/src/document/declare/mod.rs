@@ -14,7 +14,7 @@ mod table;
 mod time_base;
 
 use super::graph_file::GraphFile;
-use super::problem::DocumentProblem;
+use super::problem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
@@ -55,7 +55,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         let expected = "a table".to_owned();
         diagnostics.report(
             tree.place,
-            DocumentProblem::WrongType {
+            problem::WrongType {
                 key: None,
                 expected,
                 found: tree.found(),
@@ -94,7 +94,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         let expected = "a list of tables, each under `[[tests]]`".to_owned();
         diagnostics.report(
             tests.place,
-            DocumentProblem::WrongType {
+            problem::WrongType {
                 key: Some("tests".to_owned()),
                 expected,
                 found: tests.found(),

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::diagnostic::{Diagnostics, Place};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::Table;
 
 /// Reports names of sets, signals, nodes and outputs that break the rules, and names that two of the first three share. What a reference
@@ -25,7 +25,7 @@ pub(super) fn check(
                 broken.extend(name.split(['.', ':']).next().map(str::to_owned));
             }
             if let Some(&(first_role, first)) = taken.get(name) {
-                let problem = DocumentProblem::DuplicateName {
+                let problem = problem::DuplicateName {
                     role,
                     name: name.to_owned(),
                     first_role,
@@ -57,7 +57,7 @@ pub(super) fn name_rule(
     if !is_name(name, digit_first) {
         diagnostics.report(
             place,
-            DocumentProblem::BadName {
+            problem::BadName {
                 role,
                 name: name.to_owned(),
                 digit_first,
@@ -84,7 +84,7 @@ pub(super) fn distinct(
     for (name, place) in names {
         name_rule(name, *place, role, true, diagnostics);
         if let Some(&first) = seen.get(name.as_str()) {
-            let problem = DocumentProblem::DuplicateName {
+            let problem = problem::DuplicateName {
                 role,
                 name: name.clone(),
                 first_role: role,

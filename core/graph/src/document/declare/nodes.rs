@@ -9,7 +9,7 @@ use super::reading::{
 use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, nearest};
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
 
@@ -212,7 +212,7 @@ impl Named<'_> {
             Data::Text(text) => {
                 let is_set = |name: &&str| self.each.iter().any(|(set, _)| set == name);
                 for name in placeholder::names(text).filter(|name| !is_set(name)) {
-                    let problem = DocumentProblem::UnknownPlaceholder {
+                    let problem = problem::UnknownPlaceholder {
                         name: name.to_owned(),
                         known: self.known(),
                         what: self.what.to_owned(),
@@ -348,7 +348,7 @@ fn type_key<'a>(keys: &'a Table, what: &str, diagnostics: &mut Diagnostics) -> &
     let Some((key, entry)) = keys.iter().find(|(key, _)| is_meant(key)) else {
         return "type";
     };
-    let problem = DocumentProblem::UnknownKey {
+    let problem = problem::UnknownKey {
         key: key.to_owned(),
         what: what.to_owned(),
         known: OWN_KEYS.map(str::to_owned).to_vec(),

@@ -4,7 +4,7 @@ use super::placeholder;
 use super::reading::{known_keys, meant, missing, one_or_more, quantity, table};
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::OutputDecl;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Value};
 
 pub(super) fn declare(outputs: Option<&Value>, diagnostics: &mut Diagnostics) -> Vec<OutputDecl> {
@@ -46,7 +46,7 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
     let from = one_or_more(from, name, &what, diagnostics)?;
     for (text, place) in &from {
         for placeholder in placeholder::names(text) {
-            let problem = DocumentProblem::UnknownPlaceholder {
+            let problem = problem::UnknownPlaceholder {
                 name: placeholder.to_owned(),
                 known: Vec::new(),
                 what: what.clone(),

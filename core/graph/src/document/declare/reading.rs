@@ -1,8 +1,8 @@
 //! How single values of a section are read and refused; what they are for is decided by the sections.
 
-use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::diagnostic::{Diagnostics, Place, Problem, nearest};
 use crate::document::hint::Hint;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Table, Value};
 use crate::quantity::{Quantity, QuantityError};
 use crate::time::Duration;
@@ -13,7 +13,7 @@ pub fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut D
         let known = known.iter().map(|key| (*key).to_owned()).collect();
         diagnostics.report(
             entry.key,
-            DocumentProblem::UnknownKey {
+            problem::UnknownKey {
                 key: key.to_owned(),
                 what: what.to_owned(),
                 known,
@@ -47,7 +47,7 @@ fn lacking(
     hint: Option<Hint>,
     diagnostics: &mut Diagnostics,
 ) {
-    let problem = DocumentProblem::WrongType {
+    let problem = problem::WrongType {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
@@ -63,7 +63,7 @@ pub(super) fn missing(
     advice: Option<&str>,
     diagnostics: &mut Diagnostics,
 ) {
-    let problem = DocumentProblem::MissingKey {
+    let problem = problem::MissingKey {
         key: key.to_owned(),
         what: what.to_owned(),
         advice: advice.map(str::to_owned),
@@ -127,7 +127,7 @@ pub(super) fn one_or_more(
     if value.as_list().is_some_and(<[Value]>::is_empty) {
         diagnostics.report(
             value.place,
-            DocumentProblem::EmptyList {
+            problem::EmptyList {
                 what: what.to_owned(),
             },
         );
@@ -150,13 +150,15 @@ pub(super) fn duration(
     };
     let read = match samples(text) {
         Some(number) => in_samples(text, number, sample),
-        None => text.parse().map_err(DocumentProblem::Duration),
+        None => text
+            .parse()
+            .map_err(|error| problem::NotADuration { error }.into()),
     };
     read.map_err(|problem| diagnostics.report(value.place, problem))
         .ok()
 }
 
-/// A duration that is longer than nothing.
+/// A duration above 0.
 pub(super) fn length(
     value: &Value,
     key: &'static str,
@@ -167,7 +169,7 @@ pub(super) fn length(
     if length > Duration::ZERO {
         return Some(length);
     }
-    diagnostics.report(value.place, DocumentProblem::NoLength { key });
+    diagnostics.report(value.place, problem::NotPositive { key });
     None
 }
 
@@ -190,7 +192,7 @@ pub(super) fn quantity(
             };
             lacking(value, key, &expected, hint, diagnostics);
         }
-        Some(Err(error)) => diagnostics.report(value.place, DocumentProblem::Quantity(error)),
+        Some(Err(error)) => diagnostics.report(value.place, problem::NotAQuantity { error }),
     }
     None
 }
@@ -210,18 +212,18 @@ pub(super) fn in_samples(
     text: &str,
     number: &str,
     sample: Option<Duration>,
-) -> Result<Duration, DocumentProblem> {
+) -> Result<Duration, Box<dyn Problem>> {
     let Some(sample) = sample else {
-        return Err(DocumentProblem::SamplesWithoutClock {
-            text: text.to_owned(),
-        });
+        let text = text.to_owned();
+        return Err(problem::SamplesWithoutClock { text }.into());
     };
     number
         .parse::<i64>()
         .ok()
         .and_then(|number| number.checked_mul(sample.as_ns()))
         .map(Duration::from_ns)
-        .ok_or(DocumentProblem::Duration(
-            crate::time::DurationError::TooLong,
-        ))
+        .ok_or_else(|| {
+            let error = crate::time::DurationError::TooLong;
+            problem::NotADuration { error }.into()
+        })
 }

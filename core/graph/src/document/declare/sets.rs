@@ -8,7 +8,7 @@ use indexmap::{IndexMap, IndexSet};
 use super::names::{distinct, is_name};
 use super::reading::{table, texts};
 use crate::diagnostic::{Diagnostics, Names, Place};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::Value;
 
 /// The sets of a graph.
@@ -41,7 +41,7 @@ pub(super) fn declare(
         if entry.value.as_list().is_some_and(<[Value]>::is_empty) {
             diagnostics.report(
                 entry.value.place,
-                DocumentProblem::EmptyList {
+                problem::EmptyList {
                     what: format!("the set \"{name}\""),
                 },
             );
@@ -84,7 +84,7 @@ impl Sets {
         diagnostics: &mut Diagnostics,
     ) -> Option<&[String]> {
         if !self.members.contains_key(name) && !self.broken.contains(name) {
-            let problem = DocumentProblem::UnknownSet {
+            let problem = problem::UnknownSet {
                 name: name.to_owned(),
                 known: Arc::clone(self.known()),
                 or,

@@ -10,7 +10,7 @@ use super::reading::{
 use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Names, Place, counted};
 use crate::document::graph_file::SignalDecl;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Value};
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -117,7 +117,7 @@ fn unit(value: &Value, diagnostics: &mut Diagnostics) -> Option<(Unit, Place)> {
     match Unit::parse(text) {
         Ok(unit) => Some((unit, value.place)),
         Err(error) => {
-            diagnostics.report(value.place, DocumentProblem::Unit(error));
+            diagnostics.report(value.place, problem::NotAUnit { error });
             None
         }
     }
@@ -151,7 +151,7 @@ fn channels(
     if value.as_list().is_some_and(<[Value]>::is_empty) {
         diagnostics.report(
             value.place,
-            DocumentProblem::EmptyList {
+            problem::EmptyList {
                 what: format!("the list of channels of {what}"),
             },
         );
@@ -176,7 +176,7 @@ fn column(
             let what = format!("a column of {what}");
             diagnostics.report(
                 value.place,
-                DocumentProblem::UnknownPlaceholder {
+                problem::UnknownPlaceholder {
                     name: name.to_owned(),
                     known,
                     what,
@@ -189,7 +189,7 @@ fn column(
     if !names_channel && count > 1 {
         diagnostics.report(
             value.place,
-            DocumentProblem::OneColumn {
+            problem::OneColumn {
                 pattern: pattern.to_owned(),
                 channels: count,
             },
@@ -213,7 +213,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         let expected = "a list of two quantities, the low end first".to_owned();
         diagnostics.report(
             value.place,
-            DocumentProblem::WrongType {
+            problem::WrongType {
                 key: Some("range".to_owned()),
                 expected,
                 found,
@@ -235,9 +235,9 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         .collect();
     if let Some((first, place)) = foreign.first() {
         // Where neither converts, the unit of the signal is the one mistake.
-        let problem = DocumentProblem::RangeUnit {
+        let problem = problem::RangeUnit {
             found: first.unit.to_string(),
-            unit: Box::new(unit.clone()),
+            unit: unit.clone(),
         };
         diagnostics.report(*place, problem);
         return None;
@@ -248,7 +248,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
     }
     diagnostics.report(
         value.place,
-        DocumentProblem::RangeOrder {
+        problem::RangeOrder {
             low,
             high,
             unit: unit.to_string(),
@@ -271,7 +271,7 @@ fn optional(
     let known = Arc::new(known);
     for (name, place) in &names {
         if !known.contains(name) {
-            let problem = DocumentProblem::UnknownChannel {
+            let problem = problem::UnknownChannel {
                 name: name.clone(),
                 signal: signal.to_owned(),
                 known: Arc::clone(&known),

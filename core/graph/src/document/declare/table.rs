@@ -7,7 +7,7 @@ use super::reading::{missing, table, text, wrong_type};
 use crate::diagnostic::Diagnostics;
 use crate::document::decode;
 use crate::document::pattern::Pattern;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Value};
 
 /// How tabular sources lay out their text, with what differs in some of their files.
@@ -214,7 +214,7 @@ fn format(keys: &Value, what: &str, diagnostics: &mut Diagnostics) -> Option<Tab
     for (key, reason) in refused {
         let (place, key) = (keys.place_of(key), Some(key.to_owned()));
         let reason = reason.to_owned();
-        diagnostics.report(place, DocumentProblem::Refused { key, reason });
+        diagnostics.report(place, problem::Refused { key, reason });
     }
     Some(format)
 }

@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::reading::{duration, known_keys, table, text, wrong_type};
+use super::reading::{known_keys, length, table, text, wrong_type};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::{TimeBase, TimeForm};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Table, Value};
 use crate::time::{Duration, TimeColumns, TimeFormat, Zone};
 
@@ -35,7 +35,9 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
         diagnostics,
     );
     let unit = time.get("unit").and_then(|value| unit(value, diagnostics));
-    let step = time.get("step").and_then(|value| step(value, diagnostics));
+    let step = time
+        .get("step")
+        .and_then(|value| length(value, "step", None, diagnostics));
     let form = match format(time, unit, diagnostics) {
         Some(format) => TimeForm::Format(format),
         None => form(time, unit, step, diagnostics),
@@ -67,7 +69,7 @@ fn zone(time: &Table, form: &TimeForm, diagnostics: &mut Diagnostics) -> Option<
     };
     if let Some(with) = with {
         let (key, with) = ("zone", with.to_owned());
-        diagnostics.report(entry.key, DocumentProblem::TimeContradiction { key, with });
+        diagnostics.report(entry.key, problem::TimeContradiction { key, with });
     }
     parsed(&entry.value, "zone", diagnostics)
 }
@@ -83,7 +85,7 @@ fn format(
     let step = || time.entry("step").map(|_| "a `step`".to_owned());
     if let Some(with) = beside.or_else(step) {
         let key = "format";
-        diagnostics.report(entry.key, DocumentProblem::TimeContradiction { key, with });
+        diagnostics.report(entry.key, problem::TimeContradiction { key, with });
     }
     parsed(&entry.value, "format", diagnostics)
 }
@@ -95,7 +97,7 @@ where
     let parsed = text(value, key, diagnostics)?.parse();
     if let Err(error) = &parsed {
         let (key, reason) = (Some(key.to_owned()), T::Err::to_string(error));
-        diagnostics.report(value.place, DocumentProblem::Refused { key, reason });
+        diagnostics.report(value.place, problem::Refused { key, reason });
     }
     parsed.ok()
 }
@@ -113,7 +115,7 @@ fn form(
         (Some((name, _)), Some(entry)) => {
             diagnostics.report(
                 entry.key,
-                DocumentProblem::TimeContradiction {
+                problem::TimeContradiction {
                     key: "step",
                     with: format!("unit = \"{name}\""),
                 },
@@ -141,20 +143,11 @@ fn unit<'a>(value: &'a Value, diagnostics: &mut Diagnostics) -> Option<(&'a str,
         .filter(|unit| unit.is_ascii())
         .map(|unit| (*unit).to_owned())
         .collect();
-    let problem = DocumentProblem::UnknownChoice {
+    let problem = problem::UnknownChoice {
         key: Some("unit".to_owned()),
         found: name.to_owned(),
         choices,
     };
     diagnostics.report(value.place, problem);
     None
-}
-
-fn step(value: &Value, diagnostics: &mut Diagnostics) -> Option<Duration> {
-    let step = duration(value, "step", None, diagnostics)?;
-    if step <= Duration::ZERO {
-        diagnostics.report(value.place, DocumentProblem::StepNotPositive);
-        return None;
-    }
-    Some(step)
 }

@@ -6,30 +6,53 @@ use serde::de::{self, Expected, Unexpected};
 
 use crate::diagnostic::{Diagnostics, Place, Problem, counted, nearest};
 use crate::document::hint::Hint;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem::{
+    MissingKey, NotADuration, NotAQuantity, NotAUnit, Refused, UnknownChoice, UnknownKey, WrongType,
+};
 use crate::document::tree::{Data, Value};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
 
 /// A problem, its place, and the keys from the decoded value to the value or table that it is about.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Mistake {
     pub(super) keys: Vec<String>,
     pub(super) place: Place,
-    pub(super) problem: DocumentProblem,
+    pub(super) cause: Cause,
+}
+
+/// What is wrong; of the first ones the key or the table is not known before they are reported.
+#[derive(Debug)]
+pub(super) enum Cause {
+    UnknownKey(UnknownKey),
+    MissingKey(MissingKey),
+    WrongType(WrongType),
+    UnknownChoice(UnknownChoice),
+    Refused(Refused),
+    Value(Box<dyn Problem>),
+}
+
+impl Cause {
+    fn as_problem(&self) -> &dyn Problem {
+        match self {
+            Self::UnknownKey(problem) => problem,
+            Self::MissingKey(problem) => problem,
+            Self::WrongType(problem) => problem,
+            Self::UnknownChoice(problem) => problem,
+            Self::Refused(problem) => problem,
+            Self::Value(problem) => &**problem,
+        }
+    }
 }
 
 impl Mistake {
     /// Whether it is an unknown key that another finds missing under its right name.
     pub(super) fn is_meant_for(&self, missing: &Self) -> bool {
-        match (&self.problem, &missing.problem) {
-            (
-                DocumentProblem::UnknownKey { key, known, .. },
-                DocumentProblem::MissingKey { key: wanted, .. },
-            ) => {
-                let near = nearest(key, known.iter().map(String::as_str));
-                self.keys == missing.keys && near == Some(wanted)
+        match (&self.cause, &missing.cause) {
+            (Cause::UnknownKey(unknown), Cause::MissingKey(missed)) => {
+                let near = nearest(&unknown.key, unknown.known.iter().map(String::as_str));
+                self.keys == missing.keys && near == Some(&missed.key)
             }
             _ => false,
         }
@@ -48,25 +71,26 @@ impl Mistake {
             keys => format!("\"{}\" of {what}", keys.join(".")),
         };
         let is_outermost = self.keys.is_empty();
-        match &mut self.problem {
-            DocumentProblem::UnknownKey { what, known, .. } => {
-                *what = owner;
+        match &mut self.cause {
+            Cause::UnknownKey(unknown) => {
+                unknown.what = owner;
                 if is_outermost {
-                    known.extend(elsewhere.iter().map(|&key| key.to_owned()));
+                    let elsewhere = elsewhere.iter().map(|&key| key.to_owned());
+                    unknown.known.extend(elsewhere);
                 }
             }
-            DocumentProblem::MissingKey { key, what, advice } => {
-                *what = owner;
+            Cause::MissingKey(missing) => {
+                missing.what = owner;
                 if is_outermost {
-                    *advice = of_missing(key);
+                    missing.advice = of_missing(&missing.key);
                 }
             }
-            DocumentProblem::WrongType { key, .. }
-            | DocumentProblem::UnknownChoice { key, .. }
-            | DocumentProblem::Refused { key, .. } => *key = self.keys.pop(),
-            _ => {}
+            Cause::WrongType(WrongType { key, .. })
+            | Cause::UnknownChoice(UnknownChoice { key, .. })
+            | Cause::Refused(Refused { key, .. }) => *key = self.keys.pop(),
+            Cause::Value(_) => {}
         }
-        diagnostics.report(self.place, self.problem);
+        diagnostics.report_borrowed(self.place, self.cause.as_problem());
     }
 }
 
@@ -76,22 +100,22 @@ pub(super) struct DecodeError(Box<Unplaced>);
 
 #[derive(Debug)]
 struct Unplaced {
-    problem: DocumentProblem,
+    cause: Cause,
     at: Option<(Vec<String>, Place)>,
 }
 
 impl DecodeError {
-    pub(super) fn of(problem: DocumentProblem) -> Self {
-        DecodeError(Box::new(Unplaced { problem, at: None }))
+    pub(super) fn of(cause: Cause) -> Self {
+        DecodeError(Box::new(Unplaced { cause, at: None }))
     }
 
     /// Places the error at `value`, or at a key or choice of it that a buffered enum names. An error that has a place keeps it.
     pub(super) fn at(mut self, value: &Value, keys: impl FnOnce() -> Vec<String>) -> Self {
         if self.0.at.is_none() {
             let table = value.as_table();
-            let inner = table.and_then(|table| match &self.0.problem {
-                DocumentProblem::UnknownKey { key, .. } => Some(table.entry(key)?.key),
-                DocumentProblem::UnknownChoice { found, .. } => {
+            let inner = table.and_then(|table| match &self.0.cause {
+                Cause::UnknownKey(unknown) => Some(table.entry(&unknown.key)?.key),
+                Cause::UnknownChoice(UnknownChoice { found, .. }) => {
                     let mut values = table.iter().map(|(_, entry)| &entry.value);
                     Some(values.find(|value| value.as_text() == Some(found))?.place)
                 }
@@ -103,23 +127,19 @@ impl DecodeError {
     }
 
     pub(super) fn into_mistake(self, place: Place) -> Mistake {
-        let Unplaced { problem, at } = *self.0;
+        let Unplaced { cause, at } = *self.0;
         let (keys, place) = at.unwrap_or((Vec::new(), place));
-        Mistake {
-            keys,
-            place,
-            problem,
-        }
+        Mistake { keys, place, cause }
     }
 
     /// Another type than `expected`.
     pub(super) fn wrong_type(found: String, expected: &str, hint: Option<Hint>) -> Self {
-        Self::of(DocumentProblem::WrongType {
+        Self::of(Cause::WrongType(WrongType {
             key: None,
             expected: expected.to_owned(),
             found,
             hint,
-        })
+        }))
     }
 
     /// What is wrong with a value in the place of a duration, a quantity or a unit, by the name of that type.
@@ -127,20 +147,21 @@ impl DecodeError {
         let text = value.as_text();
         let read = match type_name {
             Duration::TYPE => text.map(|text| {
-                text.parse::<Duration>()
-                    .err()
-                    .map(DocumentProblem::Duration)
+                let error = text.parse::<Duration>().err()?;
+                Some(NotADuration { error }.into())
             }),
             Quantity::TYPE => text.map(|text| {
-                text.parse::<Quantity>()
-                    .err()
-                    .map(DocumentProblem::Quantity)
+                let error = text.parse::<Quantity>().err()?;
+                Some(NotAQuantity { error }.into())
             }),
-            Unit::TYPE => text.map(|text| Unit::parse(text).err().map(DocumentProblem::Unit)),
+            Unit::TYPE => text.map(|text| {
+                let error = Unit::parse(text).err()?;
+                Some(NotAUnit { error }.into())
+            }),
             _ => return None,
         };
         match (read, type_name) {
-            (Some(error), _) => error.map(Self::of),
+            (Some(problem), _) => problem.map(|problem| Self::of(Cause::Value(problem))),
             (None, Duration::TYPE) => Some(Self::wrong_type(
                 value.found(),
                 Duration::EXPECTED,
@@ -158,7 +179,7 @@ impl DecodeError {
 
 impl fmt::Display for DecodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0.problem.message())
+        f.write_str(&self.0.cause.as_problem().message())
     }
 }
 
@@ -167,7 +188,7 @@ impl std::error::Error for DecodeError {}
 impl de::Error for DecodeError {
     fn custom<T: fmt::Display>(reason: T) -> Self {
         let reason = reason.to_string();
-        Self::of(DocumentProblem::Refused { key: None, reason })
+        Self::of(Cause::Refused(Refused { key: None, reason }))
     }
 
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
@@ -192,28 +213,28 @@ impl de::Error for DecodeError {
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
         let choices = expected.iter().map(|choice| (*choice).to_owned()).collect();
-        Self::of(DocumentProblem::UnknownChoice {
+        Self::of(Cause::UnknownChoice(UnknownChoice {
             key: None,
             found: variant.to_owned(),
             choices,
-        })
+        }))
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
         let known = expected.iter().map(|key| (*key).to_owned()).collect();
-        Self::of(DocumentProblem::UnknownKey {
+        Self::of(Cause::UnknownKey(UnknownKey {
             key: field.to_owned(),
             what: String::new(),
             known,
-        })
+        }))
     }
 
     fn missing_field(field: &'static str) -> Self {
-        Self::of(DocumentProblem::MissingKey {
+        Self::of(Cause::MissingKey(MissingKey {
             key: field.to_owned(),
             what: String::new(),
             advice: None,
-        })
+        }))
     }
 
     fn duplicate_field(field: &'static str) -> Self {

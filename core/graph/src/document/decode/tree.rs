@@ -6,8 +6,8 @@ use serde::de::value::StrDeserializer;
 use serde::de::{self, DeserializeSeed, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
 
-use super::error::{DecodeError, Mistake};
-use crate::document::problem::DocumentProblem;
+use super::error::{Cause, DecodeError, Mistake};
+use crate::document::problem::UnknownKey;
 use crate::document::tree::{Data, Entry, Table, Value};
 
 /// The keys from the decoded value to one inside it, as a list on the stack; the elements of a list have those of the list.
@@ -103,7 +103,7 @@ impl<'a> TreeDeserializer<'a> {
         let is_known = move |key: &str| fields.is_none_or(|fields| fields.contains(&key));
         for (key, entry) in table.iter().filter(|(key, _)| !is_known(key)) {
             let known = fields.into_iter().flatten();
-            let problem = DocumentProblem::UnknownKey {
+            let unknown = UnknownKey {
                 key: key.to_owned(),
                 what: String::new(),
                 known: known.map(|field| (*field).to_owned()).collect(),
@@ -111,7 +111,7 @@ impl<'a> TreeDeserializer<'a> {
             self.unknown.borrow_mut().push(Mistake {
                 keys: self.keys(),
                 place: entry.key,
-                problem,
+                cause: Cause::UnknownKey(unknown),
             });
         }
         TableAccess {

@@ -35,9 +35,9 @@ impl Estimator for Level {
 
     fn learns(&self) -> Learns {
         if self.fault == Fault::Learned {
-            Learns::UnlessTold
+            Learns::ByDefault
         } else {
-            Learns::WhenTold
+            Learns::OnRequest
         }
     }
 

@@ -216,7 +216,7 @@ fn of_truths_that_come_much_faster_than_a_step_each_series_takes_one_a_step() {
         learner.learn(&[1.0], 0.0, at);
     }
     for followed in &learner.known.series {
-        assert!((10..=11).contains(&followed.told), "{followed:?}");
+        assert!((10..=11).contains(&followed.truths), "{followed:?}");
     }
 }
 

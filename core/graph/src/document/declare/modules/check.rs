@@ -10,7 +10,7 @@ use super::outlet::{Outlet, outlet};
 use crate::diagnostic::{Diagnostics, Names};
 use crate::document::declare::names::name_rule;
 use crate::document::declare::reading::{table, text};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Table, Value};
 
 /// Reports what is wrong with modules as they are declared, used or not; `sight` are the modules that those see which see them.
@@ -56,7 +56,7 @@ fn check_one<'a>(module: &Module<'a>, sight: &[&'a Table], diagnostics: &mut Dia
         if node.contains('.') || port.is_some_and(|port| port.contains('.')) {
             let reason =
                 "an output is a node of the module or a port of one, with all its channels";
-            let problem = DocumentProblem::Refused {
+            let problem = problem::Refused {
                 key: Some(name.to_owned()),
                 reason: reason.to_owned(),
             };
@@ -68,7 +68,7 @@ fn check_one<'a>(module: &Module<'a>, sight: &[&'a Table], diagnostics: &mut Dia
                 diagnostics.report(place, problem);
             }
         } else {
-            let problem = DocumentProblem::OutOfReach {
+            let problem = problem::OutOfReach {
                 name: node.to_owned(),
                 module: module.name.to_owned(),
                 known: Arc::clone(&known),
@@ -93,7 +93,7 @@ fn lacking_output(
     module: &str,
     sight: &[&Table],
     listed: &mut Listed,
-) -> Option<DocumentProblem> {
+) -> Option<problem::UnknownOutput> {
     let Outlet::Unknown(outputs) = outlet(module, port, sight, DEEPEST) else {
         return None;
     };
@@ -102,7 +102,7 @@ fn lacking_output(
         Arc::new(names.map(str::to_owned).collect())
     };
     let known = listed.entry(outputs.map(std::ptr::from_ref));
-    Some(DocumentProblem::UnknownOutput {
+    Some(problem::UnknownOutput {
         node: node.to_owned(),
         output: port.map(str::to_owned),
         module: module.to_owned(),

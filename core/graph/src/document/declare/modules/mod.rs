@@ -45,7 +45,7 @@ use super::placeholder;
 use super::reading::{known_keys, meant, missing, table, text};
 use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Names};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use check::check;
 use module::{Module, find};
@@ -256,7 +256,7 @@ impl Expansion<'_> {
 
     fn too_large(&mut self, node: String, entry: &Entry) {
         let limit = MOST_VALUES;
-        let problem = DocumentProblem::TooLargeExpanded { node, limit };
+        let problem = problem::TooLargeExpanded { node, limit };
         self.diagnostics.report(entry.key, problem);
         self.full = true;
     }
@@ -266,7 +266,7 @@ impl Expansion<'_> {
             self.values += weight(&entry.value);
             let name = || level.name(name);
             if self.placed.len() >= MOST_INSTANCES {
-                let problem = DocumentProblem::TooManyInstances {
+                let problem = problem::TooManyInstances {
                     node: name(),
                     instances: self.placed.len() + 1,
                     limit: MOST_INSTANCES,
@@ -306,7 +306,7 @@ impl Expansion<'_> {
         let module_name = text(wanted, "module", self.diagnostics)?;
         let Some((found, sight)) = find(module_name, &level.modules) else {
             let tables: Vec<_> = level.modules.iter().rev().copied().collect();
-            let problem = DocumentProblem::UnknownModule {
+            let problem = problem::UnknownModule {
                 name: module_name.to_owned(),
                 known: self.known(&tables, []),
             };
@@ -316,7 +316,7 @@ impl Expansion<'_> {
         let here = (module_name.to_owned(), std::ptr::from_ref(found));
         if self.path.contains(&here) || self.path.len() >= DEEPEST {
             let path = self.path.iter().chain([&here]);
-            let problem = DocumentProblem::ModuleLoop {
+            let problem = problem::ModuleLoop {
                 path: path.map(|(name, _)| name.clone()).collect(),
                 limit: DEEPEST,
             };
@@ -472,7 +472,7 @@ impl Expansion<'_> {
                 let strange =
                     |name: &&str| !name.contains('/') && !within.each.iter().any(|set| set == name);
                 for name in placeholder::names(&text).filter(strange) {
-                    let problem = DocumentProblem::UnknownPlaceholder {
+                    let problem = problem::UnknownPlaceholder {
                         name: name.to_owned(),
                         known: within.each.clone(),
                         what: what.to_owned(),

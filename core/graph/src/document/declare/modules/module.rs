@@ -4,7 +4,7 @@
 use crate::diagnostic::Diagnostics;
 use crate::document::declare::names::distinct;
 use crate::document::declare::reading::{known_keys, meant, missing, table, texts};
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Entry, Table, Value};
 
 const KEYS: [&str; 6] = [
@@ -77,7 +77,7 @@ impl<'a> Module<'a> {
             } else {
                 continue;
             };
-            let problem = DocumentProblem::DuplicateName {
+            let problem = problem::DuplicateName {
                 role: "parameter",
                 name: name.clone(),
                 first_role,

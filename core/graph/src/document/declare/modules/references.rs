@@ -3,7 +3,7 @@
 use super::outlet::{Outlet, outlet, parts};
 use super::{DEEPEST, Expansion, Level};
 use crate::diagnostic::Place;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
 
 impl Expansion<'_> {
@@ -86,7 +86,7 @@ impl Expansion<'_> {
                         Value::new(reads.place, Data::Text(reference.clone() + &rest))
                     }
                     _ => {
-                        let problem = DocumentProblem::Refused {
+                        let problem = problem::Refused {
                             key: Some(input.to_owned()),
                             reason: format!(
                                 "module \"{}\" takes a part of this input, which only a single reference has",
@@ -110,7 +110,7 @@ impl Expansion<'_> {
         let Some(entry) = level.nodes.entry(node) else {
             if let Some(given) = &level.given {
                 let inputs = given.inputs.keys().map(|input| format!("{{{input}}}"));
-                let problem = DocumentProblem::OutOfReach {
+                let problem = problem::OutOfReach {
                     name: node.to_owned(),
                     module: given.module.clone(),
                     known: self.known(&[level.nodes], inputs),
@@ -128,7 +128,7 @@ impl Expansion<'_> {
             Outlet::Found(target) => format!("{prefix}{node}/{target}"),
             Outlet::Unknown(outputs) => {
                 let known = self.known(outputs.as_slice(), []);
-                let problem = DocumentProblem::UnknownOutput {
+                let problem = problem::UnknownOutput {
                     node: node.to_owned(),
                     output: port.map(str::to_owned),
                     module: module.to_owned(),

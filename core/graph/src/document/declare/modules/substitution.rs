@@ -4,7 +4,7 @@ use super::Given;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::declare::each::weight;
 use crate::document::declare::placeholder;
-use crate::document::problem::DocumentProblem;
+use crate::document::problem;
 use crate::document::tree::{Data, Entry, Value};
 use crate::quantity::Quantity;
 use crate::unit::Unit;
@@ -71,7 +71,7 @@ impl Given {
     }
 
     /// The parameter that is given with a unit in a text that has one for it, where both together are no quantity.
-    fn unit_twice(&self, text: &str) -> Option<(&Value, DocumentProblem)> {
+    fn unit_twice(&self, text: &str) -> Option<(&Value, problem::UnitTwice)> {
         let (parameter, unit) = text.strip_prefix('{')?.split_once('}')?;
         let given = self.parameters.get(parameter)?;
         let written = given.as_text()?;
@@ -79,7 +79,7 @@ impl Given {
         let quantity: Quantity = written.parse().ok()?;
         let filled = placeholder::fill(text, &[(parameter, written)]);
         filled.parse::<Quantity>().is_err().then(|| {
-            let problem = DocumentProblem::UnitTwice {
+            let problem = problem::UnitTwice {
                 parameter: parameter.to_owned(),
                 module: self.module.clone(),
                 given: quantity,
@@ -113,7 +113,7 @@ impl Given {
                 Data::Float(number) => texts.push((name, number.to_string())),
                 Data::Bool(truth) => texts.push((name, truth.to_string())),
                 Data::List(_) | Data::Table(_) => {
-                    let problem = DocumentProblem::WrongType {
+                    let problem = problem::WrongType {
                         key: Some(name.to_owned()),
                         expected: "a text or a number within a text".to_owned(),
                         found: value.found(),

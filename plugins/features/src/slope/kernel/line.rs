@@ -1,4 +1,4 @@
-//! Decides what is told of the line through a window beside its slope.
+//! The line through a window, beside its slope.
 
 use std::array::from_fn;
 

@@ -30,7 +30,7 @@ pub(super) fn mistakes(of: &Identified) -> Vec<Mistake> {
 
 pub(super) fn coefficients(of: &Identified) -> Coefficients {
     let model = &of.model;
-    let mut told = Coefficients {
+    let mut all = Coefficients {
         step: Some(of.step),
         differences: model.differences,
         ..Coefficients::default()
@@ -43,7 +43,7 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
             Some(errors) if of.regressors.is_empty() && !of.mean_level => errors.level,
             _ => f64::NAN,
         };
-        told.terms
+        all.terms
             .push(Term::new(Of::Constant, at_rest).within(error));
     }
     let errors = of.errors.as_ref();
@@ -61,11 +61,11 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
                 input,
             };
             let error = errors.get(nth).copied().unwrap_or(f64::NAN);
-            told.terms
+            all.terms
                 .push(Term::new(of, value / scale).within(error / scale));
         }
         if matches!(polynomial, 'A' | 'D' | 'F') {
-            told.modes
+            all.modes
                 .extend(Fading::of(values).iter().map(|fading| Mode {
                     of: match input {
                         Some(nth) => format!("{polynomial} {}", of.regressors[nth]),
@@ -84,11 +84,11 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
     }
     tell('C', None, (&model.c, errors.map_or(&[], |of| &of.c)));
     tell('D', None, (&model.d, errors.map_or(&[], |of| &of.d)));
-    told.noises
+    all.noises
         .extend(of.deviations.first().map(|&deviation| Noise {
             name: "e".to_owned(),
             deviation,
             per_s: None,
         }));
-    told
+    all
 }

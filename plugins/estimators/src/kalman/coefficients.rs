@@ -6,7 +6,7 @@ use athermal_numerics::Structural;
 
 use super::KalmanPredictor;
 
-/// The time over which noises are told, in s.
+/// The time over which noises are given, in s.
 const PER_S: f64 = 3600.0;
 
 /// After so many times in which it returns, 2 % of a level are left, and less than a thousandth of its variance.

@@ -1,0 +1,68 @@
+//! Mistakes in signals: their columns, ranges and channels.
+
+use std::sync::Arc;
+
+use super::nearest_of_many;
+use crate::diagnostic::{Names, code, problem};
+use crate::unit::Unit;
+
+code!(
+    A021,
+    Error,
+    "column pattern",
+    "The columns of a signal with several channels must differ: the pattern contains `{channel}`."
+);
+
+problem! {
+    /// Several channels would be read from one column.
+    A021 OneColumn { pattern: String, channels: usize }
+    message: format!("{channels} channels would all be read from the column \"{pattern}\""),
+    label: "",
+    help: "put `{channel}` into the pattern",
+}
+
+code!(
+    A022,
+    Error,
+    "bad range",
+    "A range is `[low, high]`, both in units that convert to the signal's, the low one below the high one."
+);
+
+problem! {
+    /// A range whose ends do not measure what the signal measures.
+    A022 RangeUnit {
+        /// The unit of the end.
+        found: String,
+        /// The unit of the signal.
+        unit: Unit,
+    }
+    message: format!("the range is in \"{found}\", which does not convert to the signal's unit \"{unit}\""),
+    label: format!("does not convert to {unit}"),
+    help: match unit.scale_meant() {
+        Some(meant) => meant.to_owned(),
+        None => format!("write it in {unit}, or correct the signal's unit"),
+    },
+}
+
+problem! {
+    /// A range whose low end is not below its high end.
+    A022 RangeOrder { low: f64, high: f64, unit: String }
+    message: format!("the range from {low} {unit} to {high} {unit} contains nothing"),
+    label: "",
+    help: "write the lower limit first",
+}
+
+code!(
+    A023,
+    Error,
+    "unknown channel",
+    "`optional` names a channel that the signal does not have."
+);
+
+problem! {
+    /// `optional` names what is not a channel.
+    A023 UnknownChannel { name: String, signal: String, known: Arc<Names> }
+    message: format!("signal \"{signal}\" has no channel \"{name}\""),
+    label: "not a channel",
+    help: nearest_of_many(name, known, "its channels are"),
+}
