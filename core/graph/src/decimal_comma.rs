@@ -1,4 +1,4 @@
-//! Whether a text that cannot be read has a comma where a point belongs, and how that is worded.
+//! Whether a text that cannot be read has a comma where a point belongs, and what to write instead.
 
 /// The text with a point in the place of its one comma between digits.
 pub fn with_point(text: &str) -> Option<String> {

@@ -1,4 +1,4 @@
-//! Counts and short lists in sentences; the caller names what is counted.
+//! How many there are of something, in words.
 
 use std::fmt::Display;
 

@@ -1,4 +1,4 @@
-//! Numbers to so many significant digits, whatever their size.
+//! A number with as many digits as are shown, whatever its size.
 
 /// A number to so many significant digits.
 #[must_use]
