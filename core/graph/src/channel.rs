@@ -73,7 +73,7 @@ pub struct Extremes {
     pub highest: f64,
 }
 
-/// How far apart values are, as a share of their size, that only rounding tells apart.
+/// How far apart values are, as a share of their size, that differ by rounding alone.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Extremes {

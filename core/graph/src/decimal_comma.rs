@@ -1,4 +1,4 @@
-//! Decides whether a text that cannot be read has a comma where a point belongs, and what is told of it; not what the text stands for.
+//! Whether a text that cannot be read has a comma where a point belongs, and what to write instead.
 
 /// The text with a point in the place of its one comma between digits.
 pub fn with_point(text: &str) -> Option<String> {

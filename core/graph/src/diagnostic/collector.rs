@@ -168,7 +168,7 @@ impl Diagnostics {
 
     /// Notes a problem of one member, e.g. `in node "thermal", member "Z1"`.
     ///
-    /// The same problem at the same place is told once, with its first context and the number of the others.
+    /// The same problem at the same place is reported once, with its first context and the number of the others.
     pub fn report_in(
         &mut self,
         context: impl Into<String>,

@@ -1,4 +1,4 @@
-//! How many there are of something, as it is told; what is counted is named by who counts.
+//! How many there are of something, in words.
 
 use std::fmt::Display;
 

@@ -1,4 +1,4 @@
-//! How many digits of a number are told, whatever its size.
+//! A number with as many digits as are shown, whatever its size.
 
 /// A number to so many significant digits.
 #[must_use]
