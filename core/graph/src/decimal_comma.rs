@@ -38,8 +38,8 @@ mod tests {
             ("1h2,5min", "1h2.5min"),
         ] {
             assert_eq!(with_point(text).as_deref(), Some(instead));
-            let told = format!("a number has a decimal point: \"{instead}\"");
-            assert_eq!(help(instead), told);
+            let text = format!("a number has a decimal point: \"{instead}\"");
+            assert_eq!(help(instead), text);
         }
         for text in ["5 nm, 6 nm", "1,2,3 nm", ",5 nm", "5, nm", "5 nm"] {
             assert_eq!(with_point(text), None, "{text}");

@@ -451,7 +451,7 @@ impl Serialize for Duration {
 impl Duration {
     /// The name by which a deserializer knows the type.
     pub(crate) const TYPE: &str = "athermal::Duration";
-    /// What a message says that was expected.
+    /// What a message names as expected.
     pub(crate) const EXPECTED: &str = "a duration like \"5min\"";
 }
 

@@ -26,7 +26,7 @@ impl Severity {
 
 /// One kind of mistake, with the data of its texts; [`problem!`](crate::problem) declares it.
 pub trait Problem: Debug {
-    /// The code, which says how bad it is.
+    /// The code, with how bad it is.
     fn code(&self) -> &'static Code;
 
     /// What is wrong, in one sentence that stands alone.

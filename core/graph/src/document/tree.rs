@@ -255,7 +255,7 @@ impl Value {
         }
     }
 
-    /// As [`Data::found`].
+    /// As `Data::found`.
     pub fn found(&self) -> String {
         self.data.found()
     }
