@@ -3,7 +3,7 @@
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
-use athermal::core::diagnostic::{panic_text, said};
+use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{CommandFactory, Parser};
 
 use crate::terminal::{Answer, Failure, Format};
@@ -76,7 +76,7 @@ fn report_panics_in_a_line() {
 }
 
 fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
-    let message = said(panic.payload());
+    let message = panic_message(panic.payload());
     match panic.location() {
         Some(place) => format!("panic at {place}: {message}"),
         None => format!("panic: {message}"),

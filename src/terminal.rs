@@ -26,7 +26,7 @@ pub struct Options {
     // A text, so that a command with forms of its own can declare the same option with other values.
     #[arg(long, global = true, value_name = "FORMAT", value_parser = formats(), default_value = "table")]
     pub format: String,
-    /// Say only what was asked for and what went wrong
+    /// Print only the result, warnings and errors
     #[arg(long, short, global = true)]
     pub quiet: bool,
 }

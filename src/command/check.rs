@@ -29,7 +29,7 @@ pub struct Check {
     /// Graph files
     #[arg(required = true, value_name = "GRAPH")]
     graphs: Vec<PathBuf>,
-    /// Take warnings as a reason to say no (exit status 1)
+    /// Fail on warnings too (exit status 1)
     #[arg(long)]
     strict: bool,
 }

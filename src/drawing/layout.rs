@@ -153,7 +153,7 @@ fn place(items: &mut [Item], columns: &[Vec<usize>]) -> f64 {
             y += items[item].size[1] + BETWEEN_BOXES;
         }
     }
-    // The last sweep looks back, since what a box is made from says more of its place than what it goes into.
+    // The last sweep looks back: a box belongs below what it is made from, rather than above what it goes into.
     for looks_back in (0..SWEEPS).map(|sweep| sweep % 2 == 1) {
         for column in columns.iter() {
             let wanted: Vec<f64> = column

@@ -326,8 +326,19 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
     let probe = |train, test| (train, test, None);
     let alone = |file| probe(file, file);
     let mut runs = Vec::new();
+    // Others of these machines differ from the one graph in what they do beside predicting; the zoo takes as long as all else.
+    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
+    let is_shortest = |name: &str| {
+        let of_machine = ["die-tester", "linear-axis"]
+            .iter()
+            .find(|machine| name.starts_with(**machine));
+        name != "zoo" && of_machine.is_none_or(|machine| name == *machine)
+    };
     for path in graphs("graphs") {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        if !(is_long || is_shortest(&name)) {
+            continue;
+        }
         match &name {
             name if name == "zoo" || name.starts_with("die-tester") => {
                 runs.push((name.clone(), die_tester))
@@ -389,7 +400,7 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
             }
         }
     }
-    assert!(scored > 150, "{scored}");
+    assert!(scored > if is_long { 150 } else { 30 }, "{scored}");
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 

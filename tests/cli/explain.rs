@@ -91,3 +91,28 @@ fn only_what_is_unused_or_doubtful_is_a_warning() {
     }
     assert_eq!(warnings, BTreeSet::from(["A059", "A060", "A065", "A069"]));
 }
+
+/// The page of all codes in the guide, as it follows from their declarations.
+fn page() -> String {
+    let mut page = "# The codes of mistakes\n\n\
+        Each mistake in a graph file, its tests or its model has a code, which never changes its meaning. `athermal explain CODE`\n\
+        shows a graph with the mistake and one without. This page is generated from the same declarations.\n\n\
+        | code | | mistake | why, and what to do |\n|---|---|---|---|\n"
+        .to_owned();
+    for entry in codes() {
+        let (code, severity) = (entry.code, entry.severity.word());
+        let (title, explanation) = (entry.title, entry.explanation);
+        page += &format!("| {code} | {severity} | {title} | {explanation} |\n");
+    }
+    page
+}
+
+#[test]
+fn the_guide_lists_every_code_as_it_is_declared() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/codes.md");
+    if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+        std::fs::write(&path, page()).unwrap();
+    }
+    let guide = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(guide, page(), "INSTA_UPDATE=always writes the page anew");
+}

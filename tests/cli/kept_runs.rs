@@ -112,7 +112,7 @@ fn a_run_leaves_out_at_the_end_of_its_input_what_only_more_of_it_would_confirm_a
         (
             "ahead",
             format!("9999{last}\n"),
-            "no row follows by which to tell a gap from a wrong time; the row was left out",
+            "no row follows that decides between a gap and a wrong time; the row was left out",
         ),
     ] {
         let state = scratch.path(test);

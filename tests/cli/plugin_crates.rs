@@ -238,13 +238,12 @@ fn a_crate_that_is_not_made_for_this_athermal_is_refused_before_anything_is_buil
                 &scratch,
                 "tested-nodes",
                 &format!(
-                    "athermal-core = {{ path = {:?}, features = [\"testkit\"] }}",
-                    format!("{ROOT}/core/framework")
+                    "athermal-core = {{ path = \"{ROOT}/core/framework\" }}\nathermal-testkit = {{ path = \"{ROOT}/core/testkit\" }}"
                 ),
             ),
             2,
             [
-                "tested-nodes has athermal-core with the feature `testkit` under `[dependencies]`",
+                "tested-nodes has athermal-testkit under `[dependencies]`",
                 "`[dev-dependencies]`",
             ],
         ),

@@ -304,7 +304,6 @@ fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
         "What the correction is worth",
         "Largest loss per temperature step",
         "Scores",
-        "Table 3, die tester",
         "Drift over time",
         "Votes, features and errors",
         "Correlation of features with drift.Z1",

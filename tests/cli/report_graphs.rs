@@ -327,7 +327,7 @@ fn losses_are_those_of_the_drifts_that_their_nodes_read_in_any_order_and_each_of
 fn what_cannot_be_judged_of_a_correction_is_told_and_the_rest_is_there() {
     let more = format!(
         "[nodes.limited]\ntype = \"safe_state\"\ninputs.signal = {{ from = \"thermal\", max_age = \"1min\" }}\n\
-         refuge = \"zero\"\nmax_slew = \"100 nm/min/s\"\n\
+         when_lost = \"zero\"\nmax_slew = \"100 nm/min/s\"\n\
          [nodes.compensate]\ninputs.rate = {{ from = \"limited\", max_age = \"1min\" }}\n{COMPENSATE}\
          [signals.speed]\nunit = \"nm/min\"\nchannels = [\"S1\"]\ncolumn = \"X1_nm\"\nmax_age = \"3min\"\n\
          [nodes.stepping]\ntype = \"linear\"\ninputs.features = \"gradients\"\ninputs.truth = \"speed.S1\"\nahead = \"0s\"\n\

@@ -382,14 +382,14 @@ fn told_soon(files: &Memory, told: &str, help: &str) -> usize {
         .find(|found| found.message.contains(told));
     let found = one.and_then(|found| found.help.as_deref());
     assert_eq!(found, Some(help), "{told}");
-    assert!(taken < 6 * TOO_LONG, "{told}: {taken:?}");
+    assert!(taken < 3 * TOO_LONG, "{told}: {taken:?}");
     diagnostics.error_count()
 }
 
 #[test]
-fn twenty_thousand_unknown_references_are_told_soon() {
+fn thousands_of_unknown_references_are_told_soon() {
     let mut text = "schema = 1\n[signals.t]\nunit = \"Cel\"\nchannels = [\"a\"]\n".to_owned();
-    for nth in 0..10_000 {
+    for nth in 0..MANY {
         let node = format!(
             "[nodes.slope_{nth:04}]\ntype = \"slope\"\nwindows = [\"5min\"]\n\
              inputs.signal = [\"slop_{nth:04}\", \"epols_{nth:04}\"]\n"
@@ -398,12 +398,12 @@ fn twenty_thousand_unknown_references_are_told_soon() {
     }
     text.push_str("[outputs]\nfirst = \"slope_0000\"\n");
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "slop_9999", "did you mean `slope_9999`?");
-    assert_eq!(errors, 20_000);
+    let errors = told_soon(&files, "slop_3999", "did you mean `slope_3999`?");
+    assert_eq!(errors, 2 * MANY);
 }
 
 /// How many names there are, and how many more are not there, of each sort of names that a file may have many of.
-const MANY: usize = 10_000;
+const MANY: usize = 4_000;
 
 /// A graph of nodes that read a signal, with what each of them has beside its type.
 fn of_nodes(before: &str, each: impl Fn(usize) -> String) -> String {
@@ -429,20 +429,20 @@ fn signal_of_many() -> String {
 }
 
 #[test]
-fn ten_thousand_unknown_channels_are_told_soon() {
+fn thousands_of_unknown_channels_are_told_soon() {
     let text = of_nodes(&signal_of_many(), |nth| slope(&format!("t.plat_{nth:04}")));
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "plat_9999", "did you mean `plate_9999`?");
+    let errors = told_soon(&files, "plat_3999", "did you mean `plate_3999`?");
     assert_eq!(errors, MANY);
 
     let optional = many(|nth| format!("\"plat_{nth:04}\", "));
     let signal = signal_of_many() + &format!("optional = [{optional}]\n");
     let files = Memory::new().with("a.toml", format!("schema = 1\n{signal}"));
-    told_soon(&files, "plat_9999", "did you mean \"plate_9999\"?");
+    told_soon(&files, "plat_3999", "did you mean \"plate_3999\"?");
 }
 
 #[test]
-fn ten_thousand_unknown_channels_of_tests_are_told_soon() {
+fn thousands_of_unknown_channels_of_tests_are_told_soon() {
     let node = slope("t");
     let test = |nth| {
         format!(
@@ -453,31 +453,31 @@ fn ten_thousand_unknown_channels_of_tests_are_told_soon() {
     let (signal, tests) = (signal_of_many(), many(test));
     let text = format!("schema = 1\n{signal}[nodes.s]\n{node}\n[outputs]\nfirst = \"s\"\n{tests}");
     let files = Memory::new().with("a.toml", text);
-    told_soon(&files, "plat_9999", "did you mean `plate_9999`?");
+    told_soon(&files, "plat_3999", "did you mean `plate_3999`?");
 }
 
 #[test]
-fn ten_thousand_unknown_sets_are_told_soon() {
+fn thousands_of_unknown_sets_are_told_soon() {
     let node = slope("t");
     let using = |nth| format!("{node}\neach = \"axs_{nth:04}\"");
     for (members, more) in [("[\"X\"]", 0), ("[]", MANY)] {
         let sets = many(|nth| format!("axis_{nth:04} = {members}\n"));
         let text = of_nodes(&format!("[sets]\n{sets}{PLATE}"), using);
         let files = Memory::new().with("a.toml", text);
-        let errors = told_soon(&files, "axs_9999", "did you mean \"axis_9999\"?");
+        let errors = told_soon(&files, "axs_3999", "did you mean \"axis_3999\"?");
         assert_eq!(errors, MANY + more);
     }
 }
 
 #[test]
-fn ten_thousand_unknown_modules_and_parts_of_modules_are_told_soon() {
+fn thousands_of_unknown_modules_and_parts_of_modules_are_told_soon() {
     let inner = "inputs = [\"x\"]\nnodes.s = { type = \"slope\", inputs.signal = \"{x}\", windows = [\"5min\"] }\n";
     let modules = many(|nth| format!("[modules.mod_{nth:04}]\n{inner}"));
     let text = of_nodes(&format!("{modules}{PLATE}"), |nth| {
         format!("module = \"md_{nth:04}\"\ninputs.x = \"t\"")
     });
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "md_9999", "did you mean \"mod_9999\"?");
+    let errors = told_soon(&files, "md_3999", "did you mean \"mod_3999\"?");
     assert_eq!(errors, MANY);
 
     let instance = "[nodes.i]\nmodule = \"m\"\ninputs.x = \"t\"\n";
@@ -485,7 +485,7 @@ fn ten_thousand_unknown_modules_and_parts_of_modules_are_told_soon() {
     let module = format!("[modules.m]\n{inner}{outputs}{PLATE}{instance}");
     let text = of_nodes(&module, |nth| slope(&format!("i:prt_{nth:04}")));
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "prt_9999", "did you mean \"part_9999\"?");
+    let errors = told_soon(&files, "prt_3999", "did you mean \"part_3999\"?");
     assert_eq!(errors, MANY);
 
     let nodes = many(|nth| {
@@ -496,12 +496,12 @@ fn ten_thousand_unknown_modules_and_parts_of_modules_are_told_soon() {
     });
     let text = format!("schema = 1\n[modules.m]\ninputs = [\"x\"]\n{nodes}{PLATE}{instance}");
     let files = Memory::new().with("a.toml", text);
-    told_soon(&files, "\"slop_9999\"", "did you mean \"slope_9999\"?");
-    told_soon(&files, "\"slo_9999\"", "did you mean \"slope_9999\"?");
+    told_soon(&files, "\"slop_3999\"", "did you mean \"slope_3999\"?");
+    told_soon(&files, "\"slo_3999\"", "did you mean \"slope_3999\"?");
 }
 
 #[test]
-fn ten_thousand_nodes_that_are_not_there_to_be_removed_are_told_soon() {
+fn thousands_of_nodes_that_are_not_there_to_be_removed_are_told_soon() {
     let removed = many(|nth| format!("nodes.slop_{nth:04} = false\n"));
     let files = Memory::new()
         .with(
@@ -509,6 +509,6 @@ fn ten_thousand_nodes_that_are_not_there_to_be_removed_are_told_soon() {
             format!("schema = 1\nextends = \"b.toml\"\n{removed}"),
         )
         .with("b.toml", of_nodes(PLATE, |_| slope("t")));
-    let errors = told_soon(&files, "slop_9999", "did you mean \"slope_9999\"?");
+    let errors = told_soon(&files, "slop_3999", "did you mean \"slope_3999\"?");
     assert_eq!(errors, MANY);
 }

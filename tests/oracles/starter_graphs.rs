@@ -1,46 +1,17 @@
 //! The starter graph of every log in the shared data: it checks, fits and evaluates as it is.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_athermal");
-
-fn data() -> Option<PathBuf> {
-    let stated = std::env::var_os("ATHERMAL_SHARED").map(PathBuf::from);
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    let data = stated.unwrap_or(beside).join("data");
-    if !data.is_dir() {
-        eprintln!("skipped: there is no {}", data.display());
-        return None;
-    }
-    Some(data)
-}
-
-fn run(arguments: &[&str]) -> Output {
-    Command::new(PROGRAM).args(arguments).output().unwrap()
-}
+use crate::workbench::{Scratch, athermal, athermal_on, data};
 
 /// Writes a starter graph for one log, fits it, and scores it on another: (RMSE of the vote, without a model) per axis.
 fn scored(train: &Path, test: &Path) -> Vec<(f64, f64)> {
-    let name = train.to_string_lossy().replace(['/', '\\'], "_");
-    let base = std::env::temp_dir().join(format!("athermal-init-{}-{name}", std::process::id()));
-    let path = |ending: &str| base.with_extension(ending).to_str().unwrap().to_owned();
-    let (graph, model) = (path("toml"), path("json"));
-    let (train, test) = (train.to_str().unwrap(), test.to_str().unwrap());
-    for arguments in [
-        &["init", train, "-o", &graph, "--force"][..],
-        &["check", "--strict", &graph],
-        &["fit", &graph, "--data", train, "-o", &model],
-    ] {
-        let output = run(arguments);
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{arguments:?}\n{told}");
-    }
-    let output = run(&["evaluate", &model, "--data", test, "--format", "json"]);
-    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    for file in [graph, model] {
-        std::fs::remove_file(file).unwrap();
-    }
+    let scratch = Scratch::new("starter-graph");
+    let (graph, model) = (scratch.path("graph.toml"), scratch.path("model.json"));
+    athermal(&[&"init", &train, &"-o", &graph]).ended(0);
+    athermal(&[&"check", &"--strict", &graph]).ended(0);
+    athermal_on("fit", &graph, train, &[&"-o", &model]).ended(0);
+    let facts = athermal_on("evaluate", &model, test, &[&"--format", &"json"]).json();
     let votes = facts["scores"].as_array().unwrap().iter();
     votes
         .filter(|score| score["node"].as_str().unwrap().starts_with("vote"))
@@ -89,9 +60,7 @@ fn logs_of_the_oracle_in_which_nothing_drifts_are_told_so() {
         "nab_machine_temperature_system_failure.csv",
     ] {
         let path = data.join("temperature-faults").join(file);
-        let output = run(&["init", path.to_str().unwrap(), "-o", "-"]);
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        assert!(told.contains("nothing in it drifts: t_"), "{told}");
+        let refused = athermal(&[&"init", &path, &"-o", &"-"]).ended(2);
+        refused.tells(&["nothing in it drifts: t_"]);
     }
 }

@@ -123,7 +123,7 @@ pub fn length(duration: Duration) -> String {
 }
 
 /// A table with the first column to the left and the others to the right, each as wide as it must be. A cell beyond those of the
-/// header is a remark, which stands below its row where it does not fit into [`WIDTH`].
+/// header is a remark, which stands below its row where it does not fit into 80 columns.
 #[must_use]
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let width = |column: usize| {
@@ -165,7 +165,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     text
 }
 
-/// A table with a row and a column for each of many; columns that do not fit into [`WIDTH`] go on below.
+/// A table with a row and a column for each of many; columns that do not fit into 80 columns go on below.
 #[must_use]
 pub fn matrix(corner: &str, columns: &[String], rows: &[(String, Vec<String>)]) -> String {
     let long = |texts: &mut dyn Iterator<Item = &String>| {
@@ -199,7 +199,7 @@ pub fn matrix(corner: &str, columns: &[String], rows: &[(String, Vec<String>)]) 
     text
 }
 
-/// Words that follow a label, in lines that fit into [`WIDTH`]; lines after the first are indented.
+/// Words that follow a label, in lines that fit into 80 columns; lines after the first are indented.
 #[must_use]
 pub fn paragraph(label: &str, indent: usize, words: &str) -> String {
     let mut text = label.to_owned();
@@ -222,7 +222,7 @@ pub fn paragraph(label: &str, indent: usize, words: &str) -> String {
     text
 }
 
-/// A text of paragraphs and lists in lines that fit into [`WIDTH`]; tables and code stay as they are.
+/// A text of paragraphs and lists in lines that fit into 80 columns; tables and code stay as they are.
 #[must_use]
 pub fn page(text: &str) -> String {
     let stays = |line: &str| line.starts_with('|') || line.starts_with("    ");

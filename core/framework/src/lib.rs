@@ -134,5 +134,5 @@ pub use inventory;
 #[doc(hidden)]
 pub mod __private {
     pub use crate::node::read;
-    pub use {schemars, serde_json, typetag};
+    pub use {rmp_serde, schemars, serde_json, typetag};
 }

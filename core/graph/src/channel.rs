@@ -16,7 +16,7 @@ pub fn unless_infinite(value: f64) -> f64 {
 
 /// No value *yet*: the window or lag of the channel reaches back before its first value of the segment.
 ///
-/// It is a NaN with a payload of its own, so that whoever only asks "is there a value" need not know it. Fitting tells
+/// It is a NaN with a payload of its own, so that whoever only asks "is there a value" need not know it. Fitting keeps
 /// the two apart: a cold instant is no evidence of a bad sensor.
 pub const COLD: f64 = f64::from_bits(0x7ff8_0000_0000_c01d);
 
@@ -48,12 +48,12 @@ pub struct Channel {
     pub span: Duration,
     /// The horizon of a prediction; zero for measured and derived values.
     pub ahead: Duration,
-    /// How long a sample of the underlying signal counts, where the signal says so.
+    /// How long a sample of the underlying signal counts, where the signal defines it.
     pub max_age: Option<Duration>,
 }
 
 impl Channel {
-    /// How long a held value of this channel counts by default: its span where it has one, else what its signal says.
+    /// How long a held value of this channel counts by default: its span where it has one, else what its signal defines.
     #[must_use]
     pub fn default_max_age(&self) -> Option<Duration> {
         if self.span > Duration::ZERO {
@@ -73,7 +73,7 @@ pub struct Extremes {
     pub highest: f64,
 }
 
-/// How far apart values are, as a share of their size, that only rounding tells apart.
+/// How far apart values are, as a share of their size, that differ by rounding alone.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Extremes {

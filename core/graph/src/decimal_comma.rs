@@ -1,4 +1,4 @@
-//! Decides whether a text that cannot be read has a comma where a point belongs, and what is told of it; not what the text stands for.
+//! Whether a text that cannot be read has a comma where a point belongs, and what to write instead.
 
 /// The text with a point in the place of its one comma between digits.
 pub fn with_point(text: &str) -> Option<String> {
@@ -38,8 +38,8 @@ mod tests {
             ("1h2,5min", "1h2.5min"),
         ] {
             assert_eq!(with_point(text).as_deref(), Some(instead));
-            let told = format!("a number has a decimal point: \"{instead}\"");
-            assert_eq!(help(instead), told);
+            let text = format!("a number has a decimal point: \"{instead}\"");
+            assert_eq!(help(instead), text);
         }
         for text in ["5 nm, 6 nm", "1,2,3 nm", ",5 nm", "5, nm", "5 nm"] {
             assert_eq!(with_point(text), None, "{text}");

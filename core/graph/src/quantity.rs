@@ -231,7 +231,7 @@ impl Serialize for Quantity {
 impl Quantity {
     /// The name by which a deserializer knows the type.
     pub(crate) const TYPE: &str = "athermal::Quantity";
-    /// What a message says that was expected.
+    /// What a message names as expected.
     pub(crate) const EXPECTED: &str = "a quantity like \"150 nm/min\"";
 }
 

@@ -46,9 +46,9 @@ const UNITS: [(&str, i64); 10] = [
 pub struct Instant(i64);
 
 impl Instant {
-    /// The earliest instant that can be told.
+    /// The earliest instant.
     pub const MIN: Instant = Instant(i64::MIN);
-    /// The latest instant that can be told.
+    /// The latest instant.
     pub const MAX: Instant = Instant(i64::MAX);
 
     /// The instant `ns` nanoseconds after the origin.
@@ -72,7 +72,7 @@ pub struct Duration(i64);
 impl Duration {
     /// No time at all.
     pub const ZERO: Duration = Duration(0);
-    /// The longest duration that can be told.
+    /// The longest duration.
     pub const MAX: Duration = Duration(i64::MAX);
 
     /// A duration of `ns` nanoseconds.
@@ -451,7 +451,7 @@ impl Serialize for Duration {
 impl Duration {
     /// The name by which a deserializer knows the type.
     pub(crate) const TYPE: &str = "athermal::Duration";
-    /// What a message says that was expected.
+    /// What a message names as expected.
     pub(crate) const EXPECTED: &str = "a duration like \"5min\"";
 }
 

@@ -489,7 +489,7 @@ impl Serialize for Unit {
 impl Unit {
     /// The name by which a deserializer knows the type.
     pub(crate) const TYPE: &str = "athermal::Unit";
-    /// What a message says that was expected.
+    /// What a message names as expected.
     pub(crate) const EXPECTED: &str = "a unit like \"nm/min\"";
 }
 

@@ -107,7 +107,7 @@ impl Case {
         self
     }
 
-    /// The same, with output ports that have something to say before any input has come: a state, a reason, a refuge.
+    /// The same, with output ports that have something to say before any input has come: a state, a reason, a safe value.
     #[must_use]
     pub fn speaks_without_input(mut self, ports: &[&str]) -> Self {
         self.without_input = ports.iter().map(|&port| port.to_owned()).collect();

@@ -104,7 +104,7 @@ fn a_graph_is_told_which_crates_took_the_name() {
     let told = told.map(|_| ()).map_err(|error| error.to_string());
     assert_eq!(
         told.unwrap_err(),
-        r#"error[A041]: `keeper` cannot be used, since the name of the state `kept/1` is taken twice, by `athermal-core`, `keepers`
+        r#"error[A041]: `keeper` cannot be used, since the name of the state `kept/1` is taken twice, by `athermal-testkit`, `keepers`
  --> model.json:1:1
   |
 1 | {"athermal_model": 1, "card": null, "fitted": {}, "graph": {
@@ -124,7 +124,7 @@ fn the_kit_says_so_before_anything_else() {
     assert_eq!(
         told,
         [
-            "names: the name of the state `kept/1` is taken twice, by `athermal-core` and `keepers`\n  to do: take another name, and \
+            "names: the name of the state `kept/1` is taken twice, by `athermal-testkit` and `keepers`\n  to do: take another name, and \
           begin those of states and predictors with that of the kind: all crates of a program share them. Ports and kinds are a \
           letter, then letters, digits, `_` and `-`; a feature of several output ports tells them by `ports`"
         ]
@@ -136,6 +136,6 @@ fn a_kind_of_two_crates_is_told_by_both() {
     let told = broken::<Twin>(&[Case::new("")]);
     assert_eq!(
         told[0].found,
-        "the name of the kind `twin` is taken twice, by `athermal-core` and `keepers`"
+        "the name of the kind `twin` is taken twice, by `athermal-testkit` and `keepers`"
     );
 }

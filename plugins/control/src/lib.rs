@@ -12,7 +12,7 @@ mod uncorrected;
 pub use compensate::{Compensate, Stop, held_back_by};
 pub use health::{Health, health_reason};
 pub use optical_loss::OpticalLoss;
-pub use safe_state::{Refuge, SafeState};
+pub use safe_state::{SafeState, WhenLost};
 pub use settled::Settled;
 pub use stability::{Stability, StabilityState};
 pub use uncorrected::{Uncorrected, UntilFirst};

@@ -16,22 +16,22 @@ use crate::limit;
 /// Passes a signal on while it can be trusted, and otherwise puts out a stated safe value.
 ///
 /// A signal is not trusted where it is absent or too old, or where the input `distrust` is other than 0 (such as the
-/// reasons of a `health` node). For up to `after` ticks the last value is kept; then the output goes to its refuge, `hold`, `zero`
+/// reasons of a `health` node). For up to `after` ticks the last value is kept; then the output goes to `when_lost`: `hold`, `zero`
 /// or a stated value, by at most `max_slew`, and comes back by the same when trust returns. It always has a value; before the first trusted one it is the
-/// refuge, or 0. The port `why` says: 0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on
+/// value of `when_lost`, or 0. The port `why` says: 0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on
 /// the way back. When the graph is replaced, it goes on from what it put out. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SafeState {
     /// What is safe.
-    pub refuge: Refuge,
-    /// The stated value, such as `"0 nm"`, with `refuge = "value"`.
+    pub when_lost: WhenLost,
+    /// The stated value, such as `"0 nm"`, with `when_lost = "value"`.
     #[serde(default)]
     pub value: Option<Quantity>,
     /// The number of ticks without trust that are bridged with the last value.
     #[serde(default)]
     pub after: u32,
-    /// The fastest way to the refuge and back, such as `"50 nm/s"`.
+    /// The fastest way there and back, such as `"50 nm/s"`.
     #[schemars(extend("minimum" = 0))]
     pub max_slew: Quantity,
     /// The longest time between two ticks that counts for that way: after a longer pause the output goes on from where it is and
@@ -44,7 +44,7 @@ pub struct SafeState {
 /// A safe output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Refuge {
+pub enum WhenLost {
     /// The last trusted value.
     Hold,
     /// Zero.
@@ -64,13 +64,13 @@ mod why {
 }
 
 impl SafeState {
-    /// The refuge, if it is a value, and the fastest way per second.
+    /// The value when lost, if there is one, and the fastest way per second.
     fn limits(&self, channel: &Channel) -> Result<(Option<f64>, f64), Vec<Mistake>> {
         let mut mistakes = Vec::new();
-        let refuge = match (self.refuge, &self.value) {
-            (Refuge::Hold, None) => None,
-            (Refuge::Zero, None) => Some(0.0),
-            (Refuge::Value, Some(value)) => {
+        let when_lost = match (self.when_lost, &self.value) {
+            (WhenLost::Hold, None) => None,
+            (WhenLost::Zero, None) => Some(0.0),
+            (WhenLost::Value, Some(value)) => {
                 let found = value.in_unit(&channel.unit);
                 if found.is_none() {
                     let message = format!(
@@ -81,18 +81,19 @@ impl SafeState {
                 }
                 found
             }
-            (Refuge::Value, None) => {
-                let mistake = Mistake::at("refuge", "`refuge = \"value\"` needs to know which");
+            (WhenLost::Value, None) => {
+                let mistake =
+                    Mistake::at("when_lost", "`when_lost = \"value\"` needs to know which");
                 let help = format!("add `value = \"0 {}\"`", channel.unit);
                 mistakes.push(mistake.help(help).rests_on("value"));
                 None
             }
-            (Refuge::Hold | Refuge::Zero, Some(_)) => {
+            (WhenLost::Hold | WhenLost::Zero, Some(_)) => {
                 let mistake = Mistake::at(
                     "value",
-                    "`value` has a meaning only with `refuge = \"value\"`",
+                    "`value` has a meaning only with `when_lost = \"value\"`",
                 );
-                mistakes.push(mistake.rests_on("refuge"));
+                mistakes.push(mistake.rests_on("when_lost"));
                 None
             }
         };
@@ -101,7 +102,7 @@ impl SafeState {
             &limit::per_second(&channel.unit),
             "max_slew",
         ) {
-            Ok(slew) if mistakes.is_empty() => Ok((refuge, slew)),
+            Ok(slew) if mistakes.is_empty() => Ok((when_lost, slew)),
             Ok(_) => Err(mistakes),
             Err(mistake) => {
                 mistakes.push(mistake);
@@ -173,7 +174,7 @@ impl Feature for SafeState {
             .collect();
         let channels = limits
             .iter()
-            .map(|&(refuge, _)| Output::new(refuge))
+            .map(|&(when_lost, _)| Output::new(when_lost))
             .collect();
         Box::new(Guarding {
             after: self.after,
@@ -222,9 +223,9 @@ struct Output {
 }
 
 impl Output {
-    fn new(refuge: Option<f64>) -> Self {
+    fn new(when_lost: Option<f64>) -> Self {
         Self {
-            given: refuge.unwrap_or(0.0),
+            given: when_lost.unwrap_or(0.0),
             doubtful: 0,
             away: false,
             begun: false,
@@ -254,7 +255,7 @@ impl Operator for Guarding {
         let dt = passed.min(self.max_gap).secs();
         self.known.last = Some(tick.now);
         let count = signal.len();
-        for (i, (output, &(refuge, slew))) in
+        for (i, (output, &(when_lost, slew))) in
             self.known.channels.iter_mut().zip(&self.limits).enumerate()
         {
             let mark = distrust.get(if distrust.len() == 1 { 0 } else { i });
@@ -281,7 +282,7 @@ impl Operator for Guarding {
                 if output.doubtful > self.after {
                     // Without a trusted value so far there is nothing to come back from slowly.
                     output.away = output.begun;
-                    output.approach(refuge.unwrap_or(output.given), slew * dt);
+                    output.approach(when_lost.unwrap_or(output.given), slew * dt);
                     cause + why::SAFE
                 } else {
                     cause
@@ -294,8 +295,8 @@ impl Operator for Guarding {
 
     fn segment(&mut self) {
         self.known.last = None;
-        for (output, &(refuge, _)) in self.known.channels.iter_mut().zip(&self.limits) {
-            *output = Output::new(refuge);
+        for (output, &(when_lost, _)) in self.known.channels.iter_mut().zip(&self.limits) {
+            *output = Output::new(when_lost);
         }
     }
 

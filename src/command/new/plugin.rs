@@ -15,9 +15,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Write a crate with a node type, a source, a sink or a machine of your own
 ///
-/// The crate builds as it is: something small that works, its tests, a graph with a test, and a README that says what to do
+/// The crate builds as it is: something small that works, its tests, a graph with a test, and a README with what to do
 /// next. A node comes with the tests of the rules that every node keeps, a source or a sink with a live program of its own.
-/// Change it into yours and see what the tests say.
+/// Change it into yours and run its tests.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal new plugin room-lag

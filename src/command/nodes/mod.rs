@@ -130,7 +130,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             );
         }
     }
-    let explained = parameters::explain(&schema);
+    let explained = parameters::explain(schema);
     print!("{explained}");
     if explained.is_empty() && kind.framework_keys().is_empty() {
         println!("  none");

@@ -12,7 +12,7 @@ use super::work::{Ran, Status};
 use crate::terminal::{Answer, Failure};
 use athermal_analysis::figures::count;
 
-/// The line of a test and, unless it passed, the figures that say why.
+/// The line of a test and, unless it passed, the figures that made it fail.
 pub(super) fn lines(suite: &Suite, ran: &Ran) -> String {
     let name = &suite.trials[ran.trial].name;
     let mark = match ran.status {

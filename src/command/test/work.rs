@@ -50,7 +50,7 @@ pub(super) enum Status {
 pub(super) struct Broken {
     /// What and why.
     pub(super) message: String,
-    /// The exit status that says so.
+    /// Its exit status.
     pub(super) status: u8,
 }
 

@@ -61,7 +61,7 @@ pub(crate) fn assert_told(name: &str, text: &str, expected: &[(u64, &str)]) {
 fn six_mistakes_of_six_kinds_are_reported_at_once_each_with_its_suggestion() {
     let text = r#"schema = 1
 [signals.temperature]
-unit = "degrees"
+unit = "nm/mn"
 channels = ["a"]
 max_age = "1min"
 [signals.position]
@@ -93,7 +93,7 @@ predicted = "thermal"
         (one["line"].as_u64().unwrap(), help.unwrap().to_owned())
     });
     let expected = [
-        (3, "deg"),
+        (3, "nm/min"),
         (9, "the units are ns, us, ms, s, min"),
         (11, "`slope`"),
         (16, "`position`"),

@@ -37,7 +37,7 @@ max_slew = "50 nm/s"
 [nodes.safe]
 type = "safe_state"
 inputs.signal = "compensate"
-refuge = "hold"
+when_lost = "hold"
 max_slew = "50 nm/s"
 [outputs]
 correction = "compensate"

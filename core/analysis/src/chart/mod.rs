@@ -44,7 +44,7 @@ pub struct Layer<'a> {
     pub y: &'a [f64],
     /// The class that gives its colour: `c1` to `c6`.
     pub class: &'static str,
-    /// What the legend says; nothing for no entry.
+    /// Its text in the legend; empty for no entry.
     pub label: String,
     /// How it is drawn.
     pub mark: Mark,
@@ -124,7 +124,7 @@ enum Shape {
         from: (f64, f64),
         to: (f64, f64),
     },
-    /// Points joined by lines, with gaps at NaN; dots where it says so.
+    /// Points joined by lines, with gaps at NaN; or dots.
     Path {
         class: &'static str,
         points: Vec<(f64, f64)>,

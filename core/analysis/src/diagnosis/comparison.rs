@@ -70,7 +70,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// On how many instants the error of persistence is, where these are so few that it says little of the others.
+    /// On how many instants the error of persistence is, where these are too few to compare it with the others.
     #[must_use]
     pub fn persistence_on_few(&self) -> Option<usize> {
         self.baseline_persistence?;
@@ -96,7 +96,7 @@ pub struct Row {
     /// For each truth whose prediction is valid at less than half of the instants those that it is scored on apart from the others.
     pub own: Vec<Option<Own>>,
     /// The standard error of the difference of that error and the smallest of the truth, on the instants at which both are valid;
-    /// none where there are too few to tell.
+    /// none where there are too few.
     pub difference_error: Vec<Option<f64>>,
     /// The share of all instants with a truth at which there is a prediction.
     pub valid: Vec<Option<f64>>,

@@ -52,9 +52,9 @@ pub struct Lags {
 pub struct FeatureLags {
     /// The channel: `gradients.chuck@150s`.
     pub feature: String,
-    /// With the truth: where the feature says something of it, and when.
+    /// With the truth: where the feature explains something of it, and when.
     pub truth: Correlogram,
-    /// With what the prediction left of it (measured less predicted): beyond its bound, the feature says something that the
+    /// With what the prediction left of it (measured less predicted): beyond its bound, the feature explains something that the
     /// model does not use.
     pub residual: Correlogram,
 }

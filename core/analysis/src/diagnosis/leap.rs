@@ -16,7 +16,7 @@ use crate::figures::number;
 /// So many times as large as nineteen in twenty changes is a leap. In the largest measured and simulated sets of data without one,
 /// what stands alone is at most 2.1 times as large.
 const TIMES: f64 = 20.0;
-/// The share of changes that say what is usual.
+/// The share of changes that define what is usual.
 const USUAL: f64 = 0.95;
 /// The share of those that do where leaps are many, and so many times what they do not exceed is usual at most. In measured and
 /// simulated data without leaps, what nineteen in twenty do not exceed is at most 2.1 times that, and 11 times in a heater.
@@ -24,7 +24,7 @@ const MOSTLY: f64 = 0.75;
 const SPREAD: f64 = 10.0;
 /// The share of a leap that the changes beside it do not reach.
 const BESIDE: f64 = 0.1;
-/// Fewer changes do not say what is usual.
+/// Fewer changes do not define what is usual.
 const FEWEST_CHANGES: usize = 20;
 /// A change over a time so many times as long as the median is no leap, for much may have happened.
 const LONGEST_GAP: f64 = 3.0;
@@ -72,7 +72,7 @@ impl fmt::Display for Leaps {
     }
 }
 
-/// For each measured channel a finder where a leap says that something is wrong: in a temperature, and in what a truth is made of.
+/// For each measured channel a finder where a leap is a fault: in a temperature, and in what a truth is made of.
 #[must_use]
 pub fn finders(plan: &Plan) -> Vec<Option<Finder>> {
     let channels = plan.channels.iter().zip(of_truths(plan));
@@ -139,7 +139,7 @@ impl Finder {
         self.met += 1;
     }
 
-    /// The leaps; none where there are none, or too few samples to tell.
+    /// The leaps; none where there are none, or too few samples.
     #[must_use]
     pub fn found(&self) -> Option<Leaps> {
         if self.changes.kept.len() < FEWEST_CHANGES {

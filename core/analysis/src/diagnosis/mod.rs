@@ -38,7 +38,7 @@ use serde::Serialize;
 
 use observation::main_prediction;
 
-/// All that a diagnosis says.
+/// The facts of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
 pub struct Diagnosis {
     /// The graph's name.
@@ -92,7 +92,7 @@ pub struct Options {
 }
 
 impl Diagnosis {
-    /// Leaves out what is said of other predictions than those asked for by name, and of truths none of them predicts.
+    /// Leaves out the facts of other predictions than those asked for by name, and of truths none of them predicts.
     pub fn keep_only(&mut self, of: &[String]) {
         self.residuals.retain(|it| is_asked(&it.prediction, of));
         let kept = |truth: &str| self.residuals.iter().any(|it| it.truth == truth);

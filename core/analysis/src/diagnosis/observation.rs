@@ -25,7 +25,7 @@ pub struct Observation {
     pub(super) valid: Vec<u64>,
 }
 
-/// What can be said of a measured channel without its course.
+/// The facts about a measured channel without its course.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SourceStatistics {
     /// Valid samples.

@@ -297,7 +297,7 @@ fn with_residual(of: &Lags) -> Picture {
     picture
 }
 
-/// Of each sensor the feature that says most.
+/// Of each sensor the feature that explains most.
 fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Picture {
     let unit = TimeUnit::of(longest(&of.lag_s));
     let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / unit.seconds).collect();
@@ -374,7 +374,7 @@ fn response(of: &Responses, of_unit: &str, impulse: bool) -> Picture {
     let names: Vec<&str> = largest.iter().map(|of| &*of.sensor).collect();
     let lines = largest.iter().zip(short(&names)).enumerate();
     let lines = lines.map(|(nth, (sensor, name))| {
-        // What is predicted of the time until the horizon has been said before anything happened.
+        // Predictions for the time until the horizon were made before anything happened.
         let ahead_s = sensor.time_s.first().copied().filter(|ahead| *ahead > 0.0);
         let before = ahead_s.map_or(Vec::new(), |ahead| vec![0.0, ahead]);
         let scale = if impulse { time.seconds / 60.0 } else { 1.0 };

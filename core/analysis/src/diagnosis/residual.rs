@@ -2,7 +2,7 @@
 //!
 //! Truths over windows that overlap share noise, and forecasts made before the last error was known repeat it. So residuals are
 //! taken one per window or horizon, whichever is longer: those of a perfect model are white, and others are not. Where truths are
-//! missing, their places stay empty, and only pairs that are there tell of a lag.
+//! missing, their places stay empty, and only pairs that are there count for a lag.
 
 use athermal_core::compile::Plan;
 use athermal_core::time::{Duration, Instant};
@@ -48,7 +48,7 @@ pub struct Residuals {
     pub ljung_box: Option<f64>,
     /// See `ljung_box`.
     pub p_value: Option<f64>,
-    /// Whether they may be white, `p_value` not being below `level`; none where there are too few to say.
+    /// Whether they may be white, `p_value` not being below `level`; none where there are too few.
     pub white: Option<bool>,
     /// The p-value below which they are called not white.
     pub level: f64,

@@ -4,11 +4,10 @@
 //! (Mandelli, Dankwart and Napoli, section 3.2). It is found by asking the graph itself: all sensors rest at their means, one of
 //! them steps, and the engine runs. So it holds for whatever features a graph has, lags and other frames included, and for an
 //! estimator that is not linear it is the answer to a change of one standard deviation. Where a node that watches sensors lets
-//! that not through, the change is a hundredth of it, or less, and sensors rest as the module `rest` says.
+//! that not through, the change is a hundredth of it, or less, and sensors rest as in the module `rest`.
 //!
-//! Estimators that read or follow past truths run freely, on their own predictions: truths that rest while a sensor steps would tell
-//! them that nothing has happened, and what is asked for is the transfer function of the model, not of a predictor that is
-//! contradicted.
+//! Estimators that read or follow past truths run freely, on their own predictions: truths that rest while a sensor steps would
+//! contradict them, and what is asked for is the transfer function of the model.
 
 use std::sync::Arc;
 
@@ -214,7 +213,7 @@ struct Probe<'a> {
 }
 
 impl<'a> Probe<'a> {
-    /// None where nothing was measured often enough to say at which rate.
+    /// None where nothing was measured often enough to have a rate.
     fn new(
         model: &'a Model,
         observation: &Observation,

@@ -94,10 +94,10 @@ impl Changes {
         }
     }
 
-    /// Goes on to a row, by what `settled` nodes say: the minutes since a change that has not settled, and of each way the
+    /// Goes on to a row, by the output of `settled` nodes: the minutes since a change that has not settled, and of each way the
     /// settle time in min where it has just come; NaN for none.
     pub(super) fn go_on(&mut self, at_s: f64, since_min: f64, settled_min: [f64; 2]) {
-        // The time since an unsettled change tells when that was, to the instant.
+        // The time since an unsettled change gives its instant.
         let start_s = at_s - 60.0 * since_min;
         let known = |nth: usize| (self.settling[nth].at_s - start_s).abs() < 1.0;
         if since_min > 0.0 && !self.current.is_some_and(known) {

@@ -62,7 +62,7 @@ pub struct Axis {
     pub ahead_s: f64,
     /// The weights of a vote's voters at each truth; empty where nothing is weighed.
     pub weights: Vec<Weight>,
-    /// Below this absolute truth the axis is stable, and from the second on transient, as a `stability` node says; none without one,
+    /// Below this absolute truth the axis is stable, and from the second on transient, by a `stability` node; none without one,
     /// since what is stable depends on the machine.
     pub states: Option<(f64, f64)>,
 }

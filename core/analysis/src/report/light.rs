@@ -79,7 +79,7 @@ impl Light {
         (self.settling, self.steps) = changes.steps(change);
     }
 
-    /// Over which time the losses are, as people say it.
+    /// Over which time the losses are, in words.
     pub(super) fn span(&self) -> String {
         match self.over {
             Some(over) if over.secs() != 300.0 => over.to_string(),

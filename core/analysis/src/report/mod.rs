@@ -43,7 +43,7 @@ use crate::diagnosis::observe;
 use crate::diagnosis::residual::residuals;
 use crate::diagnosis::response::{Responses, responses};
 
-/// All that a report says.
+/// The facts of a report.
 #[derive(Debug, Clone, Serialize)]
 pub struct Facts {
     /// The graph's name.
@@ -125,7 +125,7 @@ fn spelled(unit: &str) -> &str {
 /// Why there is no report.
 pub type ReportError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Steps a model over a recording and collects what a report says.
+/// Steps a model over a recording and collects the facts of a report.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.

@@ -14,7 +14,7 @@ use crate::figures::{counted, time};
 use athermal_core::compile::origins::{health_reasons, of_truths};
 use athermal_run::live::monitor::standstill;
 
-/// What can be said of a measured channel.
+/// The facts about a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct SensorFacts {
     /// The channel: `temperature.plate1`.
@@ -46,7 +46,7 @@ pub struct SensorFacts {
     pub range: Option<(f64, f64)>,
     /// The same in the data of the fit, where these reach far beyond them; not of what a truth is made of, whose drift is what counts.
     pub exceeds: Option<(f64, f64)>,
-    /// Ticks by what a `health` node of the graph said of the channel; empty where none watches it.
+    /// Ticks by what a `health` node of the graph found of the channel; empty where none watches it.
     pub health: BTreeMap<&'static str, u64>,
     #[serde(skip)]
     looking: Looking,
@@ -71,7 +71,7 @@ struct Looking {
     limits: (f64, f64),
     /// Whether data may lack it, such as what a machine reports as applied, which may rest.
     optional: bool,
-    /// The slot in which a `health` node says what is wrong.
+    /// The slot of the reason that a `health` node gives.
     reason: Option<usize>,
 }
 
@@ -100,7 +100,7 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     sources.map(facts).collect()
 }
 
-/// Has every `health` node say what is wrong and every `compensate` what holds it back, whether or not the graph reads it.
+/// Has every `health` node give its reason and every `compensate` what holds it back, whether or not the graph reads it.
 pub(super) fn ask_for_reasons(plan: &mut Plan) {
     for node in &mut plan.nodes {
         if matches!(node.kind.name, "health" | "compensate")

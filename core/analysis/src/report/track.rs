@@ -100,7 +100,7 @@ pub struct Unjudged {
 pub(super) struct Places {
     positions: Vec<usize>,
     corrections: Vec<usize>,
-    /// Where each correction says what holds it back.
+    /// Where each correction gives what holds it back.
     why: Vec<usize>,
     /// From the unit of each correction to that of its position.
     factors: Vec<f64>,

@@ -24,7 +24,7 @@ pub struct Verdict {
     pub(super) called: String,
     /// The unit.
     pub unit: String,
-    /// Whether the truth is a point on a scale, such as a temperature in °C, of which no model says nothing.
+    /// Whether the truth is a point on a scale, such as a temperature in °C, where no model means nothing.
     pub on_scale: bool,
     /// Error of the prediction on the instants on which it is scored, or, where these leave many out, wherever there is one; none
     /// where it gave nothing.

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use super::instance::instance_name;
 use super::kind_fault::KindFault;
-use crate::diagnostic::{NodePanic, said};
+use crate::diagnostic::{NodePanic, panic_message};
 use crate::document::{InstanceDecl, NodeDecl};
 use crate::node::Kind;
 
@@ -30,16 +30,16 @@ impl Panics {
     ) -> Result<T, KindFault> {
         // What the work has half done is let go with the graph.
         catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
-            let said = said(&*panic).to_owned();
+            let message = panic_message(&*panic).to_owned();
             if self == Self::Propagate {
                 resume_unwind(Box::new(NodePanic {
                     node: instance_name(&node.name, decl.member.as_deref()),
                     when: "while its graph was compiled".to_owned(),
                     author: kind.author(),
-                    message: said,
+                    message,
                 }));
             }
-            KindFault::panics(&said)
+            KindFault::panics(&message)
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Turns a graph file into a [`Plan`]: kinds read, an order found, references resolved, units, spans and horizons checked,
 //! leaks found, steps laid out.
 //!
-//! The planner ([`order`]) only orders, one [`gate`] checks any order, and [`steps`] makes steps of it.
+//! The planner (`order`) only orders, one `gate` checks any order, and `steps` makes steps of it.
 
 mod agreement;
 mod column_unit;

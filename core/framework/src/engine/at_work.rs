@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use crate::compile::{Plan, PlannedNode};
-use crate::diagnostic::{NodePanic, said};
+use crate::diagnostic::{NodePanic, panic_message};
 use crate::time::Instant;
 
 /// When a node is at work.
@@ -61,6 +61,6 @@ fn go_on(node: Option<&PlannedNode>, when: When, panic: Box<dyn std::any::Any + 
             When::Start => "before its first tick".to_owned(),
         },
         author: node.kind.author(),
-        message: said(&*panic).to_owned(),
+        message: panic_message(&*panic).to_owned(),
     }))
 }

@@ -1,6 +1,6 @@
 //! Steps a plan: what runs at a tick, in which order, and when truths reach those that learn.
 //!
-//! Three rooms: [`tick`] computes, [`learning`] hands truths over when they may be known, [`state`] is what goes on in
+//! Three rooms: `tick` computes, `learning` hands truths over when they may be known, `state` is what goes on in
 //! another engine. Sources and sinks are not known here.
 
 mod at_work;

@@ -50,9 +50,9 @@ pub use learning_gate::{Admission, LearningGate, LearningLimits};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read};
-#[doc(hidden)]
-pub use predictor::InModel;
 pub use predictor::Predictor;
+#[doc(hidden)]
+pub use predictor::{InModel, PredictorForm};
 pub use range::{ParameterPart, Range, each_parameter, out_of_range};
 pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
@@ -61,6 +61,8 @@ pub use registry::read;
 pub use registry::{
     Kind, NodeSpec, ReadSpec, Role, RoleName, as_toml, first_paragraph, inline_toml, kind, kinds,
 };
+#[doc(hidden)]
+pub use state::StateForm;
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
 pub use written_name::taken_twice;

@@ -3,8 +3,9 @@
 use std::any::Any;
 use std::fmt::Debug;
 
-use serde::de::{Deserialize, Deserializer};
+use serde::de::{Deserialize, Deserializer, Error as _};
 use serde::ser::{Serialize, Serializer};
+use serde_json::{Map, Value};
 
 use super::{Coefficients, Learner, LinearForm, Mistake, TrainedRange};
 
@@ -59,15 +60,21 @@ pub trait Predictor: InModel + Any + Debug + Send + Sync {
 
 /// What stands in model files under a name; [`predictor!`](crate::predictor) makes a [`Predictor`] such a thing.
 #[doc(hidden)]
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no name under which a model holds it",
     label = "give it one: `athermal_core::predictor!({Self}, \"name\")`"
 )]
-pub trait InModel {
-    /// The same as what it is.
-    fn into_predictor(self: Box<Self>) -> Box<dyn Predictor>;
+pub trait InModel {}
+
+/// How a predictor of one name is read. A reader of one format alone is a tenth of the code of one for any format.
+#[doc(hidden)]
+pub struct PredictorForm {
+    pub name: &'static str,
+    pub read: fn(Value) -> Result<Box<dyn Predictor>, serde_json::Error>,
 }
+
+inventory::collect!(PredictorForm);
 
 impl Serialize for dyn Predictor {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
@@ -78,7 +85,17 @@ impl Serialize for dyn Predictor {
 
 impl<'de> Deserialize<'de> for Box<dyn Predictor> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        Box::<dyn InModel>::deserialize(from).map(InModel::into_predictor)
+        let mut written = Map::deserialize(from)?;
+        let name = written.remove("type");
+        let name = name.as_ref().and_then(Value::as_str);
+        let name = name.ok_or_else(|| D::Error::missing_field("type"))?;
+        let mut forms = inventory::iter::<PredictorForm>();
+        match forms.find(|form| form.name == name) {
+            Some(form) => (form.read)(Value::Object(written)).map_err(D::Error::custom),
+            None => Err(D::Error::custom(format_args!(
+                "no node of this program has the fit `{name}`"
+            ))),
+        }
     }
 }
 
@@ -91,13 +108,19 @@ macro_rules! predictor {
         const _: () = {
             use $crate::__private::typetag;
 
-            #[typetag::serde(name = $name)]
-            impl $crate::node::InModel for $predictor {
-                fn into_predictor(self: Box<Self>) -> Box<dyn $crate::node::Predictor> {
-                    self
-                }
-            }
+            #[typetag::serialize(name = $name)]
+            impl $crate::node::InModel for $predictor {}
         };
+
+        $crate::inventory::submit! {
+            $crate::node::PredictorForm {
+                name: $name,
+                read: |written| {
+                    let fit: $predictor = $crate::__private::serde_json::from_value(written)?;
+                    Ok(Box::new(fit))
+                },
+            }
+        }
 
         $crate::__written!(Predictor, $name);
     };

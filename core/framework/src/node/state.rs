@@ -3,18 +3,51 @@
 use std::any::Any;
 use std::fmt;
 
+use rmp_serde::decode;
+use serde::Deserialize;
+
 /// What a running node knows: all that its next outputs depend on, beside its inputs.
 ///
 /// A state is a serde struct whose registered name ends in the version of its form, `"slope/1"`. A form that has been
 /// replaced stays registered, so that what was written by an older program can be read and migrated. [`state!`](crate::state)
 /// makes a struct a state.
-#[typetag::serde(tag = "state")]
+#[typetag::serialize(tag = "state")]
 pub trait State: fmt::Debug + Send + Sync {
     /// The state as any value, so that a node can ask whether it is one of its own.
     fn into_any(self: Box<Self>) -> Box<dyn Any>;
 }
 
+/// How a state of one name is read. A reader of one format alone is a tenth of the code of one for any format.
+#[doc(hidden)]
+pub struct StateForm {
+    pub name: &'static str,
+    pub read: fn(&[u8]) -> Result<Box<dyn State>, decode::Error>,
+}
+
+inventory::collect!(StateForm);
+
+/// The name that a written state begins with.
+#[derive(Deserialize)]
+struct Tag<'a> {
+    state: &'a str,
+}
+
 impl dyn State {
+    /// The state in MessagePack, as a snapshot has it.
+    ///
+    /// # Errors
+    /// When this program does not know its name, or it has another form.
+    pub fn read(written: &[u8]) -> Result<Box<Self>, decode::Error> {
+        let Tag { state } = rmp_serde::from_slice(written)?;
+        let mut forms = inventory::iter::<StateForm>();
+        match forms.find(|form| form.name == state) {
+            Some(form) => (form.read)(written),
+            None => Err(serde::de::Error::custom(format_args!(
+                "no node of this program has the state `{state}`"
+            ))),
+        }
+    }
+
     /// The state as one of type `T`.
     ///
     /// # Errors
@@ -85,13 +118,23 @@ macro_rules! state {
         const _: () = {
             use $crate::__private::typetag;
 
-            #[typetag::serde(name = $name)]
+            #[typetag::serialize(name = $name)]
             impl $crate::node::State for $state {
                 fn into_any(self: Box<Self>) -> Box<dyn std::any::Any> {
                     self
                 }
             }
         };
+
+        $crate::inventory::submit! {
+            $crate::node::StateForm {
+                name: $name,
+                read: |written| {
+                    let state: $state = $crate::__private::rmp_serde::from_slice(written)?;
+                    Ok(Box::new(state))
+                },
+            }
+        }
 
         $crate::__written!(State, $name);
     };

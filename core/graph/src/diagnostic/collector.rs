@@ -26,7 +26,7 @@ impl Severity {
 
 /// One kind of mistake, with the data of its texts; [`problem!`](crate::problem) declares it.
 pub trait Problem: Debug {
-    /// The code, which says how bad it is.
+    /// The code, with how bad it is.
     fn code(&self) -> &'static Code;
 
     /// What is wrong, in one sentence that stands alone.
@@ -168,7 +168,7 @@ impl Diagnostics {
 
     /// Notes a problem of one member, e.g. `in node "thermal", member "Z1"`.
     ///
-    /// The same problem at the same place is told once, with its first context and the number of the others.
+    /// The same problem at the same place is reported once, with its first context and the number of the others.
     pub fn report_in(
         &mut self,
         context: impl Into<String>,

@@ -1,4 +1,4 @@
-//! How many there are of something, as it is told; what is counted is named by who counts.
+//! How many there are of something, in words.
 
 use std::fmt::Display;
 
@@ -52,18 +52,18 @@ mod tests {
 
     #[test]
     fn counts_have_separators() {
-        let told = [1_u64, 123, 1234, 123_456, 1_234_567].map(count);
-        assert_eq!(told, ["1", "123", "1,234", "123,456", "1,234,567"]);
+        let texts = [1_u64, 123, 1234, 123_456, 1_234_567].map(count);
+        assert_eq!(texts, ["1", "123", "1,234", "123,456", "1,234,567"]);
         assert_eq!([-123, -1234].map(count), ["-123", "-1,234"]);
         assert_eq!([0.5, 1234.5678].map(count), ["0.5", "1,234.5678"]);
     }
 
     #[test]
     fn of_one_there_is_no_plural() {
-        let told = [0_u64, 1, 2, 1234].map(|value| counted(value, "row"));
-        assert_eq!(told, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
-        let told = [0.5, 1.0].map(|value| counted(value, "day"));
-        assert_eq!(told, ["0.5 days", "1 day"]);
+        let texts = [0_u64, 1, 2, 1234].map(|value| counted(value, "row"));
+        assert_eq!(texts, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
+        let texts = [0.5, 1.0].map(|value| counted(value, "day"));
+        assert_eq!(texts, ["0.5 days", "1 day"]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How many digits of a number are told, whatever its size.
+//! A number with as many digits as are shown, whatever its size.
 
 /// A number to so many significant digits.
 #[must_use]
@@ -23,10 +23,11 @@ mod tests {
 
     #[test]
     fn digits_stay_as_many_where_rounding_passes_a_power_of_ten() {
-        let told = [0.0, 12.345_678, -0.000_123_456, 1_234_567.0, 98_765.4].map(|it| digits(it, 5));
-        assert_eq!(told, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
-        let told = [9.996, 99.96, 0.999_6, 999_999.6, 0.000_099_996].map(|it| digits(it, 3));
-        assert_eq!(told, ["10.0", "100", "1.00", "1.00e6", "0.000100"]);
+        let texts =
+            [0.0, 12.345_678, -0.000_123_456, 1_234_567.0, 98_765.4].map(|it| digits(it, 5));
+        assert_eq!(texts, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
+        let texts = [9.996, 99.96, 0.999_6, 999_999.6, 0.000_099_996].map(|it| digits(it, 3));
+        assert_eq!(texts, ["10.0", "100", "1.00", "1.00e6", "0.000100"]);
         assert_eq!(digits(f64::NAN, 3), "NaN");
     }
 }

@@ -21,7 +21,7 @@ pub use digits::digits;
 pub use inventory;
 pub use names::Names;
 pub use nearest::nearest;
-pub use panicked::{NodePanic, panic_text, said};
+pub use panicked::{NodePanic, panic_message, panic_text};
 pub use place::{Place, SourceId, Sources};
 
 pub use crate::{code, problem};

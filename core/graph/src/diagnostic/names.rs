@@ -12,7 +12,7 @@ use super::nearest::{LONGEST, SHORTEST, farthest, nearest};
 /// Fewer that are alike are all compared.
 const COMPARED: usize = 200;
 
-/// The names that there are, in the order in which they are told.
+/// The names that there are, in the order in which they are shown.
 ///
 /// A file may refer to thousands of names that it does not have and have thousands of others.
 #[derive(Debug, Clone, Default)]

@@ -1,9 +1,9 @@
-//! Reads what a panic says that was caught, and of which node it is where that is known.
+//! The message of a panic that was caught, and its node where that is known.
 
 use std::any::Any;
 use std::fmt;
 
-/// A panic in the code of a node: what it goes on as to whoever catches it.
+/// A panic in the code of a node: what it is for whoever catches it.
 #[derive(Debug)]
 pub struct NodePanic {
     /// The node: `thermal.Z1`.
@@ -33,13 +33,13 @@ impl fmt::Display for NodePanic {
 
 /// The message of a panic, without the node.
 #[must_use]
-pub fn said(panic: &(dyn Any + Send)) -> &str {
+pub fn panic_message(panic: &(dyn Any + Send)) -> &str {
     if let Some(of_node) = panic.downcast_ref::<NodePanic>() {
         return &of_node.message;
     }
     let owned = panic.downcast_ref::<String>().map(String::as_str);
-    let said = owned.or_else(|| panic.downcast_ref::<&str>().copied());
-    said.unwrap_or("it does not say why")
+    let message = owned.or_else(|| panic.downcast_ref::<&str>().copied());
+    message.unwrap_or("it has no message")
 }
 
 /// What to report of a panic: with its node, where it is one of a node.
@@ -47,6 +47,6 @@ pub fn said(panic: &(dyn Any + Send)) -> &str {
 pub fn panic_text(panic: &(dyn Any + Send)) -> String {
     match panic.downcast_ref::<NodePanic>() {
         Some(of_node) => of_node.to_string(),
-        None => format!("a panic: {}", said(panic)),
+        None => format!("a panic: {}", panic_message(panic)),
     }
 }

@@ -130,7 +130,7 @@ pub struct NodeDecl {
     pub name: String,
     /// Where it is declared.
     pub place: Place,
-    /// Its `type`, and where that stands; none where a mistake in it has been told.
+    /// Its `type`, and where that stands; none where a mistake in it has been reported.
     pub kind: Option<(String, Place)>,
     /// The sets of its `each`, in order.
     pub each: Vec<String>,

@@ -173,6 +173,40 @@ impl Value {
         value.map_or(self.place, |value| value.place)
     }
 
+    /// The same tree with another value in the place of each text.
+    pub(super) fn with_texts(&self, of: &mut dyn FnMut(&str, Place) -> Value) -> Value {
+        let data = match &self.data {
+            Data::Text(text) => return of(text, self.place),
+            Data::List(values) => {
+                let values = values.iter().map(|value| value.with_texts(&mut *of));
+                Data::List(values.collect())
+            }
+            Data::Table(table) => {
+                let entries = table.iter().map(|(key, entry)| {
+                    let value = entry.value.with_texts(&mut *of);
+                    let place = entry.key;
+                    (key.to_owned(), Entry { key: place, value })
+                });
+                Data::Table(entries.collect())
+            }
+            other => other.clone(),
+        };
+        Value::new(self.place, data)
+    }
+
+    /// Whether one of the texts in it fits; each is given with its place, up to that one.
+    pub(super) fn any_text(&self, fits: &mut dyn FnMut(&str, Place) -> bool) -> bool {
+        match &self.data {
+            Data::Text(text) => fits(text, self.place),
+            Data::List(values) => values.iter().any(|value| value.any_text(&mut *fits)),
+            Data::Table(table) => {
+                let mut entries = table.iter();
+                entries.any(|(_, entry)| entry.value.any_text(&mut *fits))
+            }
+            _ => false,
+        }
+    }
+
     /// The text, if it is one.
     pub fn as_text(&self) -> Option<&str> {
         match &self.data {
@@ -221,7 +255,7 @@ impl Value {
         }
     }
 
-    /// As [`Data::found`].
+    /// As `Data::found`.
     pub fn found(&self) -> String {
         self.data.found()
     }

@@ -196,8 +196,8 @@ mod tests {
             ("{Date} { }", "no column is named between `{` and `}`"),
             ("{Time} {Time}", "the column `Time` stands twice"),
         ] {
-            let told = text.parse::<TimeColumns>().unwrap_err().to_string();
-            assert_eq!(told, format!("{what}; {example}"), "{text}");
+            let error = text.parse::<TimeColumns>().unwrap_err().to_string();
+            assert_eq!(error, format!("{what}; {example}"), "{text}");
         }
     }
 }

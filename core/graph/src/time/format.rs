@@ -10,7 +10,7 @@ use jiff::tz::{Offset, TimeZone};
 /// How dates and times are written, in the letters of `strptime` (POSIX.1-2017, and `%f` for fractions of a second):
 /// `%d.%m.%Y %H:%M:%S`.
 ///
-/// A time that does not say how far it is from UTC (`%z`) is UTC.
+/// A time without its offset from UTC (`%z`) is UTC.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct TimeFormat(String);
 
@@ -23,7 +23,7 @@ impl TimeFormat {
     pub fn read(&self, text: &[u8]) -> Option<i128> {
         let parts = BrokenDownTime::parse(&self.0, text).ok()?;
         if parts.iana_time_zone().is_some() {
-            // The name of a region says two things twice a year.
+            // The name of a region is ambiguous twice a year.
             return None;
         }
         let offset = parts.offset().unwrap_or(Offset::UTC);
@@ -31,7 +31,7 @@ impl TimeFormat {
         Some(offset.to_timestamp(civil).ok()?.as_nanosecond())
     }
 
-    /// Whether times of this format say how far they are from UTC.
+    /// Whether times of this format have their offset from UTC.
     #[must_use]
     pub fn has_offset(&self) -> bool {
         ["%z", "%:z", "%::z", "%:::z"]

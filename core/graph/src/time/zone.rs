@@ -249,10 +249,10 @@ mod tests {
 
     #[test]
     fn a_zone_that_is_not_there_is_told_with_the_one_that_may_be_meant() {
-        let told = |text: &str| text.parse::<Zone>().unwrap_err().to_string();
-        assert!(told("Europe/Berlim").contains("did you mean \"Europe/Berlin\"?"));
-        assert!(told("berlin").contains("did you mean \"Europe/Berlin\"?"));
-        assert!(told("").starts_with("there is no such time zone; write one"));
+        let error = |text: &str| text.parse::<Zone>().unwrap_err().to_string();
+        assert!(error("Europe/Berlim").contains("did you mean \"Europe/Berlin\"?"));
+        assert!(error("berlin").contains("did you mean \"Europe/Berlin\"?"));
+        assert!(error("").starts_with("there is no such time zone; write one"));
     }
 
     #[test]
@@ -268,9 +268,9 @@ mod tests {
             ("UTC+5,5", "+05:30"),
             ("Z", "+00:00"),
         ] {
-            let told = text.parse::<Zone>().unwrap_err().to_string();
+            let error = text.parse::<Zone>().unwrap_err().to_string();
             let expected = format!("did you mean \"{meant}\"? Write one of");
-            assert!(told.contains(&expected), "{text}: {told}");
+            assert!(error.contains(&expected), "{text}: {error}");
             assert!(meant.parse::<Zone>().is_ok(), "{meant}");
         }
         for rule in ["CET-1CEST", "<+03>-3", "UTC+99", "GMT+1:75", "UTC+", "+"] {

@@ -1,4 +1,4 @@
-//! Decides which unit a word in the name of a column says; where in a name a unit may stand is for whoever reads the name.
+//! Which unit a word in the name of a column means; where in a name it may stand is decided by the reader of the name.
 
 use super::Unit;
 use super::spelling::MICROINCH;
@@ -110,7 +110,7 @@ const WORDS: [(&str, &str); 102] = [
 ];
 
 impl Unit {
-    /// The unit that a word in the name of a column says, such as `degC` in `plate_degC`; none where the word has other meanings
+    /// The unit that a word in the name of a column means, such as `degC` in `plate_degC`; none where the word has other meanings
     /// that are as usual, such as `min`.
     #[must_use]
     pub fn in_name(word: &str) -> Option<Self> {
@@ -124,7 +124,7 @@ impl Unit {
         Self::parse(code).ok()
     }
 
-    /// The unit that a text says which is meant to be one: a word as in names, or a spelling as in graph files.
+    /// The unit that a text means which is meant to be one: a word as in names, or a spelling as in graph files.
     #[must_use]
     pub fn in_words(text: &str) -> Option<Self> {
         Self::in_name(text).or_else(|| Self::parse(text).ok())

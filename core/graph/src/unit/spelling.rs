@@ -77,7 +77,7 @@ pub(super) fn is_level(symbol: &str) -> bool {
 }
 
 /// The unit that a text may be a slip of the finger for. Short names lie near to many: one of a single letter, or that begins with
-/// another, is none of them, and one that differs in its capitals alone is none where these tell units of different kinds apart (`mPa`, `NM`).
+/// another, is none of them, and one that differs in its capitals alone is none where these separate units of different kinds (`mPa`, `NM`).
 pub(super) fn near(text: &str) -> Option<&'static str> {
     let spelt = SPELLINGS.iter().map(|(spelling, _)| *spelling);
     let known = COMMON.iter().copied().chain(spelt);

@@ -113,7 +113,7 @@ impl Model {
     }
 
     /// The same, adding the files of a graph to `sources`: from there the tests of the graph can be declared
-    /// ([`trial::declare`](crate::trial::declare)) without reading it again. What is doubtful in a graph file, but no mistake, is
+    /// (`athermal_trial::declare`) without reading it again. What is doubtful in a graph file, but no mistake, is
     /// added to `doubts`.
     ///
     /// # Errors

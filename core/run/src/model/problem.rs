@@ -92,7 +92,7 @@ problem! {
     related: vec![(*named, "the model that was fitted".to_owned())],
 }
 
-/// The first few properties that differ: what the file says, then what was fitted. Where an input reads other channels, their
+/// The first few properties that differ: what the file has, then what was fitted. Where an input reads other channels, their
 /// properties add nothing.
 fn differs(parameters: &[ParameterChange]) -> String {
     const MOST: usize = 3;

@@ -268,7 +268,7 @@ fn told(node: &str, found: &str, remedy: &str) {
     let told = compiled(node).unwrap_err();
     assert!(told.contains(&format!("error[A180]: `{found}")), "{told}");
     assert!(told.contains("= note: node `mine`"), "{told}");
-    assert!(told.contains("from athermal-core 0.1.0: "), "{told}");
+    assert!(told.contains("from athermal-testkit 0.1.0: "), "{told}");
     assert!(told.contains(remedy), "{told}");
     assert_eq!(told.matches("error[").count(), 1, "{told}");
 }
@@ -364,7 +364,7 @@ fn a_kind_that_learns_and_gives_no_learner_is_told_as_at_fault() {
     };
     let error = error.to_string();
     assert!(
-        error.contains("a mistake of its own and not of the data: for the author of `guess`, from athermal-core 0.1.0"),
+        error.contains("a mistake of its own and not of the data: for the author of `guess`, from athermal-testkit 0.1.0"),
         "{error}"
     );
     assert!(error.contains("`Predictor::learner`"), "{error}");

@@ -90,6 +90,6 @@ fn a_panic_names_the_node_and_the_tick() {
     assert_eq!(
         text,
         "the node `passed.Y` panicked at 2 s: too much; this is a mistake in its code, for the author of `brittle`, \
-         from athermal-core 0.1.0"
+         from athermal-testkit 0.1.0"
     );
 }

@@ -1,4 +1,4 @@
-//! Why faults cannot be applied. Decides how it is told, not what is refused.
+//! Why faults cannot be applied, and how that is worded.
 
 use std::fmt;
 

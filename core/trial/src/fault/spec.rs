@@ -259,9 +259,9 @@ mod tests {
             ("t=drift,size=0,5 K/h,for=1h", "0.5 K/h"),
             ("t=drift,for=1,5h", "1.5h"),
         ] {
-            let told = text.parse::<FaultSpec>().unwrap_err().to_string();
+            let error = text.parse::<FaultSpec>().unwrap_err().to_string();
             let expected = format!("a number has a decimal point: \"{instead}\"");
-            assert!(told.contains(&expected), "{told}");
+            assert!(error.contains(&expected), "{error}");
         }
     }
 }

@@ -180,7 +180,8 @@ fn losses_that_cannot_have_been_are_not_taken_up() {
     for wrong in ["-3.0", "-1e-9"] {
         let broken = kept.replacen("\"sums\":[0.0", &format!("\"sums\":[{wrong}"), 1);
         assert_ne!(broken, kept);
-        let state: Box<dyn State> = serde_json::from_str(&broken).unwrap();
+        let broken: serde_json::Value = serde_json::from_str(&broken).unwrap();
+        let state = <dyn State>::read(&rmp_serde::to_vec_named(&broken).unwrap()).unwrap();
         let restored = parameters.build(3).restore(state);
         assert!(matches!(restored, Restored::Cold { .. }), "{restored:?}");
     }

@@ -91,7 +91,7 @@ conformance!(
     SafeState,
     Case::new(
         r#"
-        refuge = "zero"
+        when_lost = "zero"
         after = 2
         max_slew = "5 nm/s"
         "#
@@ -99,7 +99,7 @@ conformance!(
     .speaks_without_input(&["safe", "why"]),
     Case::new(
         r#"
-        refuge = "value"
+        when_lost = "value"
         value = "-10 nm"
         max_slew = "1 nm/s"
         "#
@@ -108,7 +108,7 @@ conformance!(
     .speaks_without_input(&["safe", "why"]),
     Case::new(
         r#"
-        refuge = "hold"
+        when_lost = "hold"
         max_slew = "1 nm/s"
         "#
     )

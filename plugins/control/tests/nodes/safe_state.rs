@@ -1,4 +1,4 @@
-//! The way to the refuge and back.
+//! The way to the when_lost and back.
 
 use super::machine::{Machine, NONE, compiled, goes_on_alike};
 
@@ -14,7 +14,7 @@ max_age = "1h"
 [nodes.safe]
 type = "safe_state"
 inputs = { signal = "c", distrust = "bad" }
-refuge = "zero"
+when_lost = "zero"
 after = 2
 max_slew = "10 nm/s"
 [outputs]
@@ -28,7 +28,7 @@ fn at(machine: &mut Machine, t: f64, value: f64, bad: f64) -> (f64, f64) {
 }
 
 #[test]
-fn it_bridges_two_ticks_goes_to_its_refuge_and_comes_back_without_a_step() {
+fn it_bridges_two_ticks_goes_to_its_safe_value_and_comes_back_without_a_step() {
     let mut machine = Machine::new(GRAPH);
     assert_eq!(at(&mut machine, 0.0, 25.0, 0.0), (25.0, 0.0));
     assert_eq!(at(&mut machine, 2.0, NONE, NONE), (25.0, 1.0));
@@ -93,7 +93,7 @@ fn it_can_hold_or_go_to_a_stated_value() {
     let two = GRAPH.replace("\"zero\"", "\"bad\"");
     let told = compiled(&two.replace("10 nm/s", "-10 nm/s")).0.unwrap_err();
     assert!(
-        told.contains("refuge") && told.contains("max_slew"),
+        told.contains("when_lost") && told.contains("max_slew"),
         "{told}"
     );
     let rows: Vec<_> = (0..90)

@@ -113,7 +113,7 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
     let mut texts = Vec::new();
     while texts.len() < rows && csv.advance(&mut ledger)? {
         let row = csv.texts();
-        if row == csv.names() {
+        if row == csv.names() || is_rule(&row) {
             continue;
         }
         // From there on columns may stand elsewhere.
@@ -137,6 +137,12 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
         units: csv.units().to_vec(),
         rows: texts,
     })
+}
+
+/// Whether a row is the line below the names of a table in Markdown.
+fn is_rule(row: &[String]) -> bool {
+    let is_of_rule = |cell: &String| cell.bytes().all(|byte| b"-:".contains(&byte));
+    row.iter().any(|cell| cell.contains("--")) && row.iter().all(is_of_rule)
 }
 
 fn of_json(mut lines: Lines, rows: usize) -> Result<Description, FileError> {

@@ -74,7 +74,7 @@ impl NodeState {
         let Some(bytes) = &self.own else {
             return Ok(None);
         };
-        rmp_serde::from_slice(bytes).map(Some).map_err(|error| {
+        <dyn State>::read(bytes).map(Some).map_err(|error| {
             Restored::cold(format!(
                 "this program does not understand the state: {error}"
             ))

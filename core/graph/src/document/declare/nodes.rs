@@ -7,7 +7,7 @@ use super::reading::{
     in_samples, known_keys, length, meant, missing, one_or_more, samples, table, text,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, nearest};
+use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
 use crate::document::problem;
 use crate::document::tree::{Data, Entry, Table, Value};
@@ -63,10 +63,10 @@ fn node(
     let before = diagnostics.reported();
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("node \"{name}\"");
-    let type_key = type_key(keys, &what, diagnostics);
-    let kind = match keys.get(type_key) {
+    // A misspelt key is reported with the parameters.
+    let kind = match meant(keys, "type", &OWN_KEYS) {
         Some(value) => text(value, "type", diagnostics).map(|kind| (kind.to_owned(), value.place)),
-        // Why it could not be expanded has been told.
+        // Why it could not be expanded has been reported.
         None if keys.contains("module") => None,
         None => {
             missing(
@@ -92,10 +92,7 @@ fn node(
         };
         named.check(&entry.value, diagnostics);
     }
-    let mut parameters = Value::new(
-        entry.value.place,
-        Data::Table(own_parameters(keys, type_key)),
-    );
+    let mut parameters = Value::new(entry.value.place, Data::Table(own_parameters(keys)));
     convert_samples(&mut parameters, sample, diagnostics);
     let mut open = diagnostics.reported() > before_texts;
     let template = Template {
@@ -206,30 +203,22 @@ impl Named<'_> {
         own.chain(self.parameters).cloned().collect()
     }
 
-    /// Tells of placeholders that stand for nothing.
+    /// Reports placeholders that stand for nothing.
     fn check(&self, value: &Value, diagnostics: &mut Diagnostics) {
-        match &value.data {
-            Data::Text(text) => {
-                let is_set = |name: &&str| self.each.iter().any(|(set, _)| set == name);
-                for name in placeholder::names(text).filter(|name| !is_set(name)) {
-                    let problem = problem::UnknownPlaceholder {
-                        name: name.to_owned(),
-                        known: self.known(),
-                        what: self.what.to_owned(),
-                        instead: None,
-                    };
-                    // Around a module it may have been told already.
-                    diagnostics.report_unless_known(value.place, problem);
-                }
+        let is_set = |name: &&str| self.each.iter().any(|(set, _)| set == name);
+        value.any_text(&mut |text, place| {
+            for name in placeholder::names(text).filter(|name| !is_set(name)) {
+                let problem = problem::UnknownPlaceholder {
+                    name: name.to_owned(),
+                    known: self.known(),
+                    what: self.what.to_owned(),
+                    instead: None,
+                };
+                // Around a module it may have been reported already.
+                diagnostics.report_unless_known(place, problem);
             }
-            Data::List(values) => values
-                .iter()
-                .for_each(|value| self.check(value, diagnostics)),
-            Data::Table(table) => table
-                .iter()
-                .for_each(|(_, entry)| self.check(&entry.value, diagnostics)),
-            Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
-        }
+            false
+        });
     }
 }
 
@@ -262,7 +251,7 @@ impl Template {
         }
         let context = format!("node `{node}`, member `{}`", member.name);
         let outer = diagnostics.scope(Some(context));
-        // Those that stand there without a member have been converted, or told.
+        // Those that stand there without a member have been converted, or reported.
         if !has_samples(&self.parameters) {
             convert_samples(&mut parameters, self.sample, diagnostics);
         }
@@ -270,7 +259,7 @@ impl Template {
             let mut decl = filled_input(&input.decl, &member.pairs);
             let max_age = input.max_age.as_ref();
             let max_age = max_age.map(|value| filled(value, &member.pairs));
-            // A placeholder that stands for nothing has been told.
+            // A placeholder that stands for nothing has been reported.
             if let Some(value) = max_age.filter(|value| !has_placeholders(value)) {
                 let length = length(&value, "max_age", self.sample, diagnostics);
                 decl.max_age = length.map(|length| (length, value.place));
@@ -339,27 +328,9 @@ fn input(
     }
 }
 
-/// The key that says the kind: without it, a misspelt one, of which is then told.
-fn type_key<'a>(keys: &'a Table, what: &str, diagnostics: &mut Diagnostics) -> &'a str {
-    if keys.contains("type") || keys.contains("module") {
-        return "type";
-    }
-    let is_meant = |key: &str| !OWN_KEYS.contains(&key) && nearest(key, OWN_KEYS) == Some("type");
-    let Some((key, entry)) = keys.iter().find(|(key, _)| is_meant(key)) else {
-        return "type";
-    };
-    let problem = problem::UnknownKey {
-        key: key.to_owned(),
-        what: what.to_owned(),
-        known: OWN_KEYS.map(str::to_owned).to_vec(),
-    };
-    diagnostics.report(entry.key, problem);
-    key
-}
-
-fn own_parameters(keys: &Table, type_key: &str) -> Table {
+fn own_parameters(keys: &Table) -> Table {
     keys.iter()
-        .filter(|(key, _)| !OWN_KEYS.contains(key) && *key != type_key)
+        .filter(|(key, _)| !OWN_KEYS.contains(key))
         .map(|(key, entry)| (key.to_owned(), entry.clone()))
         .collect()
 }
@@ -370,24 +341,17 @@ fn convert_samples(value: &mut Value, sample: Option<Duration>, diagnostics: &mu
     if !has_samples(value) {
         return;
     }
-    let place = value.place;
-    match &mut value.data {
-        Data::Text(text) => {
-            if let Some(number) = samples(text) {
-                match in_samples(text, number, sample) {
-                    Ok(duration) => *text = duration.to_string(),
-                    Err(problem) => diagnostics.report(place, problem),
-                }
+    *value = value.with_texts(&mut |text, place| {
+        let converted = match samples(text).map(|number| in_samples(text, number, sample)) {
+            Some(Ok(duration)) => duration.to_string(),
+            Some(Err(problem)) => {
+                diagnostics.report(place, problem);
+                text.to_owned()
             }
-        }
-        Data::List(values) => values
-            .iter_mut()
-            .for_each(|value| convert_samples(value, sample, diagnostics)),
-        Data::Table(table) => table
-            .iter_mut()
-            .for_each(|(_, entry)| convert_samples(&mut entry.value, sample, diagnostics)),
-        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
-    }
+            None => text.to_owned(),
+        };
+        Value::new(place, Data::Text(converted))
+    });
 }
 
 /// The same for the tables of a list, except for the text under a key that is for people.
@@ -407,7 +371,7 @@ pub(super) fn convert_samples_but(
     }
 }
 
-/// Leaves out the references with a placeholder that stands for nothing, of which has been told.
+/// Leaves out the references with a placeholder that stands for nothing, which has been reported.
 fn leave_out_open(node: &mut NodeDecl) {
     let inputs = node.instances.iter_mut().flat_map(|of| &mut of.inputs);
     for input in inputs {
@@ -433,46 +397,16 @@ fn filled(value: &Value, members: &[(&str, &str)]) -> Value {
     if members.is_empty() || !has_placeholders(value) {
         return value.clone();
     }
-    let data = match &value.data {
-        Data::Text(text) => Data::Text(placeholder::fill(text, members)),
-        Data::List(values) => {
-            Data::List(values.iter().map(|value| filled(value, members)).collect())
-        }
-        Data::Table(table) => Data::Table(
-            table
-                .iter()
-                .map(|(key, entry)| {
-                    (
-                        key.to_owned(),
-                        Entry {
-                            key: entry.key,
-                            value: filled(&entry.value, members),
-                        },
-                    )
-                })
-                .collect(),
-        ),
-        scalar => scalar.clone(),
-    };
-    Value::new(value.place, data)
+    value.with_texts(&mut |text, place| {
+        let text = placeholder::fill(text, members);
+        Value::new(place, Data::Text(text))
+    })
 }
 
 fn has_placeholders(value: &Value) -> bool {
-    match &value.data {
-        Data::Text(text) => placeholder::names(text).next().is_some(),
-        Data::List(values) => values.iter().any(has_placeholders),
-        Data::Table(table) => table
-            .iter()
-            .any(|(_, entry)| has_placeholders(&entry.value)),
-        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => false,
-    }
+    value.any_text(&mut |text, _| placeholder::names(text).next().is_some())
 }
 
 fn has_samples(value: &Value) -> bool {
-    match &value.data {
-        Data::Text(text) => samples(text).is_some(),
-        Data::List(values) => values.iter().any(has_samples),
-        Data::Table(table) => table.iter().any(|(_, entry)| has_samples(&entry.value)),
-        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => false,
-    }
+    value.any_text(&mut |text, _| samples(text).is_some())
 }

@@ -22,12 +22,12 @@ pub fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut D
     }
 }
 
-/// Whether a key that is missing is there under a name that [`known_keys`] tells to be none.
+/// Whether a key that is missing is there under a name that [`known_keys`] reports.
 pub fn is_misspelt(table: &Table, key: &str, known: &[&str]) -> bool {
     !table.contains(key) && meant(table, key, known).is_some()
 }
 
-/// The value of a key, or of a misspelt one of which [`known_keys`] tells, so that nothing follows from its spelling.
+/// The value of a key, or of a misspelt one, which [`known_keys`] reports, so that nothing follows from its spelling.
 pub(super) fn meant<'a>(table: &'a Table, key: &str, known: &[&str]) -> Option<&'a Value> {
     let is_meant =
         |given: &str| !known.contains(&given) && nearest(given, known.iter().copied()) == Some(key);

@@ -15,7 +15,7 @@ use crate::document::tree::Value;
 pub(super) struct Sets {
     /// The members of each.
     pub(super) members: IndexMap<String, Vec<String>>,
-    /// Those with mistakes that have been told: nobody is told that they do not exist.
+    /// Those with reported mistakes, which are not reported as unknown.
     broken: IndexSet<String>,
     /// The names of all, once somebody names another: a graph may do so thousands of times.
     known: OnceCell<Arc<Names>>,
@@ -50,7 +50,7 @@ pub(super) fn declare(
         if diagnostics.error_count() > before || !is_name(name, false) {
             declared.broken.insert(name.to_owned());
         }
-        // Of those that stand twice one, lest every user of the set is told of it.
+        // Of those that stand twice one, or every user of the set would have the mistake.
         let members: IndexSet<_> = members.into_iter().map(|(member, _)| member).collect();
         let members = members.into_iter().collect();
         declared.members.insert(name.to_owned(), members);
@@ -65,7 +65,7 @@ impl Sets {
         sound.filter(|_| !self.broken.contains(name))
     }
 
-    /// The members of a set; `None` where they are not known, which has then been told.
+    /// The members of a set; `None` where they are not known, which has then been reported.
     pub(super) fn find(
         &self,
         name: &str,

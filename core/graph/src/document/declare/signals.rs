@@ -41,7 +41,7 @@ pub(super) fn declare(
     declared
 }
 
-/// A signal whose channels and unit are known: what else is wrong with it is told, and says nothing of those who refer to it.
+/// A signal whose channels and unit are known: what else is wrong with it is reported, and is no mistake of those who refer to it.
 fn signal(
     name: &str,
     entry: &Entry,
@@ -223,7 +223,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         return None;
     };
     let of = (unit.map_or("Cel", Unit::text), unit.is_some());
-    // Both are read before either is given up, so that mistakes in both are told.
+    // Both are read before either is given up, so that mistakes in both are reported.
     let ends = (
         quantity(low, "range", of, diagnostics).map(|of| (of, low.place)),
         quantity(high, "range", of, diagnostics).map(|of| (of, high.place)),

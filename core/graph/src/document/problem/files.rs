@@ -136,7 +136,7 @@ code!(
     A004,
     Error,
     "schema",
-    "Every graph file says `schema = 1`, so that a later version of the language is never misread."
+    "Every graph file has `schema = 1`, so that a later version of the language is never misread."
 );
 
 problem! {

@@ -142,7 +142,7 @@ code!(
     A024,
     Error,
     "contradicting time",
-    "`[time]` says two things that exclude each other, e.g. both `step` and a unit, or a `format` beside one."
+    "`[time]` has two keys that exclude each other, e.g. both `step` and a unit, or a `format` beside one."
 );
 
 problem! {

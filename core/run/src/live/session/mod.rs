@@ -331,3 +331,6 @@ impl Steps for Driven<'_, '_> {
         self.session.take(event, samples, self.sink)
     }
 }
+
+#[cfg(test)]
+mod tests;

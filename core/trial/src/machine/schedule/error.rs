@@ -1,4 +1,4 @@
-//! What can be wrong in a schedule file. Decides how it is told, not what is wrong.
+//! What can be wrong in a schedule file, and how that is worded.
 
 use std::fmt;
 

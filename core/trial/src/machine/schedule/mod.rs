@@ -1,4 +1,4 @@
-//! Set points over time. Decides the schedule file and what a schedule says at an instant, not what follows the set point.
+//! Set points over time. The schedule file, and the set points at an instant.
 //!
 //! A schedule file is a table with a line of names; `#` starts a comment:
 //!
@@ -78,7 +78,7 @@ impl Schedule {
         self.tracks.iter().map(|(name, _)| name.as_str())
     }
 
-    /// What it says about a set point: its default if nothing.
+    /// Its value of a set point: the default if there is none.
     #[must_use]
     pub fn track(&self, set_point: &SetPoint) -> Track {
         self.tracks

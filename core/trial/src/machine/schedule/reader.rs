@@ -1,9 +1,9 @@
-//! Reading a schedule file. Decides what its text means, not how its mistakes are told.
+//! Reading a schedule file. Its mistakes are worded in `error.rs`.
 
 use super::{Reason, Schedule, ScheduleError, Track};
 use crate::machine::{LONGEST_DAYS, SECOND_NS, SetPoint};
 
-/// The schedule that `text` says, or all of its mistakes.
+/// The schedule in `text`, or all of its mistakes.
 pub(super) fn read(text: &str, set_points: &[SetPoint]) -> Result<Schedule, Vec<ScheduleError>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text

@@ -90,7 +90,7 @@ pub(super) struct Expanded {
     pub(super) outputs: Option<Value>,
     /// The same of `[[tests]]`.
     pub(super) tests: Option<Value>,
-    /// A mistake in a module or an instance of one has been told: what is inside may not be what was meant.
+    /// A mistake in a module or an instance of one has been reported: what is inside may not be what was meant.
     pub(super) faulty: bool,
     /// Not all nodes are there, since they would be too many.
     pub(super) cut: bool,
@@ -214,7 +214,7 @@ struct Expansion<'a> {
     path: Vec<(String, *const Value)>,
     /// The names in tables, listed once for all who refer to others.
     known: HashMap<Vec<*const Table>, Arc<Names>>,
-    /// Set when the limit was told, so that nothing more is expanded.
+    /// Set when the limit was reported, so that nothing more is expanded.
     full: bool,
     /// Set when an instance could not be expanded, since what it refers to has mistakes.
     faulty: bool,
@@ -299,7 +299,7 @@ impl Expansion<'_> {
         self.place(name, entry, level);
     }
 
-    /// Replaces an instance of a module by the module's nodes; `None` where that cannot be done, which has been told.
+    /// Replaces an instance of a module by the module's nodes; `None` where that cannot be done, which has been reported.
     fn instance(&mut self, name: &str, entry: &Entry, level: &Level<'_>) -> Option<()> {
         let keys = entry.value.as_table()?;
         let wanted = keys.get("module")?;
@@ -323,12 +323,12 @@ impl Expansion<'_> {
             self.diagnostics.report(wanted.place, problem);
             return None;
         }
-        // What is wrong with a module itself has been told where it stands.
+        // What is wrong with a module itself has been reported where it stands.
         let module = Module::read(module_name, found, &mut Diagnostics::new())?;
         let each = own_each(keys, self.sets, self.diagnostics);
         let names = each.sets.into_iter().map(|(set, _)| set);
         let around = self.around(name, names.collect(), &module, level);
-        // Where it is not known what the members are of, none that is named can be told to be strange.
+        // Where it is not known what the members are of, none that is named can be called strange.
         let members = each.known.then_some(&around);
         let given = self.given(name, entry, keys, &module, members, level);
         let given = given.filter(|_| each.sound)?;
@@ -466,44 +466,22 @@ impl Expansion<'_> {
         let Some(within) = around else {
             return value;
         };
-        let place = value.place;
-        let data = match value.data {
-            Data::Text(text) => {
-                let strange =
-                    |name: &&str| !name.contains('/') && !within.each.iter().any(|set| set == name);
-                for name in placeholder::names(&text).filter(strange) {
-                    let problem = problem::UnknownPlaceholder {
-                        name: name.to_owned(),
-                        known: within.each.clone(),
-                        what: what.to_owned(),
-                        instead: None,
-                    };
-                    self.diagnostics.report(place, problem);
-                }
-                let open = |set: &String| (set.clone(), format!("{{{}}}", within.placeholder(set)));
-                let open: Vec<_> = within.each.iter().map(open).collect();
-                let open: Vec<_> = open.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
-                Data::Text(placeholder::fill(&text, &open))
+        let open = |set: &String| (set.clone(), format!("{{{}}}", within.placeholder(set)));
+        let open: Vec<_> = within.each.iter().map(open).collect();
+        let open: Vec<_> = open.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
+        let is_strange =
+            |name: &&str| !name.contains('/') && !within.each.iter().any(|set| set == name);
+        value.with_texts(&mut |text, place| {
+            for name in placeholder::names(text).filter(is_strange) {
+                let problem = problem::UnknownPlaceholder {
+                    name: name.to_owned(),
+                    known: within.each.clone(),
+                    what: what.to_owned(),
+                    instead: None,
+                };
+                self.diagnostics.report(place, problem);
             }
-            Data::List(values) => {
-                let values = values.into_iter();
-                Data::List(values.map(|v| self.outward(v, around, what)).collect())
-            }
-            Data::Table(entries) => {
-                let entries = entries.into_iter().map(|(key, entry)| {
-                    let value = self.outward(entry.value, around, what);
-                    (
-                        key,
-                        Entry {
-                            key: entry.key,
-                            value,
-                        },
-                    )
-                });
-                Data::Table(entries.collect())
-            }
-            other => other,
-        };
-        Value::new(place, data)
+            Value::new(place, Data::Text(placeholder::fill(text, &open)))
+        })
     }
 }

@@ -1,4 +1,4 @@
-//! Decides which node inside of a module an output of it stands for, however deep; not what is told where there is none.
+//! Which node inside of a module an output of it stands for, however deep.
 
 use super::module::{Module, find};
 use crate::diagnostic::Diagnostics;
@@ -10,7 +10,7 @@ pub(super) enum Outlet<'a> {
     Found(String),
     /// There is no such output; these there are, if any.
     Unknown(Option<&'a Table>),
-    /// Something has been told of it already.
+    /// A mistake in it has been reported.
     Broken,
 }
 

@@ -137,7 +137,7 @@ impl Expansion<'_> {
                 self.diagnostics.report(place, problem);
                 text.to_owned()
             }
-            // What is wrong with the module is told there.
+            // What is wrong with the module is reported there.
             Outlet::Broken => text.to_owned(),
         };
         match channel {

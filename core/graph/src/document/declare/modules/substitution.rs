@@ -5,7 +5,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::declare::each::weight;
 use crate::document::declare::placeholder;
 use crate::document::problem;
-use crate::document::tree::{Data, Entry, Value};
+use crate::document::tree::{Data, Value};
 use crate::quantity::Quantity;
 use crate::unit::Unit;
 
@@ -14,42 +14,16 @@ impl Given {
     ///
     /// A text that is nothing but `{name}` becomes the parameter's value, which stands where it was given.
     pub(super) fn fill(&self, value: &Value, diagnostics: &mut Diagnostics) -> Value {
-        let data = match &value.data {
-            Data::Text(text) => match self.whole(text) {
-                Some(given) => return given.clone(),
-                None => match self.unit_twice(text) {
-                    Some((given, problem)) => {
-                        diagnostics.report(given.place, problem);
-                        return given.clone();
-                    }
-                    None => Data::Text(self.fill_text(text, value.place, diagnostics)),
-                },
-            },
-            Data::List(values) => Data::List(
-                values
-                    .iter()
-                    .map(|value| self.fill(value, diagnostics))
-                    .collect(),
-            ),
-            Data::Table(entries) => Data::Table(
-                entries
-                    .iter()
-                    .map(|(key, entry)| {
-                        let value = self.fill(&entry.value, diagnostics);
-                        let key_place = entry.key;
-                        (
-                            key.to_owned(),
-                            Entry {
-                                key: key_place,
-                                value,
-                            },
-                        )
-                    })
-                    .collect(),
-            ),
-            scalar => scalar.clone(),
-        };
-        Value::new(value.place, data)
+        value.with_texts(&mut |text, place| {
+            if let Some(given) = self.whole(text) {
+                return given.clone();
+            }
+            if let Some((given, problem)) = self.unit_twice(text) {
+                diagnostics.report(given.place, problem);
+                return given.clone();
+            }
+            Value::new(place, Data::Text(self.fill_text(text, place, diagnostics)))
+        })
     }
 
     /// How much a value weighs once all that it names stands in it, at most.
