@@ -1,4 +1,4 @@
-//! The files of a new plugin crate. Their texts are those of `templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
+//! The files of a new plugin crate. Their texts are those of `examples/templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
 //! name, and `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
@@ -174,7 +174,7 @@ fn put(text: &str, words: &[(&str, &str)]) -> String {
 /// Files of a crate, each with its place there and the template of its text.
 macro_rules! files {
     ($($path:literal: $template:literal),* $(,)?) => {
-        vec![$(($path, include_str!(concat!("../../../templates/", $template)))),*]
+        vec![$(($path, include_str!(concat!("../../../examples/templates/", $template)))),*]
     };
 }
 

@@ -15,11 +15,11 @@ use athermal::{Instant, Model};
 use super::model::s;
 use crate::workbench::Scratch;
 
-/// The drift of a position over half a minute, in this unit.
-fn drift(unit: &str) -> String {
+/// The drift of a position over a window of this length.
+fn drift(window: &str) -> String {
     format!(
         "schema = 1\n[time]\ncolumn = \"t\"\n[signals.position]\nunit = \"nm\"\nchannels = [\"Z\"]\nmax_age = \"1min\"\n\
-         [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"30s\"]\nunit = \"{unit}\"\n\
+         [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"{window}\"]\nunit = \"nm/min\"\n\
          [outputs]\nnow = \"drift\"\n"
     )
 }
@@ -87,7 +87,7 @@ fn run(model: &Model, options: SessionOptions, table: &Table) -> (Frames, Vec<&'
 #[test]
 fn a_session_that_is_started_again_goes_on_to_the_same_bits() {
     let scratch = Scratch::new("session-state");
-    let model = Model::load(scratch.file("graph.toml", drift("nm/min"))).unwrap();
+    let model = Model::load(scratch.file("graph.toml", drift("30s"))).unwrap();
     let state = scratch.path("state");
     let (whole, _) = run(&model, SessionOptions::default(), &rows(0..200));
     let (mut first, reports) = run(&model, options(&state), &rows(0..120));
@@ -122,7 +122,7 @@ fn of_two_sessions_no_more_than_one_holds_a_state() {
 #[test]
 fn a_watched_graph_takes_over_and_a_restart_goes_on_with_it() {
     let scratch = Scratch::new("session-watched");
-    let graph = scratch.file("graph.toml", drift("nm/min"));
+    let graph = scratch.file("graph.toml", drift("30s"));
     let state = scratch.path("state");
     let watched_options = |watched| SessionOptions {
         state: Some(StateStore::open(&state, true).unwrap()),
@@ -146,7 +146,7 @@ fn a_watched_graph_takes_over_and_a_restart_goes_on_with_it() {
         frames.0.last().unwrap().2.clone()
     };
     let before = push(&mut session, &mut frames);
-    std::fs::write(&graph, drift("um/h")).unwrap();
+    std::fs::write(&graph, drift("20s")).unwrap();
     let began = Clock::now();
     while push(&mut session, &mut frames) == before {
         assert!(began.elapsed() < Span::from_secs(30), "it never took over");
@@ -172,8 +172,8 @@ fn a_watched_graph_takes_over_and_a_restart_goes_on_with_it() {
 #[test]
 fn what_is_pushed_may_swap_freeze_and_let_time_pass() {
     let scratch = Scratch::new("session-pushed");
-    let model = Model::load(scratch.file("graph.toml", drift("nm/min"))).unwrap();
-    let other = Model::load(scratch.file("other.toml", drift("um/h"))).unwrap();
+    let model = Model::load(scratch.file("graph.toml", drift("30s"))).unwrap();
+    let other = Model::load(scratch.file("other.toml", drift("20s"))).unwrap();
     let replacement = Some(Replacement::default());
     let options = SessionOptions {
         replacement,

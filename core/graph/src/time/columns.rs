@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// The columns of the time, one or several whose cells are put together.
 ///
 /// ```
-/// use athermal_core::time::TimeColumns;
+/// use athermal_graph::time::TimeColumns;
 ///
 /// let columns: TimeColumns = "{Date} {Time}".parse().unwrap();
 /// assert_eq!(columns.names(), ["Date", "Time"]);

@@ -10,7 +10,7 @@ use athermal_core::document::{Memory, declare, load};
 fn plan() -> Plan {
     const GRAPH: &str = r#"
         schema = 1
-        signals.t = { unit = "K" }
+        signals.t = { unit = "K", channels = ["a"] }
         nodes.first = { type = "brittle", inputs.signal = "t" }
         nodes.second = { type = "brittle", inputs.signal = "first" }
         outputs.out = "second"
