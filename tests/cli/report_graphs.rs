@@ -351,7 +351,7 @@ fn what_cannot_be_judged_of_a_correction_is_told_and_the_rest_is_there() {
     assert!(
         reported
             .page()
-            .contains("Nothing is told of <b>other.S1</b>")
+            .contains("Nothing is known of <b>other.S1</b>")
     );
 }
 

@@ -430,19 +430,22 @@ fn noises_in_another_unit_than_the_truth_are_told() {
 }
 
 #[test]
-fn noises_and_intervals_out_of_range_are_told_all_at_once() {
+fn noises_and_intervals_out_of_range_are_reported_all_at_once() {
     let noises =
         r#"{ observation = "0 nm/min", level = "-3 nm/min", trend = "1 nm/min", per = "0s" }"#;
     let told = problems(&following(noises, "penalty = -1.0"));
     for part in [
-        "`observation` is \"0 nm/min\"",
-        "`level` is \"-3 nm/min\"",
-        "`per` is 0s",
-        "the level has no trend",
-        "`penalty` is -1",
+        "`observation` is 0 nm/min and must be greater than 0",
+        "`level` is -3 nm/min and must be 0 or more",
+        "`per` is 0s and must be greater than 0",
+        "`penalty` is -1 and must be 0 or more",
     ] {
         assert!(told.contains(part), "{part} in {told}");
     }
+    let trend =
+        r#"{ observation = "5 nm/min", level = "3 nm/min", trend = "1 nm/min", per = "1min" }"#;
+    let told = problems(&following(trend, ""));
+    assert!(told.contains("the level has no trend"), "{told}");
     let safe = format!(
         r#"{ONE_AXIS}
         [nodes.safe]

@@ -126,7 +126,7 @@ fn a_unit_that_the_name_contradicts_is_told() {
 #[test]
 fn a_log_of_temperatures_alone_is_told_that_nothing_drifts() {
     let refused = kinds("time_s,t_machine_degF\n").unwrap_err();
-    assert!(refused.starts_with("nothing in it drifts: t_machine_degF is a temperature"));
+    assert!(refused.starts_with("nothing in it drifts: t_machine_degF may explain a drift"));
 }
 
 #[test]

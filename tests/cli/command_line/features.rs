@@ -48,7 +48,7 @@ fn lists_of_orders_are_as_long_as_there_are_features() {
 }
 
 #[test]
-fn more_features_than_a_kind_takes_are_told_beside_its_other_mistakes() {
+fn more_features_than_a_kind_takes_are_reported() {
     let told = |name: &str, sensors: usize, node: &str, expected: &[(u64, &str)]| {
         assert_told(
             &format!("command-line-many-{name}"),
@@ -61,19 +61,15 @@ fn more_features_than_a_kind_takes_are_told_beside_its_other_mistakes() {
     let text = graph(40, "type = \"polynomial\"");
     let way_out = "name fewer features, or set `interactions = false`";
     assert!(checked("command-line-many-help", &text).contains(way_out));
-    let narx = [
-        (
-            14,
-            "41 features and lags give more than 500 products of up to 2",
-        ),
-        (19, "`most` is 0"),
-    ];
-    told(
-        "narx",
-        40,
-        "type = \"narx\"\nlags = [\"5min\"]\nmost = 0",
-        &narx,
-    );
+    let narx = [(
+        14,
+        "41 features and lags give more than 500 products of up to 2",
+    )];
+    let node = "type = \"narx\"\nlags = [\"5min\"]";
+    told("narx", 40, node, &narx);
+    // A parameter out of its range comes first.
+    let expected = [(19, "`most` is 0 and must be 1 or more")];
+    told("narx-most", 40, &format!("{node}\nmost = 0"), &expected);
     let space = [(14, "60 features over a horizon of 100 steps")];
     told("space", 60, "type = \"state_space\"\nhorizon = 100", &space);
 }
@@ -103,7 +99,7 @@ fn helped(name: &str, text: &str, wrong: &[(&str, &str, &str)]) {
 }
 
 #[test]
-fn a_number_without_its_unit_is_told_with_one_that_suits_it() {
+fn a_number_without_its_unit_is_reported_with_an_example() {
     let text = r#"schema = 1
 [signals.rate]
 unit = "nm/min"
@@ -134,12 +130,12 @@ loss = "radius"
         (
             "range = \"20 um\"",
             "range = 200",
-            "needs a unit, e.g. \"200 um\"",
+            "needs a unit, e.g. \"200 nm/min\"",
         ),
         (
             "range = \"20 um\"",
             "range = \"200\"",
-            "needs a unit, e.g. \"200 um\"",
+            "needs a unit, e.g. \"200 nm/min\"",
         ),
         (
             "below = \"3 nm/min\"",
@@ -149,7 +145,7 @@ loss = "radius"
         (
             "radii = [\"2 um\"]",
             "radii = [2]",
-            "needs a unit, e.g. \"2 um\"",
+            "needs a unit, e.g. \"2 nm/min\"",
         ),
         (
             "blend = \"5 nm/s\"",

@@ -193,7 +193,7 @@ position = "position.Y"
         (16, "the node \"drift\""),
         (21, "no key \"node\""),
         (25, "\"a b\" cannot be the name"),
-        (28, "a window of 0s"),
+        (28, "`windows` is 0s and must be greater than 0"),
         (31, "`temperatur`"),
     ];
     assert_told("command-line-sets", text, &expected);
@@ -225,8 +225,17 @@ inputs.signal = ["one", "two:slope", "tow"]
 shown = "shown"
 both = ["one", "two:other.a"]
 "#;
-    let expected = [(9, "nothing"), (11, "window"), (17, "soon"), (20, "tow")];
+    let expected = [(9, "nothing"), (11, "window"), (20, "tow")];
     assert_told("command-line-modules", text, &expected);
+    // What is given to a module counts once no module has a mistake.
+    let text = text
+        .replace("other = \"nothing\"", "other = \"slope\"")
+        .replace(
+            "module = \"pair\"\ninputs.from = \"temperature\"\n[nodes.two]",
+            "module = \"pair\"\ninputs.from = \"temperature\"\nwindow = \"5min\"\n[nodes.two]",
+        );
+    let expected = [(18, "soon"), (21, "tow")];
+    assert_told("command-line-module-parameters", &text, &expected);
 }
 
 /// Signals, and slopes of them, to which nodes with mistakes are added.
@@ -387,7 +396,6 @@ expect = [{ of = "one", given_above = 0.5 }]
 "#;
     let expected = [
         (7, "which does not convert"),
-        (11, "mn"),
         (13, "{form}"),
         (17, "{axes}"),
     ];
@@ -518,7 +526,7 @@ slopes = ["one", "two"]
 #[test]
 fn a_file_with_mistakes_of_its_syntax_is_read_no_further_and_all_of_them_are_reported() {
     let text = WRONG.replace("\"nm\"", "nm") + "also = what\n";
-    let expected = [(7, "not TOML"), (27, "not TOML")];
+    let expected = [(7, "not TOML"), (25, "not TOML")];
     assert_told("command-line-syntax", &text, &expected);
     let text = WRONG.replace("schema = 1\n", "schema = 1\nextends = \"none.toml\"\n");
     assert_told(

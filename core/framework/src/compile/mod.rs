@@ -137,6 +137,10 @@ fn planned(
         return Err(Box::new(Part { plan, broken }));
     }
     debug_assert_eq!(plan.check_order(), Ok(()));
-    steps::warn(graph, &plan, diagnostics);
+    // Of a graph that is otherwise whole: outputs that are missing or never have a value, and what nobody uses.
+    steps::check_use(graph, &plan, diagnostics);
+    if diagnostics.has_errors() {
+        return Err(Box::new(Part { plan, broken }));
+    }
     Ok(plan)
 }

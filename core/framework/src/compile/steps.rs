@@ -122,8 +122,8 @@ fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
     }
 }
 
-/// Tells of outputs that nothing flows into, and of nodes and signals that flow into no output.
-pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics) {
+/// Reports outputs that nothing flows into, and warns of nodes and signals that flow into no output.
+pub(super) fn check_use(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics) {
     if plan.outputs.is_empty() {
         diagnostics.report(graph.tree.place, problem::NoOutputs {});
         return;

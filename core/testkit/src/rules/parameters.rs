@@ -61,7 +61,7 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
                 (Err(why), _) if why.starts_with(PANICS) => {
                     found.push(format!("with `{path} = {value}` {why}"));
                 }
-                (Err(why), Allowed::Yes) if why.contains(name) => found.push(format!(
+                (Err(why), Allowed::Yes) if is_of(name, &why) => found.push(format!(
                     "`{path} = {value}` is allowed by the schema, and refused: {why}"
                 )),
                 // Something else does not go together with it.
@@ -70,6 +70,13 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
         }
     });
     none_of(found)
+}
+
+/// Whether a mistake is one of a parameter: it names it, and no other before it (`largest` must be above `smallest`).
+fn is_of(name: &str, why: &str) -> bool {
+    let message = why.lines().next().unwrap_or_default();
+    let first = message.split('`').nth(1);
+    why.contains(name) && first.is_none_or(|first| first.contains(name))
 }
 
 /// JSON without its nulls, which a graph file cannot hold.

@@ -175,14 +175,18 @@ proptest! {
 fn a_range_of_something_else_hides_no_other_mistake() {
     let text = GRAPH
         .replace("\"100 nm\"", "\"200 K\"")
-        .replace("600 nm/min", "2000 K/min")
-        .replace("\"4 nm/min\"", "\"-1 nm/min\"");
+        .replace("600 nm/min", "2000 K/min");
     let told = compiled(&text).0.unwrap_err();
     assert!(told.contains("its integral cannot be in K"), "{told}");
     let told_of_rate = "`max_rate` is in K/min, which cannot be in nm/min";
     assert!(told.contains(told_of_rate), "{told}");
-    assert!(told.contains("`deadband` is -1 nm/min"), "{told}");
-    assert_eq!(told.matches("error[").count(), 3, "{told}");
+    assert_eq!(told.matches("error[").count(), 2, "{told}");
+    // A parameter out of its range comes first.
+    let text = text.replace("\"4 nm/min\"", "\"-1 nm/min\"");
+    let told = compiled(&text).0.unwrap_err();
+    let deadband = "`deadband` is -1 nm/min and must be 0 or more";
+    assert!(told.contains(deadband), "{told}");
+    assert_eq!(told.matches("error[").count(), 1, "{told}");
 }
 
 #[test]

@@ -70,7 +70,9 @@ fn a_beam_needs_exactly_one_description() {
             .contains("2 `radii` for 3 axes")
     );
     let zero = LOSS.replace("preset = \"mandelli\"", "radii = [\"0 um\"]");
-    assert!(compiled(&zero).0.unwrap_err().contains("radius above 0"));
+    let told = compiled(&zero).0.unwrap_err();
+    let radii = "`radii` is 0 um and must be greater than 0";
+    assert!(told.contains(radii), "{told}");
     let named = LOSS.replace("\"X1\"", "\"roll\"");
     assert!(
         compiled(&named)

@@ -90,12 +90,13 @@ fn it_can_hold_or_go_to_a_stated_value() {
         .0
         .unwrap_err();
     assert!(told.contains("needs to know which"), "{told}");
-    let two = GRAPH.replace("\"zero\"", "\"bad\"");
-    let told = compiled(&two.replace("10 nm/s", "-10 nm/s")).0.unwrap_err();
-    assert!(
-        told.contains("when_lost") && told.contains("max_slew"),
-        "{told}"
-    );
+    let bad = compiled(&GRAPH.replace("\"zero\"", "\"bad\""));
+    let told = bad.0.unwrap_err();
+    assert!(told.contains("when_lost"), "{told}");
+    let negative = compiled(&GRAPH.replace("10 nm/s", "-10 nm/s"));
+    let told = negative.0.unwrap_err();
+    let max_slew = "`max_slew` is -10 nm/s and must be 0 or more";
+    assert!(told.contains(max_slew), "{told}");
     let rows: Vec<_> = (0..90)
         .map(|i| {
             (

@@ -29,12 +29,6 @@ faulty! {
     TakesAnyShape,
     /// Says that it migrates what is not its own.
     MigratesAny,
-    /// Takes an older form as if it were the present one.
-    TakesOlder,
-    /// Says that it migrates another form than it does.
-    MigratesOther,
-    /// Goes on in the older form.
-    StaysOld,
     /// Its state has no version.
     Unversioned,
     /// Takes nothing for zero.
@@ -111,7 +105,6 @@ impl Feature for Averages {
             counts: vec![0.0; channels],
             seen: Vec::new(),
             cleared: false.into(),
-            old: false,
         })
     }
 }
@@ -123,8 +116,6 @@ struct Averaging {
     counts: Vec<f64>,
     seen: Vec<f64>,
     cleared: std::cell::Cell<bool>,
-    /// Whether it goes on from an older form, and says so.
-    old: bool,
 }
 
 thread_local! {
@@ -203,12 +194,6 @@ impl Operator for Averaging {
         if self.fault == Fault::Unversioned {
             return Some(Box::new(Nameless {}));
         }
-        if self.old {
-            return Some(Box::new(Older {
-                sums: self.sums.clone(),
-                counts: self.counts.clone(),
-            }));
-        }
         self.cleared.set(self.fault == Fault::ClearedBySnapshot);
         (self.fault != Fault::ForgetsAll).then(|| {
             Box::new(Known {
@@ -219,23 +204,7 @@ impl Operator for Averaging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let state = match state.into_any().downcast::<Older>() {
-            Ok(older) => {
-                let from = match self.fault {
-                    Fault::TakesOlder => return Restored::Accepted,
-                    Fault::MigratesOther => "sabotaged_feature/7".to_owned(),
-                    _ => "sabotaged_feature/0".to_owned(),
-                };
-                self.old = self.fault == Fault::StaysOld;
-                if older.sums.len() != self.sums.len() {
-                    return Restored::cold("the number of channels differs");
-                }
-                (self.sums, self.counts) = (older.sums, older.counts);
-                return Restored::Migrated { from };
-            }
-            Err(state) => state,
-        };
-        match state.downcast::<Known>() {
+        match state.into_any().downcast::<Known>() {
             Ok(known)
                 if known.sums.len() == self.sums.len() || self.fault == Fault::TakesAnyShape =>
             {
@@ -262,15 +231,6 @@ struct Known {
 }
 
 athermal_core::state!(Known, "sabotaged_feature/1");
-
-/// What it wrote before.
-#[derive(Debug, Serialize, Deserialize)]
-struct Older {
-    sums: Vec<f64>,
-    counts: Vec<f64>,
-}
-
-athermal_core::state!(Older, "sabotaged_feature/0");
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Nameless {}
@@ -330,27 +290,12 @@ fn a_state_of_another_version_kind_or_shape_is_not_taken() {
 }
 
 #[test]
-fn a_state_is_migrated_from_an_older_form_of_its_own_to_the_present_one() {
-    for (fault, found) in [
-        (
-            "migrates_any",
-            "it says that it has migrated a state of another kind from ``, which it cannot have",
-        ),
-        (
-            "takes_older",
-            "a state `sabotaged_feature/0` is taken without saying that it is migrated",
-        ),
-        (
-            "migrates_other",
-            "a state `sabotaged_feature/0` is said to be migrated from `sabotaged_feature/7`",
-        ),
-        (
-            "stays_old",
-            "migrated from `sabotaged_feature/0`, its next state is `sabotaged_feature/0` and not `sabotaged_feature/1`",
-        ),
-    ] {
-        breaks_one::<Averages>(with(fault), Rule::Versions, found);
-    }
+fn a_state_of_another_kind_is_not_migrated() {
+    breaks_one::<Averages>(
+        with("migrates_any"),
+        Rule::Versions,
+        "it says that it has migrated a state of another kind from ``, which it cannot have",
+    );
 }
 
 #[test]
@@ -442,14 +387,6 @@ fn what_panics_is_told_how_to_find_where() {
         "answers: it panics: there is nothing to average\n  in the case: fault = \"panics\"\n  to do: a node answers with absence or \
          a `Mistake` where it cannot go on, and never panics; `RUST_BACKTRACE=1` shows where it does"
     );
-}
-
-#[test]
-#[should_panic(expected = "`nonsense` is none of [\"node.a\", \"node.b\"]")]
-fn a_bench_that_has_not_been_fed_knows_its_outputs() {
-    let bench = Bench::of(&Averages { fault: Fault::None });
-    assert_eq!(bench.output("node.a"), [0.0; 0]);
-    let _ = bench.output("nonsense");
 }
 
 #[test]
