@@ -239,7 +239,7 @@ fn by_name(choices: &[Value]) -> Option<Map<String, Value>> {
     ]))
 }
 
-/// Choices that are tables which one key tells apart, as an `if … then …` for each: what is wrong in a table is then told where it
+/// Choices that are tables which one key distinguishes, as an `if … then …` for each: what is wrong in a table is then reported where it
 /// stands, not as "none of these".
 fn by_tag(choices: &[Value]) -> Option<Map<String, Value>> {
     let first = choices.first()?["properties"].as_object()?;

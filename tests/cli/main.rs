@@ -6,6 +6,7 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+mod architecture_page;
 mod command_line;
 mod compare;
 mod data_warnings;

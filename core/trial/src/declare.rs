@@ -1,4 +1,4 @@
-//! Decides what `[[tests]]` mean for a graph: channels looked up, units checked, mistakes told where they stand.
+//! Decides what `[[tests]]` mean for a graph: channels looked up, units checked, mistakes reported where they stand.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ pub enum On {
     Synthetic(Synthetic),
 }
 
-/// What the tests of a graph are; `None` after any mistake, all of which are told. Schedules are read, and added to `sources`.
+/// What the tests of a graph are; `None` after any mistake, all of which are reported. Schedules are read, and added to `sources`.
 pub fn declare(
     graph: &GraphFile,
     plan: &Plan,
@@ -136,7 +136,7 @@ pub fn observe(plan: &mut Plan, trials: &[Trial]) {
     plan.observe(expectations.flat_map(|expectation| expectation.slots.iter().copied()));
 }
 
-/// The schedules that have been read for a machine, so that mistakes in one are told once; nothing for one that has any.
+/// The schedules that have been read for a machine, so that mistakes in one are reported once; nothing for one that has any.
 type Schedules = BTreeMap<(PathBuf, &'static str), Option<Schedule>>;
 
 /// Reads one test; what it expects is read in a file of its own.
@@ -279,7 +279,7 @@ impl Declaring<'_> {
                 return None;
             }
         };
-        // What one lacks is lacking in every test that simulates it, and told once.
+        // What one lacks is lacking in every test that simulates it, and reported once.
         if self.compared.insert(known.machine.name()) {
             let test = self.diagnostics.scope(None);
             self.measured_by(known.machine, place);
@@ -336,7 +336,7 @@ impl Declaring<'_> {
         }
     }
 
-    /// A schedule from its file, in which its mistakes are told.
+    /// A schedule from its file, in which its mistakes are reported.
     fn schedule(&mut self, path: &str, place: Place, machine: &dyn Machine) -> Option<Schedule> {
         let path = self.sources.resolve(place, path);
         let known = (path.clone(), machine.name());

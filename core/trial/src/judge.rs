@@ -355,7 +355,7 @@ impl Judge<'_> {
             });
             let found: Vec<_> = found.collect();
             let off = found.iter().flatten().find(|value| !wanted.admits(value.1));
-            // A segment without a value is told before one with a wrong one.
+            // A segment without a value is reported before one with a wrong one.
             let lacks = found.contains(&None);
             let shown = off.or_else(|| found.last()?.as_ref()).filter(|_| !lacks);
             return Finding {

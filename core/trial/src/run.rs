@@ -34,7 +34,7 @@ impl Verdict {
 
 /// Steps the plan over the data of a test, with its faults, and checks what comes out.
 ///
-/// The plan is one that [`super::observe`] has been told of the test.
+/// The plan is one that [`super::observe`] has seen the test.
 ///
 /// # Errors
 /// When the data cannot be read, a fault begins after their end, or the fit does not belong to the plan.

@@ -15,8 +15,8 @@ use crate::order::Order;
 /// steps, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit
 /// circle.
 ///
-/// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is told
-/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 tell the order), unless
+/// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is decided
+/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 choose the order), unless
 /// `differences` says so: without any it is ARMAX, and an offset that the rows of the fit did not have stays an error.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the

@@ -39,7 +39,7 @@ const LARGEST_PAST: usize = 1000;
 /// default the span of the truth, since truths whose windows overlap share their noise; where several come within a step,
 /// each begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
 /// series counts as so many steps, rounded. Running, it takes each truth that the embargo lets through; what those that
-/// are missing were is told from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
+/// are missing were is estimated from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
 /// missing in the fit, windows end and begin again. A segment begins with its first truth, as if that and the features had
 /// always been what they are, and so does what comes after more steps without features than ten, or than the model reaches
 /// back where that is more; with `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the

@@ -33,7 +33,7 @@ impl<'a> Tables<'a> {
             self.responses(),
             self.designs(),
             self.contributions(),
-            self.untold(),
+            self.silent_nodes(),
             self.days(),
             self.windows(),
         ];
@@ -278,8 +278,8 @@ impl<'a> Tables<'a> {
     }
 
     /// Which sensors could not be tried.
-    fn untold(&self) -> String {
-        let all = self.diagnosis.untold.iter();
+    fn silent_nodes(&self) -> String {
+        let all = self.diagnosis.silent_nodes.iter();
         let shown = all.filter(|of| {
             let node = of.estimator.as_ref();
             node.is_none_or(|node| self.shows_estimator(node))

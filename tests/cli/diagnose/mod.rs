@@ -369,7 +369,11 @@ fn a_sensor_that_is_watched_is_tried_like_any_other() {
     ];
     for watch in watches {
         let watched = facts(watch);
-        assert!(watched.untold.is_empty(), "{watch}: {:?}", watched.untold);
+        assert!(
+            watched.silent_nodes.is_empty(),
+            "{watch}: {:?}",
+            watched.silent_nodes
+        );
         for (of, as_free) in watched.contributions.iter().zip(&free.contributions) {
             assert_eq!(of.sensor, as_free.sensor);
             assert!(
@@ -389,8 +393,8 @@ fn a_sensor_that_is_watched_is_tried_like_any_other() {
     }
     let blind = facts("range = [\"-1 Cel\", \"1 Cel\"]");
     assert!(blind.contributions.is_empty() && blind.responses.is_empty());
-    let [untold] = &blind.untold[..] else {
-        panic!("{:?}", blind.untold)
+    let [untold] = &blind.silent_nodes[..] else {
+        panic!("{:?}", blind.silent_nodes)
     };
     assert_eq!(untold.estimator.as_deref(), Some("thermal"));
     assert_eq!(untold.silent, "sound");

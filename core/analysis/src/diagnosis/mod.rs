@@ -26,7 +26,7 @@ pub(crate) use plot::{
     Picture, autocorrelation as autocorrelation_picture, responses as response_pictures,
     with_truth as truth_picture,
 };
-pub use rest::Untold;
+pub use rest::SilentNode;
 
 use athermal_core::compile::origins::{inputs, of_truths, slots, upstream};
 use athermal_core::time::Duration;
@@ -56,7 +56,8 @@ pub struct Diagnosis {
     /// What each sensor contributes.
     pub contributions: Vec<sensor::Contribution>,
     /// What could not be found of sensors, and which node gave nothing.
-    pub untold: Vec<Untold>,
+    #[serde(rename = "untold")]
+    pub silent_nodes: Vec<SilentNode>,
     /// Combiners that went by fewer truths than they take, whichever predictions are asked for.
     pub lacks: Vec<Lack>,
     /// What fits on some days are worth on others; none where it was not asked for, or there are too few days or too many.
@@ -102,7 +103,7 @@ impl Diagnosis {
         self.responses.retain(|it| is_asked(&it.node, of));
         self.designs.retain(|it| is_asked(&it.node, of));
         self.contributions.retain(|it| is_asked(&it.prediction, of));
-        self.untold
+        self.silent_nodes
             .retain(|it| it.estimator.as_ref().is_none_or(|node| is_asked(node, of)));
         if let Some(days) = &mut self.days {
             let left_out = days.left_out.iter_mut().map(|it| &mut it.scores);
@@ -136,9 +137,9 @@ pub fn diagnose(
             prediction: plan.channels[of.slot].name.clone(),
         })
     });
-    let (responses, mut untold) = response::answers(model, &observation)?;
+    let (responses, mut silent_nodes) = response::answers(model, &observation)?;
     let (contributions, more) = sensor::contributions(model, recording, &observation)?;
-    untold.extend(more);
+    silent_nodes.extend(more);
     let diagnosis = Diagnosis {
         graph: plan.name.clone().unwrap_or_default(),
         main: main.collect(),
@@ -147,7 +148,7 @@ pub fn diagnose(
         responses,
         designs: regressor::designs(model, recording)?,
         contributions,
-        untold,
+        silent_nodes,
         lacks: observation.trace.lacks.clone(),
         days: match options.day {
             Some(day) => day::days(model, recording, &observation, day, progress)?,

@@ -21,7 +21,7 @@ use serde::Serialize;
 use super::observation::Observation;
 use super::of_truths;
 use super::reach;
-use super::rest::{Rest, Untold, silent};
+use super::rest::{Rest, SilentNode, silent};
 
 /// Instants of a response, at most.
 const MOST_INSTANTS: i64 = 2_000;
@@ -114,7 +114,7 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
 pub(super) fn answers(
     model: &Model,
     observation: &Observation,
-) -> Result<(Vec<Responses>, Vec<Untold>), FitError> {
+) -> Result<(Vec<Responses>, Vec<SilentNode>), FitError> {
     let plan = &*model.plan;
     let estimators: Vec<usize> = (0..plan.nodes.len())
         .filter(|&node| matches!(plan.nodes[node].role, PlannedRole::Estimator { .. }))
@@ -131,10 +131,10 @@ pub(super) fn answers(
         let fitted = model.fitted.get(&plan.nodes[node].instance());
         fitted.is_some_and(|of| !of.uses().is_empty())
     };
-    let mut untold = Vec::new();
+    let mut silent_nodes = Vec::new();
     for (&node, &slot) in estimators.iter().zip(&slots) {
         if uses(node) && probe.resting.value(slot).is_nan() {
-            untold.push(Untold {
+            silent_nodes.push(SilentNode {
                 sensor: None,
                 estimator: Some(plan.nodes[node].instance()),
                 silent: silent(plan, &probe.resting, slot),
@@ -150,7 +150,7 @@ pub(super) fn answers(
         let (answers, size, lost) = probe.run_somehow(source, size)?;
         for (nth, silent) in lost {
             if uses(estimators[nth]) {
-                untold.push(Untold {
+                silent_nodes.push(SilentNode {
                     sensor: Some(plan.sources[source].name.clone()),
                     estimator: Some(plan.nodes[estimators[nth]].instance()),
                     silent,
@@ -192,7 +192,7 @@ pub(super) fn answers(
         }
     });
     let facts = facts.filter(|of| !of.sensors.is_empty());
-    Ok((facts.collect(), untold))
+    Ok((facts.collect(), silent_nodes))
 }
 
 /// Which of the slots that are followed fell silent, each with the first node that gave nothing.

@@ -39,7 +39,7 @@ impl Rest {
 
 /// What could not be found of a sensor, since a node gave nothing when it was tried.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Untold {
+pub struct SilentNode {
     /// The sensor; none where nothing came even when all of them rested.
     pub sensor: Option<String>,
     /// The estimator whose answer is not known; none where it is what the sensor contributes.

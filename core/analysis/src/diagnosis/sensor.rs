@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::observation::{Observation, count_valid};
 use super::of_truths;
-use super::rest::{Rest, Untold, name};
+use super::rest::{Rest, SilentNode, name};
 
 /// A node that has a value at less than this share of its rows when a sensor rests has fallen silent.
 const STILL_THERE: f64 = 0.9;
@@ -44,17 +44,17 @@ pub fn contributions(
     model: &Model,
     recording: &dyn Recording,
     observation: &Observation,
-) -> Result<(Vec<Contribution>, Vec<Untold>), FitError> {
+) -> Result<(Vec<Contribution>, Vec<SilentNode>), FitError> {
     let plan = &*model.plan;
     let of_truth = of_truths(plan);
-    let (mut contributions, mut untold) = (Vec::new(), Vec::new());
+    let (mut contributions, mut silent_nodes) = (Vec::new(), Vec::new());
     for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
         if observation.sources[source].samples == 0 {
             continue;
         }
         let (rested, silent) = rested(model, recording, observation, source)?;
         if let Some(slot) = silent {
-            untold.push(Untold {
+            silent_nodes.push(SilentNode {
                 sensor: Some(plan.sources[source].name.clone()),
                 estimator: None,
                 silent: name(plan, slot),
@@ -69,7 +69,7 @@ pub fn contributions(
             }));
         }
     }
-    Ok((contributions, untold))
+    Ok((contributions, silent_nodes))
 }
 
 /// A pass with a sensor at rest, as still as no node falls silent by it; or else the first slot that does.

@@ -39,13 +39,13 @@ pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
     {
         found.extend(unfit("the output port", ports.iter().map(|port| port.name)));
         let listed = (subject.kind.ports)();
-        let is_told = |name: &str| {
+        let is_listed = |name: &str| {
             listed
                 .iter()
                 .any(|of| of.name == name && !of.summary.is_empty())
         };
         // The only port of a node need not be named by who reads it.
-        let unlisted = ports.iter().filter(|port| !is_told(port.name));
+        let unlisted = ports.iter().filter(|port| !is_listed(port.name));
         let unlisted = unlisted.filter(|_| ports.len() > 1 || !listed.is_empty());
         found.extend(unlisted.map(|port| {
             let name = port.name;
