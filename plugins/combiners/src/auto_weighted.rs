@@ -84,14 +84,14 @@ impl Combiner for AutoWeighted {
             let message = "`power` is for weights by inverse powers of errors";
             let help = "leave it out, or use `weights = \"inverse_power\"`";
             let mistake = Mistake::at("power", message).help(help);
-            mistakes.push(mistake.rests_on("weights"));
+            mistakes.push(mistake);
         }
         for (name, value) in [("shrinkage", self.shrinkage), ("floor", self.floor)] {
             if value > 0.0 && self.weights == Weighting::AsPrintedRaw {
                 let message = format!("`{name}` is for weights that add up to 1");
                 let help = "leave it out, or use `weights = \"as_printed\"`";
                 let mistake = Mistake::at(name, message).help(help);
-                mistakes.push(mistake.rests_on("weights"));
+                mistakes.push(mistake);
             }
         }
         mistakes

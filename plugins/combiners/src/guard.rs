@@ -58,7 +58,7 @@ impl Combiner for Guard {
                     "`min_truths` is {} and the memory holds {} at most",
                     self.min_truths, last.truths
                 );
-                vec![Mistake::at("min_truths", message).rests_on("memory.truths")]
+                vec![Mistake::at("min_truths", message)]
             }
             _ => Vec::new(),
         }

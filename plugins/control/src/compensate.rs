@@ -158,13 +158,13 @@ impl Compensate {
                 self.max_slew, self.max_rate
             );
             let mistake = Mistake::at("max_slew", message).help("allow at least the largest rate");
-            mistakes.push(mistake.rests_on("max_rate"));
+            mistakes.push(mistake);
         }
         if let (Some(below), Some(above)) = (below, above)
             && above < below
         {
             let message = "`stop.above` lies under `stop.below`";
-            mistakes.push(Mistake::at("stop.above", message).rests_on("stop.below"));
+            mistakes.push(Mistake::at("stop.above", message));
         }
         match (factor, range, max_rate, slew) {
             (Some(factor), Some(range), Some(rate), Some(slew)) if mistakes.is_empty() => {
@@ -246,9 +246,7 @@ impl Feature for Compensate {
         if !self.stop_in.is_empty() && inputs.port("state").is_empty() {
             let message = "`stop_in` needs to know the state";
             mistakes.push(
-                Mistake::at("stop_in", message)
-                    .help("add `inputs.state`, a `stability` node")
-                    .rests_on("inputs.state"),
+                Mistake::at("stop_in", message).help("add `inputs.state`, a `stability` node"),
             );
         }
         if !mistakes.is_empty() {

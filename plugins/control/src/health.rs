@@ -138,7 +138,7 @@ impl Health {
             read(self.noise_below.as_ref(), &difference, "noise_below").unwrap_or(f64::INFINITY);
         if least > most {
             let message = "`noise_below` lies under `noise_above`";
-            mistakes.push(Mistake::at("noise_below", message).rests_on("noise_above"));
+            mistakes.push(Mistake::at("noise_below", message));
         }
         if mistakes.is_empty() {
             Ok(Limits {

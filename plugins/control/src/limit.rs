@@ -74,6 +74,5 @@ pub(crate) fn same_count(
         );
         Mistake::at(format!("inputs.{port}"), message)
             .help("both go together one by one, in the same order")
-            .rests_on(format!("inputs.{other}"))
     })
 }

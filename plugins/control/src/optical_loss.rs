@@ -83,12 +83,12 @@ impl OpticalLoss {
             (Some(_), Some(_)) => {
                 let message = "`radii` and `preset` both say how wide the beam is";
                 let mistake = Mistake::at("preset", message).help("leave one of them out");
-                mistakes.push(mistake.rests_on("radii"));
+                mistakes.push(mistake);
             }
             (None, None) => {
                 let message = "nothing says how wide the beam is";
                 let help = "give `radii = [\"2 um\"]`, or `preset = \"mandelli\"`";
-                mistakes.push(Mistake::at("radii", message).help(help).rests_on("preset"));
+                mistakes.push(Mistake::at("radii", message).help(help));
             }
             (Some(_), None) if count != 1 && count != drift.len() => {
                 let message = format!("there are {count} `radii` for {} axes", drift.len());

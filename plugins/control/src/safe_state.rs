@@ -85,7 +85,7 @@ impl SafeState {
                 let mistake =
                     Mistake::at("when_lost", "`when_lost = \"value\"` needs to know which");
                 let help = format!("add `value = \"0 {}\"`", channel.unit);
-                mistakes.push(mistake.help(help).rests_on("value"));
+                mistakes.push(mistake.help(help));
                 None
             }
             (WhenLost::Hold | WhenLost::Zero, Some(_)) => {
@@ -93,7 +93,7 @@ impl SafeState {
                     "value",
                     "`value` has a meaning only with `when_lost = \"value\"`",
                 );
-                mistakes.push(mistake.rests_on("when_lost"));
+                mistakes.push(mistake);
                 None
             }
         };

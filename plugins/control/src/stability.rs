@@ -77,7 +77,7 @@ impl Stability {
                 "`transient_above` ({}) lies below `stable_below` ({})",
                 self.transient_above, self.stable_below
             );
-            mistakes.push(Mistake::at("transient_above", message).rests_on("stable_below"));
+            mistakes.push(Mistake::at("transient_above", message));
         }
         let hysteresis = hysteresis.unwrap_or(0.0);
         if let Some(stable) = stable
@@ -85,11 +85,8 @@ impl Stability {
             && hysteresis > 0.0
         {
             let message = "with such a `hysteresis` an axis can never become stable again";
-            mistakes.push(
-                Mistake::at("hysteresis", message)
-                    .help("it must be below `stable_below`")
-                    .rests_on("stable_below"),
-            );
+            mistakes
+                .push(Mistake::at("hysteresis", message).help("it must be below `stable_below`"));
         }
         match (stable, transient) {
             (Some(stable), Some(transient)) if mistakes.is_empty() => Ok(Limits {

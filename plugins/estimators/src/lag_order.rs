@@ -29,14 +29,10 @@ impl LagOrder {
         let of_features = (!self.feature_lags.is_empty()).then_some(self.feature_lags.len());
         let most = [Some(self.lags.len()), of_features, None, None, None, None];
         let mut mistakes = self.order.mistakes(most);
-        for (letter, lags) in [("order.na", "lags"), ("order.nb", "feature_lags")] {
-            let of_letter = mistakes.iter_mut().filter(|mistake| mistake.at == letter);
-            of_letter.for_each(|mistake| mistake.rests_on.push(lags.to_owned()));
-        }
         if selects {
             let message = "either `order` or `selection` says which lags are used";
             let mistake = Mistake::at("order", message).help("leave one of them out");
-            mistakes.push(mistake.rests_on("selection"));
+            mistakes.push(mistake);
         }
         mistakes
     }

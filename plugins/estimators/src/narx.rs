@@ -101,12 +101,7 @@ impl Estimator for Narx {
         );
         let mistake = Mistake::at("inputs.features", message)
             .help("name fewer features, fewer lags, or a lower `degree`");
-        vec![
-            mistake
-                .rests_on("lags")
-                .rests_on("feature_lags")
-                .rests_on("degree"),
-        ]
+        vec![mistake]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -162,7 +162,6 @@ impl Penalty {
         let (smallest, largest, _) = choice.range();
         let message = format!("`largest` is {largest} and must be above `smallest`");
         let mistake = Mistake::at(format!("{place}.largest"), message);
-        let mistake = mistake.rests_on(format!("{place}.smallest"));
         Vec::from_iter((largest <= smallest).then_some(mistake))
     }
 

@@ -78,7 +78,7 @@ impl Estimator for Polynomial {
             "name fewer features"
         };
         let mistake = Mistake::at("inputs.features", message).help(fewer);
-        vec![mistake.rests_on("squares").rests_on("interactions")]
+        vec![mistake]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -170,7 +170,7 @@ impl StateSpace {
         );
         let mistake =
             Mistake::at("inputs.features", message).help(format!("name fewer features{shorter}"));
-        vec![mistake.rests_on("states").rests_on("horizon")]
+        vec![mistake]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

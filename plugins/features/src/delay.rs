@@ -116,9 +116,7 @@ impl Feature for Delay {
                     "a delay that closes a loop must say its unit",
                 );
                 return Err(vec![
-                    mistake
-                        .help("add `unit = \"nm\"`, the unit of what it delays")
-                        .rests_on("unit"),
+                    mistake.help("add `unit = \"nm\"`, the unit of what it delays"),
                 ]);
             }
             (Some(unit), channels) => {

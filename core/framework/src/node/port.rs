@@ -174,8 +174,6 @@ pub struct Mistake {
     pub message: String,
     /// What to write instead.
     pub help: Option<String>,
-    /// The other parameters on which it rests: what makes the one at fault wrong, and would be no mistake with others.
-    pub rests_on: Vec<String>,
 }
 
 impl Mistake {
@@ -186,7 +184,6 @@ impl Mistake {
             at: at.into(),
             message: message.into(),
             help: None,
-            rests_on: Vec::new(),
         }
     }
 
@@ -200,14 +197,6 @@ impl Mistake {
                 Self::at(*at, format!("`{at}` has {found} and must have {needed}"))
             })
             .collect()
-    }
-
-    /// Names another parameter on which the mistake rests (`solver.alpha`, or `inputs.PORT`): it is not reported where that one
-    /// cannot be read, since the mistake may go with that one's.
-    #[must_use]
-    pub fn rests_on(mut self, parameter: impl Into<String>) -> Self {
-        self.rests_on.push(parameter.into());
-        self
     }
 
     /// Adds the way out.

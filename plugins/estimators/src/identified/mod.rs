@@ -156,7 +156,7 @@ impl Asked {
                 let (orders, features) =
                     (counted(list.len(), "order"), counted(features, "feature"));
                 let message = format!("`{name}` has {orders} for {features}");
-                let mistake = Mistake::at(name, message).rests_on("inputs.features");
+                let mistake = Mistake::at(name, message);
                 mistakes.push(mistake.help("one number stands for all"));
             }
         }

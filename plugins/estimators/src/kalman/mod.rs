@@ -184,8 +184,7 @@ impl Noises {
             let message = "a level with a trend does not return to a mean";
             mistakes.push(
                 Mistake::at("noises.returns", message)
-                    .help("leave `returns` out, or say `trend = false`")
-                    .rests_on("trend"),
+                    .help("leave `returns` out, or say `trend = false`"),
             );
         }
         match (&self.trend, trend) {
@@ -194,13 +193,11 @@ impl Noises {
                     "noises",
                     "the level has a trend, and `noises` lacks `trend`",
                 )
-                .help("0 of the unit of the level is a trend that stays as it is")
-                .rests_on("trend"),
+                .help("0 of the unit of the level is a trend that stays as it is"),
             ),
             (Some(_), false) => mistakes.push(
                 Mistake::at("noises.trend", "the level has no trend that could wander")
-                    .help("say `trend = true` beside `noises`")
-                    .rests_on("trend"),
+                    .help("say `trend = true` beside `noises`"),
             ),
             _ => {}
         }
