@@ -1,5 +1,7 @@
 //! Decides what is tried of a node, rule by rule.
 
+#![allow(clippy::field_reassign_with_default)]
+
 mod absence;
 mod allocation;
 mod answers;
