@@ -83,7 +83,7 @@ impl Rule {
             }
             Self::Names => {
                 "take another name, and begin those of states and predictors with that of the kind: all crates of a program share them. \
-                 Ports and kinds are a letter, then letters, digits, `_` and `-`; a feature of several output ports tells them by `ports`"
+                 Ports and kinds are a letter, then letters, digits, `_` and `-`; a feature of several output ports declares them in `ports`"
             }
             Self::Answers => {
                 "give the case what a graph file needs too, such as `ahead = \"5min\"` in `Case::new`, and inputs with which the node has \

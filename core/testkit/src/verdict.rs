@@ -44,24 +44,19 @@ fn indented(text: &str) -> String {
 pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     let name = T::kind_name();
     let kind = kind(name).expect("a type with a specification is registered");
+    let in_all = |rule, found: Vec<String>| -> Vec<Broken> {
+        let each = |found| broken_in(rule, None, found);
+        found.into_iter().map(each).collect()
+    };
     let shared = rules::shared(kind);
     if !shared.is_empty() {
         // No graph with it can be compiled.
-        let shared = shared.into_iter();
-        return shared
-            .map(|found| broken_in(Rule::Names, None, found))
-            .collect();
+        return in_all(Rule::Names, shared);
     }
-    let mut broken: Vec<Broken> = rules::explained(kind)
-        .into_iter()
-        .map(|found| broken_in(Rule::Explained, None, found))
-        .collect();
+    let mut broken = in_all(Rule::Explained, rules::explained(kind));
     if cases.is_empty() {
-        broken.push(broken_in(
-            Rule::Answers,
-            None,
-            "there is no case to try it in".to_owned(),
-        ));
+        let found = "there is no case to try it in".to_owned();
+        broken.push(broken_in(Rule::Answers, None, found));
     }
     let mut subjects = subjects(kind, cases, &mut broken);
     let of_learning = derived::of_learning(&subjects);

@@ -17,11 +17,14 @@ pub trait State: fmt::Debug + Send + Sync {
     fn into_any(self: Box<Self>) -> Box<dyn Any>;
 }
 
+/// Reads a state of one form.
+type ReadState = fn(&[u8]) -> Result<Box<dyn State>, decode::Error>;
+
 /// How a state of one name is read. A reader of one format alone is a tenth of the code of one for any format.
 #[doc(hidden)]
 pub struct StateForm {
     pub name: &'static str,
-    pub read: fn(&[u8]) -> Result<Box<dyn State>, decode::Error>,
+    pub read: ReadState,
 }
 
 inventory::collect!(StateForm);

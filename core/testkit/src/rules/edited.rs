@@ -19,19 +19,17 @@ pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
     let text = text_of(subject, &subject.fitted)?;
     let model: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
     let mut places = Vec::new();
-    find(
-        &model["fitted"][NODE],
-        &format!("/fitted/{NODE}"),
-        &mut places,
-    );
+    let at = format!("/fitted/{NODE}");
+    find(&model["fitted"][NODE], &at, &mut places);
     for place in &places {
-        for (edit, what) in EDITS {
+        let value = model.pointer(place).unwrap_or(&Value::Null);
+        for (other, what) in edits(value).into_iter().filter(|edit| edit.0 != *value) {
             let mut edited = model.clone();
-            edited.pointer_mut(place).map(edit);
-            if edited != model {
-                tried(|| runs(subject, &edited))
-                    .map_err(|found| format!("with {what} {place}, {found}"))?;
+            if let Some(value) = edited.pointer_mut(place) {
+                *value = other;
             }
+            tried(|| runs(subject, &edited))
+                .map_err(|found| format!("with {what} {place}, {found}"))?;
         }
     }
     // Lists whose lengths are held against each other are all empty only where none is forgotten.
@@ -45,41 +43,19 @@ pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
     tried(|| runs(subject, &hollow)).map_err(|found| format!("with every list empty, {found}"))
 }
 
-/// What may have been done to a list or number, and to what it changes nothing of the rest.
-type Edit = fn(&mut Value);
-
-const EDITS: [(Edit, &str); 5] = [
-    (
-        |value| in_list(value, |list| drop(list.pop())),
-        "the last dropped of",
-    ),
-    (
-        |value| in_list(value, |list| drop(list.drain(..list.len().min(1)))),
-        "the first dropped of",
-    ),
-    (|value| in_list(value, Vec::clear), "nothing left of"),
-    (
-        |value| {
-            in_list(value, |list| {
-                list.push(list.last().cloned().unwrap_or_else(|| json!(1.0)))
-            })
-        },
-        "one more in",
-    ),
-    (
-        |value| {
-            if value.is_u64() {
-                *value = json!(MANY)
-            }
-        },
-        "a large number in place of",
-    ),
-];
-
-fn in_list(value: &mut Value, edit: fn(&mut Vec<Value>)) {
-    if let Some(list) = value.as_array_mut() {
-        edit(list);
-    }
+/// What may have been done to a list, or to a number that counts.
+fn edits(value: &Value) -> Vec<(Value, &'static str)> {
+    let Value::Array(list) = value else {
+        return vec![(json!(MANY), "a large number in place of")];
+    };
+    let more = list.last().cloned().unwrap_or_else(|| json!(1.0));
+    let shorter = list.len().saturating_sub(1);
+    vec![
+        (json!(list[..shorter]), "the last dropped of"),
+        (json!(list[list.len() - shorter..]), "the first dropped of"),
+        (json!([]), "nothing left of"),
+        (json!([&list[..], &[more]].concat()), "one more in"),
+    ]
 }
 
 /// The places of lists and of numbers that count, as JSON pointers.

@@ -1,7 +1,5 @@
 //! Decides what is tried of a node, rule by rule.
 
-#![allow(clippy::field_reassign_with_default)]
-
 mod absence;
 mod allocation;
 mod answers;
@@ -148,8 +146,10 @@ impl<'a> Subject<'a> {
     /// # Errors
     /// What the fit says where it gives nothing.
     pub(super) fn fit(&self, table: &Table, threads: usize) -> Result<Fitted, String> {
-        let mut options = FitOptions::default();
-        options.threads = threads;
+        let options = FitOptions {
+            threads,
+            ..FitOptions::default()
+        };
         let (fitted, report) = fit(&self.fixture.plan, table, &options, &mut |_| ())
             .map_err(|error| error.to_string())?;
         for estimator in &report.estimators {

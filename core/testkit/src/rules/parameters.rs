@@ -49,24 +49,21 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
             };
             let (path, name, value) = (part.path.join("."), part.name(), inline_toml(&value));
             let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
-            match (read, allowed) {
-                (Ok(_), Allowed::No) => {
-                    found.push(format!("`{path} = {value}` is accepted"));
-                }
-                (Ok(fixture), _) => {
-                    if let Err(why) = tried(|| lives(subject, &fixture)) {
-                        found.push(format!("with `{path} = {value}` {why}"));
-                    }
-                }
+            found.push(match (read, allowed) {
+                (Ok(_), Allowed::No) => format!("`{path} = {value}` is accepted"),
+                (Ok(fixture), _) => match tried(|| lives(subject, &fixture)) {
+                    Ok(()) => continue,
+                    Err(why) => format!("with `{path} = {value}` {why}"),
+                },
                 (Err(why), _) if why.starts_with(PANICS) => {
-                    found.push(format!("with `{path} = {value}` {why}"));
+                    format!("with `{path} = {value}` {why}")
                 }
-                (Err(why), Allowed::Yes) if is_of(name, &why) => found.push(format!(
-                    "`{path} = {value}` is allowed by the schema, and refused: {why}"
-                )),
+                (Err(why), Allowed::Yes) if is_of(name, &why) => {
+                    format!("`{path} = {value}` is allowed by the schema, and refused: {why}")
+                }
                 // Something else does not go together with it.
-                (Err(_), _) => {}
-            }
+                (Err(_), _) => continue,
+            });
         }
     });
     none_of(found)
