@@ -126,7 +126,7 @@ fn the_kit_says_so_before_anything_else() {
         [
             "names: the name of the state `kept/1` is taken twice, by `athermal-testkit` and `keepers`\n  to do: take another name, and \
           begin those of states and predictors with that of the kind: all crates of a program share them. Ports and kinds are a \
-          letter, then letters, digits, `_` and `-`; a feature of several output ports tells them by `ports`"
+          letter, then letters, digits, `_` and `-`; a feature of several output ports declares them in `ports`"
         ]
     );
 }
