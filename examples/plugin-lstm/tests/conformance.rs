@@ -1,8 +1,8 @@
 //! Every kind of this crate through the rules that every node keeps.
 
+use athermal_lstm::{Lstm, LstmEncoder};
 use athermal_testkit::conformance;
 use athermal_testkit::{Case, assert_every_kind_conforms};
-use athermal_lstm::{Lstm, LstmEncoder};
 
 conformance!(
     Lstm,
