@@ -1,10 +1,10 @@
 //! A machine of athermal: a body on a heated chuck, and an axis that grows with it.
 
+use athermal_core::prng::Prng;
 use athermal_trial::machine::schedule::Track;
 use athermal_trial::machine::{
     Channel, Machine, Row, SECOND_NS, Schedule, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
-use athermal_core::prng::Prng;
 
 /// The machine `my-node`.
 ///

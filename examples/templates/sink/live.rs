@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use athermal::Model;
-use athermal::run::live;
 use athermal::files::{Options, Reader, layout};
+use athermal::run::live;
 use my_node::MyNode;
 
 #[test]

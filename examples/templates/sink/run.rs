@@ -7,8 +7,8 @@ use std::io::stdout;
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::run::live;
 use athermal::files::{Options, Reader, layout};
+use athermal::run::live;
 use my_node::MyNode;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -6,8 +6,8 @@
 use std::io::BufRead;
 
 use athermal_core::compile::Plan;
-use athermal_run::recording::{Event, Samples, Source, SourceError};
 use athermal_core::time::Instant;
+use athermal_run::recording::{Event, Samples, Source, SourceError};
 
 /// Lines from whatever has lines: standard input, a serial port, a socket.
 pub struct MyNode<R> {

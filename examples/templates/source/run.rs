@@ -7,8 +7,8 @@ use std::io::stdin;
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::run::live;
 use athermal::files::{Flush, Writer};
+use athermal::run::live;
 use my_node::MyNode;
 
 fn main() -> Result<(), Box<dyn Error>> {
