@@ -133,12 +133,11 @@ fn planned(
     resolver.find_leaks();
     let outputs = resolver.outputs();
     let (plan, broken) = resolver.finish(outputs, wanted);
-    if diagnostics.has_errors() {
-        return Err(Box::new(Part { plan, broken }));
+    if !diagnostics.has_errors() {
+        debug_assert_eq!(plan.check_order(), Ok(()));
+        // Of a graph that is otherwise whole: outputs that are missing or never have a value, and what nobody uses.
+        steps::check_use(graph, &plan, diagnostics);
     }
-    debug_assert_eq!(plan.check_order(), Ok(()));
-    // Of a graph that is otherwise whole: outputs that are missing or never have a value, and what nobody uses.
-    steps::check_use(graph, &plan, diagnostics);
     if diagnostics.has_errors() {
         return Err(Box::new(Part { plan, broken }));
     }
