@@ -155,6 +155,11 @@ fn cases() -> Vec<Case> {
             windows_1252(&warm),
             &["encoding = \"windows-1252\"", "decimal = \",\""],
         ),
+        (
+            "code page 1252 in the units alone",
+            windows_1252(&with_line(&plain(), 1, "s,\u{b0}C,\u{b5}m")),
+            &["encoding = \"windows-1252\"", "units = 2"],
+        ),
         case("sep=,", format!("sep=,\n{}", plain()), &["skip = 1"]),
         case(
             "semicolons and decimal commas",

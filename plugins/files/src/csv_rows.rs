@@ -177,7 +177,7 @@ impl CsvRows {
         self.head.skip
     }
 
-    /// Whether the names are not in UTF-8, and were taken for Windows-1252.
+    /// Whether the names or the units are not in UTF-8, and were taken for Windows-1252.
     pub fn is_windows_1252(&self) -> bool {
         self.windows_1252
     }
@@ -253,6 +253,7 @@ impl CsvRows {
                 found: format!("`{found}` stands here"),
             });
         }
+        self.windows_1252 |= std::str::from_utf8(self.lines.text()).is_err();
         self.units = row.to_vec();
         self.units.resize(self.names.len(), String::new());
         self.report_units(&mut ledger.report);
