@@ -1,9 +1,6 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
-mod days;
-mod instances;
 mod next;
-mod responses;
 mod tables;
 
 use std::collections::BTreeSet;
@@ -112,9 +109,7 @@ impl Diagnose {
             outside_fit: beyond::beyond(model.sample_ranges(), &trace.ranges),
         };
         if terminal.format == Format::Json {
-            let mut asked = diagnosis.clone();
-            asked.keep_only(&self.of);
-            let mut facts = json!({ "data": self.data.names(), "diagnosis": asked });
+            let mut facts = json!({ "data": self.data.names(), "diagnosis": tables.shown() });
             doubts.add_to(&mut facts);
             println!("{facts:#}");
         } else {
