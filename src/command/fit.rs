@@ -88,6 +88,7 @@ impl Fit {
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
         self.doubt_tests(&model, sources, terminal);

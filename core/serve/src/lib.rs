@@ -4,7 +4,8 @@
 //!
 //! # A reader's path
 //!
-//! [`sequencer::Sequencer`] first: it decides which samples make a tick, and when.
+//! [`sequencer::Sequencer`] first: it decides which samples make a tick, and when. Then [`journal::Record`], which is such a decision in
+//! the journal, and [`replay::Replay`], which applies it again.
 //!
 //! # The layers
 //!
@@ -12,9 +13,16 @@
 //! |---|---|
 //! | [`moment`] | time that the host's clock does not touch |
 //! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
+//! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
+//! | [`replay`] | a log through an engine, to the same bits |
 
+pub mod journal;
 pub mod moment;
+pub mod replay;
 pub mod sequencer;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, time};
+use athermal_core::{channel, compile, engine, time};
+
+#[cfg(test)]
+mod tests;

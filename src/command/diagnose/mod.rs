@@ -82,6 +82,7 @@ impl Diagnose {
             )));
         }
         self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
         let model = load_fitted(&self.model, Wanted::default(), terminal)?;
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
