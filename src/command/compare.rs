@@ -174,6 +174,7 @@ impl Compare {
         scored: &ScoreOptions,
         terminal: &Terminal,
     ) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
+        self.data.check_offsets(&self.on)?;
         let on = self.data.others(self.on.clone());
         if self.graphs.len() > 1 {
             self.data.check_lasting("--data")?;

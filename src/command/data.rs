@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-use athermal::Model;
 use athermal::core::compile::Plan;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use athermal::run::model::DataCard;
+use athermal::{Duration, Model};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::json;
@@ -22,7 +22,7 @@ use athermal_analysis::figures::{DATES_S, count, counted, instant};
 /// Recorded data.
 #[derive(Debug, Args)]
 pub struct Data {
-    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given
+    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time
     #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     files: Vec<PathBuf>,
     /// Take cells and rows that cannot be read as missing, and count them
@@ -31,6 +31,25 @@ pub struct Data {
     /// Take each file as a segment of its own, also where its times go on: windows, lags and filters start afresh with it
     #[arg(long)]
     segments: bool,
+    /// Merge files of different columns by time although their times are no dates: all of them count from one instant
+    #[arg(long, conflicts_with = "segments")]
+    merge: bool,
+    /// Add this to the times of a file, whose clock is behind by it (negative: ahead): `positions.csv=1.5s`. `diagnose` estimates it
+    #[arg(long = "offset", value_name = "FILE=TIME", value_parser = offset)]
+    offsets: Vec<(PathBuf, Duration)>,
+}
+
+/// Reads a file and what is added to its times.
+fn offset(text: &str) -> Result<(PathBuf, Duration), String> {
+    let (file, by) = text
+        .rsplit_once('=')
+        .ok_or("expected a file and a time, such as `positions.csv=1.5s`")?;
+    let (sign, length) = match by.strip_prefix(['-', '−']) {
+        Some(length) => (-1, length),
+        None => (1, by.strip_prefix('+').unwrap_or(by)),
+    };
+    let length: Duration = length.parse().map_err(|error| format!("{error}"))?;
+    Ok((file.into(), Duration::from_ns(sign * length.as_ns())))
 }
 
 /// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
@@ -54,6 +73,35 @@ impl Data {
             files,
             lenient: false,
             segments: false,
+            merge: false,
+            offsets: Vec::new(),
+        }
+    }
+
+    /// The files that the name in an offset stands for: a path, or the name of files in any folder.
+    fn named<'a>(&'a self, name: &'a Path) -> impl Iterator<Item = &'a PathBuf> {
+        let is_it = move |file: &&PathBuf| {
+            **file == *name || file.file_name().is_some_and(|of| of == name.as_os_str())
+        };
+        self.files.iter().filter(is_it)
+    }
+
+    /// Refuses an offset of a file that is neither among these nor among others.
+    ///
+    /// # Errors
+    /// When there is one.
+    pub fn check_offsets(&self, others: &[PathBuf]) -> Result<(), Failure> {
+        let others = self.others(others.to_vec());
+        let unknown = |(file, _): &&(PathBuf, Duration)| {
+            self.named(file).chain(others.named(file)).next().is_none()
+        };
+        match self.offsets.iter().find(unknown) {
+            Some((file, _)) => Err(Failure::Request(format!(
+                "--offset {}: this is none of the files of the data, which are {}",
+                file.display(),
+                self.names().join(", ")
+            ))),
+            None => Ok(()),
         }
     }
 
@@ -93,17 +141,25 @@ impl Data {
             files,
             lenient: self.lenient,
             segments: self.segments,
+            merge: self.merge,
+            offsets: self.offsets.clone(),
         }
     }
 
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
+        let offsets = self.offsets.iter().flat_map(|(name, by)| {
+            let files = self.named(name);
+            files.map(|file| (file.clone(), by.as_ns()))
+        });
         Dataset::new(
             self.files.clone(),
             Options {
                 lenient: self.lenient,
                 segments: self.segments,
+                merge: self.merge,
+                offsets: offsets.collect(),
                 ..Options::default()
             },
         )
@@ -112,9 +168,18 @@ impl Data {
     /// These files as a command for a shell names them; more of them may follow.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
-        let options = [(self.lenient, "--lenient"), (self.segments, "--segments")];
+        let options = [
+            (self.lenient, "--lenient"),
+            (self.segments, "--segments"),
+            (self.merge, "--merge"),
+        ];
         let options = options.into_iter().filter(|(given, _)| *given);
         let options = options.map(|(_, option)| option.to_owned());
+        let offsets = self.offsets.iter().flat_map(|(file, by)| {
+            let offset = format!("{}={by}", file.display());
+            ["--offset".to_owned(), quoted(&offset)]
+        });
+        let options = options.chain(offsets);
         let files = self.files.iter();
         let files = files.map(|path| quoted(&path.display().to_string()));
         let words = options.chain(["--data".to_owned()]);

@@ -72,6 +72,7 @@ impl Evaluate {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
         self.scored.check(&model)?;
+        self.data.check_offsets(&[])?;
         let dataset = self.data.dataset();
         let options = ScoreOptions {
             each_on_its_own: self.each_on_its_own,

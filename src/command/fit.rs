@@ -9,7 +9,7 @@ use athermal::core::diagnostic::Sources;
 use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
 use athermal::run::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
-use athermal::run::model::{Card, EstimatorCard, Period};
+use athermal::run::model::{Card, EstimatorCard};
 use clap::Args;
 use serde_json::json;
 
@@ -24,7 +24,7 @@ use super::threads::Threads;
 use crate::invocation::{next, program, quoted};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal_analysis::figures::{count, counted, number, paragraph, seconds, table};
+use athermal_analysis::figures::{count, counted, number, paragraph, table};
 
 /// Fit a graph on recorded data
 ///
@@ -88,6 +88,7 @@ impl Fit {
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
         self.doubt_tests(&model, sources, terminal);
@@ -176,12 +177,11 @@ impl Fit {
             let estimators: Vec<_> = report
                 .estimators
                 .iter()
-                .map(|fit| match (&fit.outcome, card(fit)) {
-                    (_, Some(card)) => json!(card),
-                    (Outcome::Failed(error), None) => {
+                .map(|fit| match &fit.outcome {
+                    Outcome::Fitted(_) => json!(EstimatorCard::of(fit)),
+                    Outcome::Failed(error) => {
                         json!({ "node": fit.node, "error": error.to_string() })
                     }
-                    (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
             let mut facts = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
@@ -232,18 +232,7 @@ pub fn fit_on(
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());
     faults::warn(terminal, &outcome.faults);
-    model.card = Some(Card {
-        athermal: env!("CARGO_PKG_VERSION").to_owned(),
-        created: created(),
-        data: data.cards(dataset)?,
-        period: report.period.map(|(from, to)| Period {
-            from_s: seconds(from),
-            to_s: seconds(to),
-        }),
-        ticks: report.ticks,
-        ranges: report.ranges.clone(),
-        estimators: report.estimators.iter().filter_map(short_card).collect(),
-    });
+    model.card = Some(Card::of(report, data.cards(dataset)?, created()));
     Ok(outcome)
 }
 
@@ -445,35 +434,6 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         text.push_str(&paragraph("  note:", 6, note));
     }
     text
-}
-
-fn card(fit: &EstimatorFit) -> Option<EstimatorCard> {
-    let Outcome::Fitted(report) = &fit.outcome else {
-        return None;
-    };
-    Some(EstimatorCard {
-        node: fit.node.clone(),
-        kind: fit.kind.to_owned(),
-        truth: fit.truth.clone(),
-        unit: fit.unit.clone(),
-        rows: fit.rows,
-        dropped: fit.dropped,
-        dropped_candidates: fit.dropped_candidates.clone(),
-        report: report.clone(),
-    })
-}
-
-/// How many candidates of each step a model keeps: the one taken, and the next best.
-const CANDIDATES_KEPT: usize = 2;
-
-/// A card as a model keeps it.
-fn short_card(fit: &EstimatorFit) -> Option<EstimatorCard> {
-    let mut card = card(fit)?;
-    let report = &mut card.report;
-    for step in report.selection.iter_mut().chain(&mut report.refused) {
-        step.candidates.truncate(CANDIDATES_KEPT);
-    }
-    Some(card)
 }
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.

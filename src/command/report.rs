@@ -52,6 +52,7 @@ impl Report {
     /// When the model or the data cannot be used, or a file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
         if let Some(output) = &self.output {
             if output.as_os_str() == "-" && terminal.format == Format::Json {
                 let message = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";

@@ -36,6 +36,7 @@ mod report;
 mod report_graphs;
 mod restarted_pipes;
 mod schema;
+mod several_loggers;
 mod shipped_graphs;
 mod starter_graphs;
 mod stopped_runs;

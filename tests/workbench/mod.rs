@@ -31,6 +31,16 @@ pub fn data() -> Option<PathBuf> {
     None
 }
 
+/// The folder of a case: a log as somebody has it, with what is right; nothing, with a remark, where this machine lacks it.
+pub fn case(name: &str) -> Option<PathBuf> {
+    let case = data()?.with_file_name("cases").join(name);
+    if case.is_dir() {
+        return Some(case);
+    }
+    eprintln!("skipped: {} is not there", case.display());
+    None
+}
+
 /// A graph file of this project.
 pub fn graph(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");

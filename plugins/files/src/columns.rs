@@ -137,13 +137,11 @@ pub(crate) fn ambiguous(place: Place, wanted: &[&str], names: &[String]) -> Opti
     })
 }
 
-/// The error for columns that are not among the names found, with what may be why.
-pub(crate) fn missing<'a>(
-    place: Place,
+/// Columns that are not among the names found, each with the one that is most like it.
+pub(crate) fn nearest<'a>(
     columns: impl IntoIterator<Item = &'a str>,
     found: &[String],
-    note: &'static str,
-) -> FileError {
+) -> Vec<MissingColumn> {
     let lower: Vec<_> = found.iter().map(|name| name.to_lowercase()).collect();
     let nearest = |column: &str| {
         let wanted = column.to_lowercase();
@@ -165,9 +163,19 @@ pub(crate) fn missing<'a>(
                 .flatten(),
         });
     }
+    missing
+}
+
+/// The error for columns that are not among the names found, with what may be why.
+pub(crate) fn missing<'a>(
+    place: Place,
+    columns: impl IntoIterator<Item = &'a str>,
+    found: &[String],
+    note: &'static str,
+) -> FileError {
     FileError::MissingColumns {
         place,
-        missing,
+        missing: nearest(columns, found),
         found: found.iter().map(|name| excerpt(name.as_bytes())).collect(),
         note,
     }

@@ -168,6 +168,13 @@ impl CsvRows {
         &self.names
     }
 
+    /// Which channels have a column.
+    pub fn present(&self) -> Vec<bool> {
+        let channels = self.layout.iter().flat_map(|layout| &layout.channels);
+        let places = channels.zip(&self.columns.channels);
+        places.map(|(_, at)| at.is_some()).collect()
+    }
+
     /// The units in the row below the names; none where there is no such row, known once a row was read.
     pub fn units(&self) -> &[String] {
         &self.units

@@ -8,8 +8,9 @@ use athermal_core::document::{TimeBase, TimeForm as Declared};
 use athermal_core::time::Duration;
 use athermal_run::recording::{self, Samples, Source, SourceError};
 
+use crate::merge::Joint;
 use crate::stream::next_of;
-use crate::{ChannelColumn, Layout, Options, Recording, Report, TimeColumn, TimeForm};
+use crate::{ChannelColumn, Layout, Options, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -96,7 +97,7 @@ impl Dataset {
 
 impl recording::Recording for Dataset {
     fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
-        let recording = Recording::join(&self.paths, layout(plan), self.options.clone())?;
+        let recording = Joint::open(&self.paths, layout(plan), self.options.clone())?;
         Ok(Box::new(Reading {
             recording,
             reports: &self.reports,
@@ -105,7 +106,7 @@ impl recording::Recording for Dataset {
 }
 
 struct Reading<'a> {
-    recording: Recording,
+    recording: Joint,
     reports: &'a RefCell<Vec<(String, Report)>>,
 }
 
@@ -113,7 +114,7 @@ impl Source for Reading<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
         let next = next_of(samples, |row| self.recording.next_into(row))?;
         if next.is_none() {
-            *self.reports.borrow_mut() = self.recording.reports().to_vec();
+            *self.reports.borrow_mut() = self.recording.reports();
         }
         Ok(next)
     }

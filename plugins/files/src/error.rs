@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::cell;
 use crate::detect::LongFormat;
+use crate::merge::MergeError;
 
 mod message;
 
@@ -111,6 +112,8 @@ pub enum FileError {
     },
     /// Standard input is one of several files to be joined.
     StandardInputInList,
+    /// Several files are not one recording.
+    Merge(Box<MergeError>),
     /// There is nothing in the file but blank lines and comments.
     Empty {
         /// The name of the file.
@@ -317,6 +320,7 @@ impl FileError {
             Self::Open { .. }
             | Self::Write { .. }
             | Self::StandardInputInList
+            | Self::Merge(_)
             | Self::Empty { .. }
             | Self::NotBegun { .. }
             | Self::NoTable { .. }

@@ -185,6 +185,17 @@ impl Cells for JsonRows {
 }
 
 impl JsonRows {
+    /// Which channels some object had.
+    pub fn present(&self) -> Vec<bool> {
+        let seen = |&key: &usize| self.keys[key].ever_seen;
+        self.channels.iter().map(seen).collect()
+    }
+
+    /// The keys of the first object.
+    pub fn names(&self) -> Vec<String> {
+        self.found.clone().unwrap_or_default()
+    }
+
     /// The keys of the time.
     fn of_time(&self) -> impl Iterator<Item = &Key> {
         self.keys[..self.time.names().len()].iter()

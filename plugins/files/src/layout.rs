@@ -116,6 +116,14 @@ impl Layout {
         self.table.of(&name.to_string_lossy())
     }
 
+    /// Leaves out the columns that are declared for segments.
+    pub(crate) fn without_segments(&mut self) {
+        let files = self.table.files.iter_mut().map(|(_, table)| table);
+        for table in files.chain([&mut self.table.base]) {
+            table.segment = None;
+        }
+    }
+
     /// The names of all columns wanted, time first.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> + Clone {
         let time = self.time.columns.names().iter().map(String::as_str);

@@ -52,6 +52,11 @@ impl Long {
         }
     }
 
+    /// Whether a row was of each channel.
+    pub fn seen(&self) -> &[bool] {
+        &self.seen
+    }
+
     /// The channels that the current row has a value of.
     pub fn channels(&self) -> &[usize] {
         self.channels.get(&self.current).map_or(&[], Vec::as_slice)

@@ -1,7 +1,7 @@
 //! Rows of a recording in either format: instants that advance, values or absence. Not how the bytes are cut into cells.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use athermal_core::document::{Arrangement, DecimalMark, TableFormat};
 use athermal_core::time::{Civil, Instant};
@@ -34,6 +34,10 @@ pub struct Options {
     pub goes_on: bool,
     /// Of several files each is a segment of its own, also where its times go on from those of the one before.
     pub segments: bool,
+    /// Files of different columns count their times from one instant, so that they can be merged where these are no dates.
+    pub merge: bool,
+    /// What is added to the times of files, in ns.
+    pub offsets: Vec<(PathBuf, i64)>,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.
@@ -257,6 +261,28 @@ impl Reader {
     /// What was met so far.
     pub fn report(&self) -> &Report {
         &self.reading.ledger.report
+    }
+
+    /// Whether the columns are known by their names alone, and not by the rows.
+    pub(crate) fn has_names(&self) -> bool {
+        matches!(self.rows, Rows::Csv(_)) && self.reading.long.is_none()
+    }
+
+    /// Which channels of the layout were there, as far as the file was read.
+    pub(crate) fn present(&self) -> Vec<bool> {
+        match (&self.reading.long, &self.rows) {
+            (Some(long), _) => long.seen().to_vec(),
+            (None, Rows::Csv(rows)) => rows.present(),
+            (None, Rows::Json(rows)) => rows.present(),
+        }
+    }
+
+    /// The names of all columns that are known; none of a file that has them in its rows.
+    pub(crate) fn names(&self) -> Vec<String> {
+        match &self.rows {
+            Rows::Csv(rows) => rows.names().to_vec(),
+            Rows::Json(rows) => rows.names(),
+        }
     }
 
     /// What is read.

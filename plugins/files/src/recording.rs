@@ -21,8 +21,8 @@ pub enum Event {
 /// Files of one clock are read in the order of time: those whose times are dates and whose first instants all differ, and those
 /// of which, in that order, each begins after the last instant of the one before. Others, such as those that each count from their
 /// beginning, are read in the order given. A file that starts after the last instant of the one before continues it; one that starts
-/// at or before it is a segment of its own. That also holds for files that cover the same period with different columns: they
-/// are not merged; with [`Options::segments`] every file is one. A file without rows is passed over.
+/// at or before it is a segment of its own. With [`Options::segments`] every file is one. A file without rows is passed over.
+/// Logs of different columns are merged before ([`Dataset`](crate::Dataset)).
 ///
 /// Where times are dates, or numbers that must be some, the reports count the rows that lie in the period of another file.
 pub struct Recording {
@@ -30,6 +30,8 @@ pub struct Recording {
     layout: Layout,
     options: Options,
     current: Option<(String, Reader)>,
+    /// What is added to the times of the file that is read, in ns.
+    offset_ns: i64,
     last_ns: Option<i64>,
     /// The first row of a segment, until the break before it was given.
     waiting: Option<Row>,
@@ -74,6 +76,7 @@ impl Recording {
             layout,
             options,
             current: None,
+            offset_ns: 0,
             last_ns: None,
             waiting: None,
             reports: Vec::new(),
@@ -96,6 +99,7 @@ impl Recording {
             if let Some((_, reader)) = &mut self.current {
                 let first = reader.report().rows == 0;
                 if reader.next_into(row)? {
+                    row.time_ns = row.time_ns.saturating_add(self.offset_ns);
                     let apart = |last| self.options.segments || row.time_ns <= last;
                     let of_file = first && self.last_ns.is_some_and(apart);
                     if of_file || row.begins_segment {
@@ -109,6 +113,7 @@ impl Recording {
             let Some(path) = self.rest.next() else {
                 return Ok(Event::End);
             };
+            self.offset_ns = offset_of(&path, &self.options);
             let reader = Reader::open(&path, self.layout.clone(), self.options.clone())?;
             self.current = Some((path.display().to_string(), reader));
         }
@@ -151,8 +156,15 @@ impl Recording {
     }
 }
 
+/// What is added to the times of a file, in ns.
+fn offset_of(path: &Path, options: &Options) -> i64 {
+    let mut offsets = options.offsets.iter();
+    let of = offsets.find(|(file, _)| file == path);
+    of.map_or(0, |(_, offset_ns)| *offset_ns)
+}
+
 /// Whether an instant is the same in all files, and not counted from the beginning of its own.
-fn is_dated(layout: &Layout, time_ns: i64) -> bool {
+pub(crate) fn is_dated(layout: &Layout, time_ns: i64) -> bool {
     match layout.time.form {
         TimeForm::Rfc3339 | TimeForm::Format(_) => true,
         TimeForm::Numbers { .. } | TimeForm::Since { .. } => time_ns >= DATED_NS,
@@ -170,7 +182,9 @@ fn in_order(
     let mut as_given = Vec::with_capacity(paths.len());
     for path in paths {
         let mut reader = Reader::open(&path, layout.clone(), options.clone())?;
-        let start = reader.next_into(&mut row)?.then_some(row.time_ns);
+        let offset_ns = offset_of(&path, options);
+        let start = reader.next_into(&mut row)?;
+        let start = start.then(|| row.time_ns.saturating_add(offset_ns));
         as_given.push((start, path));
     }
     let mut by_time = as_given.clone();
@@ -199,7 +213,7 @@ fn follow_each_other(
         }
         let mut reader = Reader::open(path, layout.clone(), options.clone())?;
         while reader.next_into(&mut row)? {
-            last = Some(row.time_ns);
+            last = Some(row.time_ns.saturating_add(offset_of(path, options)));
         }
     }
     Ok(true)

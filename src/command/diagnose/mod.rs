@@ -1,9 +1,6 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
-mod days;
-mod instances;
 mod next;
-mod responses;
 mod tables;
 
 use std::collections::BTreeSet;
@@ -85,6 +82,7 @@ impl Diagnose {
             )));
         }
         self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
         let model = load_fitted(&self.model, Wanted::default(), terminal)?;
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
@@ -112,9 +110,7 @@ impl Diagnose {
             outside_fit: beyond::beyond(model.sample_ranges(), &trace.ranges),
         };
         if terminal.format == Format::Json {
-            let mut asked = diagnosis.clone();
-            asked.keep_only(&self.of);
-            let mut facts = json!({ "data": self.data.names(), "diagnosis": asked });
+            let mut facts = json!({ "data": self.data.names(), "diagnosis": tables.shown() });
             doubts.add_to(&mut facts);
             println!("{facts:#}");
         } else {

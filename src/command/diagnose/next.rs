@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use athermal::Model;
 use athermal::diagnosis::lag::FeatureLags;
+use athermal::diagnosis::text::is_of;
 use athermal::diagnosis::{Main, is_called};
 
 use super::Diagnose;
-use super::instances::is_of;
 use super::tables::Tables;
 use crate::invocation::{command, program, quoted};
 use athermal_analysis::figures::paragraph;
@@ -108,7 +108,7 @@ impl Diagnose {
 }
 
 /// Of what predictions leave, that which a feature surely explains most of.
-fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
+fn most_left<'a>(tables: &'a Tables<'_>) -> Option<(&'a Main, &'a FeatureLags)> {
     let left = tables.main().filter_map(|main| {
         let features = tables.lags_of(main)?.features.iter();
         let sure = features.filter(|of| of.residual.is_significant());

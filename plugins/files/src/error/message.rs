@@ -88,6 +88,7 @@ impl FileError {
                 f,
                 "standard input cannot be joined with other files, whose order is found by opening them twice; save it to a file first"
             ),
+            Self::Merge(error) => write!(f, "{error}"),
             Self::Empty { file } => write!(
                 f,
                 "{file}: is empty; a recording starts with a line of column names (CSV) or an object (JSON lines)"

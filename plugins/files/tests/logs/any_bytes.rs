@@ -83,6 +83,7 @@ fn options() -> impl Strategy<Value = Options> {
             joins,
             goes_on,
             segments,
+            ..Options::default()
         }
     })
 }

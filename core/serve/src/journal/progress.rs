@@ -1,0 +1,133 @@
+//! How far the journal is: what may leave the program, and what may be acknowledged.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant as Clock};
+
+/// How far the journal is. Shared by all threads.
+#[derive(Debug, Default)]
+pub struct Progress {
+    written: AtomicU64,
+    synced: AtomicU64,
+    synced_happenings: AtomicU64,
+    lost: AtomicU64,
+    failures: AtomicU64,
+    /// Whether the disk has failed, and it is not yet time to try again.
+    failed: AtomicBool,
+    /// Whether somebody waited in vain, and nothing has been written since.
+    is_stuck: AtomicBool,
+    error: Mutex<Option<String>>,
+}
+
+/// How the journal is, for a status.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JournalStatus {
+    /// How many records have been handed to the system.
+    pub written: u64,
+    /// How many of them are on the disk.
+    pub synced: u64,
+    /// How many records were never written.
+    pub lost: u64,
+    /// How often writing failed.
+    pub failures: u64,
+    /// Whether the program goes on without its journal at the moment.
+    pub is_degraded: bool,
+    /// What the system said last.
+    pub error: Option<String>,
+}
+
+impl Progress {
+    /// All records below this number have been handed to the system: they survive the end of the program.
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.written.load(Ordering::Acquire)
+    }
+
+    /// All records below this number are on the disk: they survive a power cut.
+    #[must_use]
+    pub fn synced(&self) -> u64 {
+        self.synced.load(Ordering::Acquire)
+    }
+
+    /// So many ticks, beats, breaks and freezes are on the disk.
+    #[must_use]
+    pub fn synced_happenings(&self) -> u64 {
+        self.synced_happenings.load(Ordering::Acquire)
+    }
+
+    /// Whether the program goes on without its journal at the moment.
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        self.failed() || self.is_stuck.load(Ordering::Acquire)
+    }
+
+    /// Waits until all records below a number are written, but no longer than so long: what comes of them may leave then. False where
+    /// they are not written. While the disk fails or hangs, nobody waits again.
+    #[must_use]
+    pub fn wait_written(&self, below: u64, patience: Duration) -> bool {
+        let began = Clock::now();
+        loop {
+            if self.written() >= below {
+                return true;
+            }
+            if self.is_degraded() {
+                return false;
+            }
+            if began.elapsed() >= patience {
+                self.is_stuck.store(true, Ordering::Release);
+                return false;
+            }
+            std::thread::sleep(Duration::from_micros(50));
+        }
+    }
+
+    /// How the journal is.
+    #[must_use]
+    pub fn status(&self) -> JournalStatus {
+        let error = self.error.lock().map_or(None, |error| error.clone());
+        JournalStatus {
+            written: self.written(),
+            synced: self.synced(),
+            lost: self.lost.load(Ordering::Relaxed),
+            failures: self.failures.load(Ordering::Relaxed),
+            is_degraded: self.is_degraded(),
+            error,
+        }
+    }
+
+    pub(super) fn failed(&self) -> bool {
+        self.failed.load(Ordering::Acquire)
+    }
+
+    pub(super) fn set_written(&self, below: u64) {
+        self.written.store(below, Ordering::Release);
+        self.is_stuck.store(false, Ordering::Release);
+    }
+
+    pub(super) fn set_synced(&self, below: u64, happenings: u64) {
+        self.synced_happenings
+            .fetch_max(happenings, Ordering::AcqRel);
+        self.synced.fetch_max(below, Ordering::AcqRel);
+    }
+
+    pub(super) fn failures(&self) -> u64 {
+        self.failures.load(Ordering::Acquire)
+    }
+
+    pub(super) fn lose(&self, records: u64) {
+        self.lost.fetch_add(records, Ordering::Relaxed);
+    }
+
+    pub(super) fn fail(&self, error: &std::io::Error) {
+        if let Ok(mut last) = self.error.lock() {
+            *last = Some(error.to_string());
+        }
+        self.failed.store(true, Ordering::Release);
+        // Last: who sees the number sees the rest.
+        self.failures.fetch_add(1, Ordering::AcqRel);
+    }
+
+    pub(super) fn try_again(&self) {
+        self.failed.store(false, Ordering::Release);
+    }
+}

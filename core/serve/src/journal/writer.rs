@@ -1,0 +1,329 @@
+//! The journal thread: encodes, writes, begins the next file, and starts again after a failure.
+
+use std::fs::{self, File};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration as Wait, Instant as Clock};
+
+use rtrb::Consumer;
+
+use super::recorder::{Message, Resume};
+use super::sync::{Mark, Syncer};
+use super::{Begin, JournalError, JournalOptions, Progress, Record, segment};
+use crate::sequencer::Timeline;
+use crate::time::Instant;
+
+/// How many bytes are written at once at most, so that a long queue is not kept back.
+const BATCH: usize = 256 << 10;
+/// How long the thread sleeps where nobody wakes it.
+const IDLE: Wait = Wait::from_millis(20);
+static ZEROS: [u8; 64 << 10] = [0; 64 << 10];
+
+/// Writes the journal.
+#[derive(Debug)]
+pub(super) struct Writer {
+    folder: PathBuf,
+    options: JournalOptions,
+    messages: Consumer<Message>,
+    progress: Arc<Progress>,
+    /// None after a failure, until the log is taken up again.
+    file: Option<Open>,
+    /// What the next file begins with.
+    begin: Begin,
+    timeline: Timeline,
+    syncer: Syncer,
+    asked: Clock,
+    failed: Clock,
+    bytes: Vec<u8>,
+}
+
+/// The file that is written.
+#[derive(Debug)]
+struct Open {
+    file: File,
+    /// Its number in this run.
+    number: u64,
+    at: u64,
+    /// Up to where it has been filled with zeros.
+    filled: u64,
+    /// All records below this number have been asked to be synced.
+    asked: u64,
+}
+
+impl Writer {
+    pub(super) fn begin(
+        folder: &Path,
+        begin: Begin,
+        options: JournalOptions,
+        messages: Consumer<Message>,
+        progress: Arc<Progress>,
+    ) -> Result<Self, JournalError> {
+        let failed = |path: &Path| {
+            let path = path.to_owned();
+            move |error| JournalError::NotWritten { path, error }
+        };
+        fs::create_dir_all(folder).map_err(failed(folder))?;
+        remove_unfinished(folder).map_err(failed(folder))?;
+        let path = folder.join(segment::name(begin.event));
+        let file = Open::create(folder, &begin, 0).map_err(failed(&path))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            options,
+            messages,
+            progress,
+            timeline: begin.timeline(),
+            file: Some(file),
+            begin,
+            syncer: Syncer::start().map_err(failed(folder))?,
+            asked: Clock::now(),
+            failed: Clock::now(),
+            bytes: Vec::with_capacity(2 * BATCH),
+        })
+    }
+
+    /// Writes until the other end is gone and all of it has been written.
+    pub(super) fn run(mut self) {
+        loop {
+            let is_abandoned = self.messages.is_abandoned();
+            let is_idle = self.take() == 0;
+            let written = self.write().and_then(|()| self.sync_now_and_then());
+            if let Err(error) = written {
+                self.fail(&error);
+            }
+            if self.progress.failed() && self.failed.elapsed() >= self.options.retry {
+                self.progress.try_again();
+            }
+            if is_idle && is_abandoned {
+                break;
+            }
+            if is_idle {
+                std::thread::park_timeout(IDLE.min(self.options.sync));
+            }
+        }
+        if let Err(error) = self.seal() {
+            self.progress.fail(&error);
+        }
+    }
+
+    /// Takes what has come, and encodes it. Returns how many messages there were.
+    fn take(&mut self) -> usize {
+        let mut taken = 0;
+        let room = |of: &Open| (self.options.file.saturating_sub(of.at) as usize).min(BATCH);
+        let room = self.file.as_ref().map_or(BATCH, room);
+        while self.bytes.len() < room.max(1)
+            && let Ok(message) = self.messages.pop()
+        {
+            taken += 1;
+            match message {
+                Message::Record(event, record) if self.file.is_some() => {
+                    segment::append(&mut self.bytes, event, &record);
+                    self.apply(event, &record);
+                }
+                // Nothing follows on what was lost, until the log is taken up again.
+                Message::Record(..) => self.progress.lose(1),
+                Message::Resume(resume) => self.resume(resume),
+                Message::Stamp(channel, stamp) => {
+                    if let Some(of) = self.begin.stamps.get_mut(channel as usize) {
+                        *of = stamp;
+                    }
+                }
+                Message::Offset(source, offset) => {
+                    if let Some(of) = self.begin.offsets.get_mut(source as usize) {
+                        *of = Some(offset.as_ns());
+                    }
+                }
+                Message::Pending(of) => {
+                    let sample = (of.channel, of.stamp, of.value.to_bits());
+                    self.begin.pending.push(sample);
+                }
+                Message::Resumed => self.resumed(),
+            }
+        }
+        taken
+    }
+
+    /// Does to what the next file begins with what a record did to the log.
+    fn apply(&mut self, event: u64, record: &Record) {
+        self.begin.event = event + 1;
+        self.begin.happenings += u64::from(record.is_happening());
+        match record {
+            Record::Freeze(frozen) => self.begin.frozen = *frozen,
+            Record::Swap { revision } => self.begin.revision = format!("{revision:016x}"),
+            _ => {}
+        }
+        record.apply(&mut self.timeline);
+    }
+
+    /// Writes what has been encoded, into the next file where this one is full.
+    fn write(&mut self) -> io::Result<()> {
+        if self.bytes.is_empty() {
+            return Ok(());
+        }
+        let Some(open) = &mut self.file else {
+            self.bytes.clear();
+            return Ok(());
+        };
+        open.append(&self.bytes, self.options.ahead)?;
+        self.bytes.clear();
+        let is_full = open.at >= self.options.file;
+        self.progress.set_written(self.begin.event);
+        if is_full {
+            self.seal()?;
+            self.begin.after_failure = false;
+            self.open_next()?;
+        }
+        Ok(())
+    }
+
+    fn sync_now_and_then(&mut self) -> io::Result<()> {
+        if let Some((mark, result)) = self.syncer.result()
+            && self.file.as_ref().is_some_and(|of| of.number == mark.file)
+        {
+            result?;
+            self.progress.set_synced(mark.event, mark.happenings);
+            segment::append_synced(&mut self.bytes, mark.offset);
+            self.write()?;
+        }
+        let event = self.begin.event;
+        if let Some(open) = &mut self.file
+            && open.asked < event
+            && self.asked.elapsed() >= self.options.sync
+        {
+            let mark = Mark {
+                file: open.number,
+                offset: open.at,
+                event,
+                happenings: self.begin.happenings,
+            };
+            if self.syncer.ask(&open.file, mark)? {
+                open.asked = event;
+                self.asked = Clock::now();
+            }
+        }
+        Ok(())
+    }
+
+    /// Cuts the file to what is written, and syncs it.
+    fn seal(&mut self) -> io::Result<()> {
+        if let Some(open) = self.file.take() {
+            open.file.set_len(open.at)?;
+            open.file.sync_all()?;
+            self.progress
+                .set_synced(self.begin.event, self.begin.happenings);
+        }
+        Ok(())
+    }
+
+    fn open_next(&mut self) -> io::Result<()> {
+        self.begin.set(&self.timeline);
+        self.create()
+    }
+
+    fn create(&mut self) -> io::Result<()> {
+        static NUMBER: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(1);
+        let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.file = Some(Open::create(&self.folder, &self.begin, number)?);
+        Ok(())
+    }
+
+    /// Gives the file up: what was not written of it is lost, and a sync that failed is not tried again.
+    fn fail(&mut self, error: &io::Error) {
+        if self.file.take().is_some() {
+            let unwritten = self.begin.event - self.progress.written();
+            self.progress.lose(unwritten);
+        }
+        self.bytes.clear();
+        self.failed = Clock::now();
+        self.progress.fail(error);
+    }
+
+    fn resume(&mut self, resume: Resume) {
+        if let Err(error) = self.write().and_then(|()| self.seal()) {
+            self.fail(&error);
+        }
+        let begin = &mut self.begin;
+        begin.event = resume.event;
+        begin.happenings = resume.happenings;
+        begin.frozen = resume.frozen;
+        begin.last = resume.last;
+        begin.stamps.fill(Instant::MIN);
+        begin.stamps.resize(begin.feed.channels.len(), Instant::MIN);
+        begin.offsets.fill(None);
+        begin.offsets.resize(begin.feed.sources.len(), None);
+        begin.pending.clear();
+    }
+
+    /// Goes on in another file. The one before stays as it is.
+    fn resumed(&mut self) {
+        self.begin.after_failure = true;
+        self.timeline = self.begin.timeline();
+        match self.create() {
+            Ok(()) => self.progress.set_written(self.begin.event),
+            Err(error) => self.fail(&error),
+        }
+    }
+}
+
+impl Open {
+    /// Makes a file with its beginning; it has its name once that is on the disk.
+    fn create(folder: &Path, begin: &Begin, number: u64) -> io::Result<Self> {
+        let path = folder.join(segment::name(begin.event));
+        let aside = path.with_extension("part");
+        let mut file = File::create(&aside)?;
+        let header = segment::header(begin);
+        file.write_all(&header)?;
+        file.sync_all()?;
+        fs::rename(&aside, &path)?;
+        sync_folder(folder)?;
+        let at = header.len() as u64;
+        Ok(Self {
+            file,
+            number,
+            at,
+            filled: at,
+            asked: begin.event,
+        })
+    }
+
+    /// Writes behind what is there. The room is made before, so that a full disk is noticed between two records.
+    fn append(&mut self, bytes: &[u8], ahead: u64) -> io::Result<()> {
+        let end = self.at + bytes.len() as u64;
+        if end > self.filled {
+            let to = end + ahead;
+            self.file.seek(SeekFrom::Start(self.filled))?;
+            while self.filled < to {
+                let piece = (to - self.filled).min(ZEROS.len() as u64);
+                self.file.write_all(&ZEROS[..piece as usize])?;
+                self.filled += piece;
+            }
+            self.file.seek(SeekFrom::Start(self.at))?;
+        }
+        self.file.write_all(bytes)?;
+        self.at = end;
+        Ok(())
+    }
+}
+
+/// Removes what was to become a file when the program ended.
+fn remove_unfinished(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "part")
+        {
+            fs::remove_file(path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the names in a folder last.
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    File::open(folder)?.sync_all()?;
+    #[cfg(not(unix))]
+    let _ = folder;
+    Ok(())
+}
