@@ -129,7 +129,16 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     let mut survey = Survey::of(path, &clock, &table, &columns)?;
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
-    let dropped = survey.dropped.clone();
+    let mut dropped = survey.dropped.clone();
+    if !dropped.is_empty() && described.format == Format::Csv && !is_long {
+        let again = described.next_names(path, clock.columns.names())?;
+        dropped.extend(again.map(|(line, names)| {
+            format!(
+                "at line {line} another table begins, with the columns {}: give each table as a file of its own",
+                names.join(", ")
+            )
+        }));
+    }
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);

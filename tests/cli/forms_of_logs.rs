@@ -374,6 +374,14 @@ fn a_long_layout_is_read_one_entity_after_the_other() {
 }
 
 #[test]
+fn a_second_table_with_other_columns_is_named() {
+    refused(
+        "long-format-one-entity-after-the-other/two-tables.csv",
+        &["at line 729 another table begins, with the columns", "z_um"],
+    );
+}
+
+#[test]
 fn a_time_beside_each_channel_is_refused_with_a_way_out() {
     refused(
         "a-time-beside-each-channel/scope.csv",

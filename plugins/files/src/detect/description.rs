@@ -94,6 +94,33 @@ impl Description {
         LongFormat::of(&self.columns, &self.rows, &|_| false)
     }
 
+    /// Where the file names other columns than at its beginning, and which: it has several tables.
+    ///
+    /// # Errors
+    /// As for [`Description::of`].
+    pub fn next_names(
+        &self,
+        path: &Path,
+        time: &[String],
+    ) -> Result<Option<(u64, Vec<String>)>, FileError> {
+        let mut csv = CsvRows::headed(Lines::open(path, None)?, &self.table, None)?;
+        let mut ledger = Ledger::new(true, None);
+        while csv.advance(&mut ledger)? {
+            if time.iter().all(|name| csv.texts().contains(name)) {
+                let names: Vec<String> = csv
+                    .texts()
+                    .into_iter()
+                    .filter(|of| !of.is_empty())
+                    .collect();
+                let others = names.iter().any(|name| !self.columns.contains(name));
+                if others {
+                    return Ok(Some((csv.place().line, names)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
     /// The same file with a column for each name of its long layout, and its times alone in the rows.
     ///
     /// # Errors
