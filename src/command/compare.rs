@@ -205,7 +205,11 @@ impl Compare {
                     progress.set(ticks);
                 }
             };
-            let trace = trace_as(&model.plan, &model.fitted, &watch, scored, &mut look)
+            let scored = ScoreOptions {
+                levels: report.levels.clone(),
+                ..scored.clone()
+            };
+            let trace = trace_as(&model.plan, &model.fitted, &watch, &scored, &mut look)
                 .map_err(|error| self.of_graph(&path, error.into()))?;
             drop(progress);
             let reports = dataset.reports();

@@ -289,6 +289,8 @@ mod tests {
             bias: None,
             max_abs: None,
             valid: None,
+            no_model: Some(0.0),
+            no_model_is: athermal::run::score::NoModel::Zero,
             baseline_zero: Some(zero),
             baseline_persistence: None,
             persistence_n: 0,

@@ -243,6 +243,7 @@ pub fn fit_on(
         }),
         ticks: report.ticks,
         ranges: report.ranges.clone(),
+        levels: report.levels.clone(),
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
     Ok(outcome)
