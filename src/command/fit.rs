@@ -1,5 +1,6 @@
 //! `athermal fit`: fits what a graph has to learn on recorded data, estimators and encoders, and writes a model.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -8,7 +9,9 @@ use athermal::core::compile::PlannedChannel;
 use athermal::core::diagnostic::Sources;
 use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
-use athermal::run::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
+use athermal::run::fit::{
+    BareOutput, EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit,
+};
 use athermal::run::model::{Card, EstimatorCard, Period};
 use clap::Args;
 use serde_json::json;
@@ -33,7 +36,8 @@ use athermal_analysis::figures::{count, counted, number, paragraph, seconds, tab
 /// on the rows of the fit. Then it writes the model: one JSON file that holds all that is needed to run.
 /// `athermal show MODEL --format coefficients` prints what is in it.
 ///
-/// A node that cannot be fitted gives nothing, and the exit status is 1. Where none can be fitted, no model is written,
+/// A node that cannot be fitted gives nothing, and the exit status is 1. So it is where no voter of an output has a regressor left:
+/// the model is written, and the first line names the output. Where none can be fitted, no model is written,
 /// and an old one stays.
 ///
 /// Where orders are compared, AIC, AICc and BIC count the variance of what is left as one parameter beside the
@@ -91,13 +95,13 @@ impl Fit {
         self.data.check_offsets(&[])?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
-        self.doubt_tests(&model, sources, terminal);
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.count(),
             ..FitOptions::default()
         };
         let outcome = fit_on(&mut model, &self.data, &options, terminal)?;
+        self.doubt_tests(&model, sources, terminal);
         let failed = outcome.report.failed().count();
         if failed > 0 && failed == outcome.report.estimators.len() {
             self.report(terminal, &outcome);
@@ -119,7 +123,12 @@ impl Fit {
             terminal.note(format_args!("wrote {}", self.output.display()));
             terminal.note(self.next(&model));
         }
-        Ok(if failed > 0 { Answer::No } else { Answer::Fine })
+        let constant = outcome.bare.iter().any(|output| !output.has_others);
+        Ok(if failed > 0 || constant {
+            Answer::No
+        } else {
+            Answer::Fine
+        })
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
@@ -212,6 +221,8 @@ pub struct FitOutcome {
     pub dataset: Dataset,
     /// How it went.
     pub report: FitReport,
+    /// Outputs of which voters have no regressor left.
+    pub bare: Vec<BareOutput>,
     /// What is wrong with channels.
     pub faults: Vec<ChannelFaults>,
     /// What was left out of the data, and what may be wrong in them.
@@ -229,6 +240,7 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<FitOutcome, Failure> {
     let mut outcome = fit_without_card(model, data, options, terminal)?;
+    warn_bare(&outcome, terminal);
     let doubts = std::mem::take(&mut outcome.doubts);
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());
@@ -247,6 +259,32 @@ pub fn fit_on(
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
     Ok(outcome)
+}
+
+/// Warns of outputs that predict a constant, and of voters that do beside others.
+fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
+    let (some, none): (Vec<_>, Vec<_>) = outcome.bare.iter().partition(|of| of.has_others);
+    for (outputs, is_constant) in [(none, true), (some, false)] {
+        if outputs.is_empty() {
+            continue;
+        }
+        let names: Vec<&str> = outputs.iter().map(|of| of.output.as_str()).collect();
+        let bare: BTreeSet<&String> = outputs.iter().flat_map(|of| &of.bare).collect();
+        let fits = outcome.report.estimators.iter();
+        let mut of_bare = fits.filter(|fit| bare.contains(&fit.node));
+        let why = match of_bare.any(|fit| !fit.dropped_candidates.is_empty()) {
+            true => {
+                "; features have values in too few rows: are windows longer than the stretches between gaps?"
+            }
+            false => "",
+        };
+        let bare: Vec<&str> = bare.into_iter().map(String::as_str).collect();
+        let (names, bare) = (names.join(", "), bare.join(", "));
+        terminal.warning(match is_constant {
+            true => format!("{names}: predicts a constant, since no voter has a regressor left ({bare}){why}"),
+            false => format!("{names}: {bare} predicts a constant, since it has no regressor left; other voters have{why}"),
+        });
+    }
 }
 
 /// The same without a card, which has the checksums of all data, and without warnings.
@@ -288,8 +326,10 @@ pub fn fit_without_card(
         report.refused,
         &report.rejected,
     );
+    let bare = report.bare_outputs(&model.plan);
     Ok(FitOutcome {
         dataset,
+        bare,
         report,
         faults,
         doubts,

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
-use athermal_analysis::figures::{count, counted, length, number, seconds};
+use athermal_analysis::figures::{apart, count, counted, length, seconds};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 const ANOTHER_RUN: &str =
@@ -99,12 +99,11 @@ fn staged(path: &Path, staged: &Staged) -> Message {
 pub fn shadow(verdict: &Verdict) -> Message {
     let mut text = "in the shadow:".to_owned();
     for output in &verdict.outputs {
+        let [running, new] = apart([output.running_rmse, output.candidate_rmse]);
         let _ = write!(
             text,
-            "\n  {}: RMSE {} running, {} new, in {}, over {}",
+            "\n  {}: RMSE {running} running, {new} new, in {}, over {}",
             output.output,
-            number(output.running_rmse),
-            number(output.candidate_rmse),
             output.unit,
             counted(output.n as u64, "instant")
         );

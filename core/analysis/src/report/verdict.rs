@@ -6,6 +6,7 @@ use athermal_run::score::{NoModel, Score};
 use serde::Serialize;
 
 use super::{Axis, Worth, figure, rms};
+use crate::figures::apart_by;
 
 /// The share of predictions from which on those that lack are not spoken of; the first windows of a recording are among them.
 const NEARLY_ALWAYS: f64 = 0.95;
@@ -128,8 +129,7 @@ impl Verdict {
         };
         let less = |with: f64, without: f64| 100.0 * (1.0 - with / without);
         let (node, unit) = (&self.called, &self.unit);
-        let left = figure(Some(error));
-        let all = figure(Some(no_model));
+        let [left, all] = apart_by([error, no_model], |value| figure(Some(value)));
         let worth = if error < no_model {
             format!("{:.0} % less than no model", less(error, no_model))
         } else {
@@ -155,12 +155,8 @@ impl Verdict {
             );
         }
         if let (Some(without), Some(with)) = (self.without_correction, self.with_correction) {
-            let _ = write!(
-                text,
-                "; corrected, {} of {} remain",
-                figure(Some(with)),
-                figure(Some(without))
-            );
+            let [remain, of] = apart_by([with, without], |value| figure(Some(value)));
+            let _ = write!(text, "; corrected, {remain} of {of} remain");
             let _ = if with < without {
                 write!(text, ", {:.0} % less", less(with, without))
             } else {
