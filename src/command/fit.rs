@@ -81,10 +81,7 @@ impl Fit {
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         // A model may take the place of one whose graph is fitted anew.
-        let is_model = self
-            .graph
-            .extension()
-            .is_some_and(|ending| ending == "json");
+        let is_model = self.graph.extension().is_some_and(|of| of == "json");
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
@@ -104,9 +101,7 @@ impl Fit {
             self.warn_of_no_model(terminal);
             return Ok(Answer::No);
         }
-        let text = model.to_text().map_err(|error| {
-            Failure::Outside(format!("the model cannot be written as JSON: {error}"))
-        })?;
+        let text = text_of(&model)?;
         let to_stdout = self.output.as_os_str() == "-";
         // First, or a reader that has seen enough, as `head` has, would end the program without a model.
         if !to_stdout {
@@ -203,6 +198,16 @@ impl Fit {
             }
         }
     }
+}
+
+/// A model as it is written to a file.
+///
+/// # Errors
+/// When it cannot be written as JSON.
+pub fn text_of(model: &Model) -> Result<String, Failure> {
+    model
+        .to_text()
+        .map_err(|error| Failure::Outside(format!("the model cannot be written as JSON: {error}")))
 }
 
 /// What came of a fit.
@@ -312,11 +317,8 @@ const BEST_ORDERS: usize = 8;
 fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
     let ranks = orders.ranked();
-    let shown = if all {
-        ranks.len()
-    } else {
-        BEST_ORDERS.min(ranks.len())
-    };
+    let most = if all { ranks.len() } else { BEST_ORDERS };
+    let shown = most.min(ranks.len());
     let cells = ranks[..shown].iter().map(|&nth| {
         let tried = &orders.tried[nth];
         let chosen = nth == orders.chosen;
@@ -350,9 +352,8 @@ fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
 /// How wide the longest name in a selection is.
 fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     let tried = steps.iter().flat_map(|step| &step.candidates);
-    let tried = tried
-        .filter(|_| candidates)
-        .map(|tried| tried.name.chars().count());
+    let tried = tried.filter(|_| candidates);
+    let tried = tried.map(|tried| tried.name.chars().count());
     let taken = steps.iter().map(|step| step.label().chars().count());
     // A width of `format!` ends there, and a name may be longer.
     let most = usize::from(u16::MAX);
@@ -379,11 +380,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];
-    let dropped: Vec<_> = dropped
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, why)| format!("{} {why}", count(*n)))
-        .collect();
+    let dropped = dropped.iter().filter(|(n, _)| *n > 0);
+    let dropped = dropped.map(|(n, why)| format!("{} {why}", count(*n)));
+    let dropped: Vec<_> = dropped.collect();
     text.push('\n');
     if !dropped.is_empty() {
         let _ = writeln!(text, "  left out: {}", dropped.join(", "));
@@ -399,11 +398,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let steps: Vec<_> = report.selection.iter().chain(refused).collect();
     let width = width(&steps, candidates);
     for (nth, step) in steps.into_iter().enumerate() {
-        let taken = nth < report.selection.len();
-        let nth = if taken {
-            (nth + 1).to_string()
-        } else {
-            "not".to_owned()
+        let nth = match nth < report.selection.len() {
+            true => (nth + 1).to_string(),
+            false => "not".to_owned(),
         };
         write_step(&mut text, &nth, step, (width, candidates));
     }
@@ -419,10 +416,8 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         facts.push(format!("in-sample RMSE {} {}", number(rmse), fit.unit));
     }
     if let Some(condition) = report.condition {
-        facts.push(format!(
-            "condition number of the regressors {}",
-            number(condition)
-        ));
+        let condition = number(condition);
+        facts.push(format!("condition number of the regressors {condition}"));
     }
     if fit.streamed {
         facts.push("rows streamed".to_owned());
@@ -438,16 +433,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
 fn created() -> Option<String> {
-    let stated = std::env::var("SOURCE_DATE_EPOCH")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    let seconds = stated.or_else(|| {
-        let now = std::time::SystemTime::now()
-            .duration_since(std::time::UNIX_EPOCH)
-            .ok()?;
-        i64::try_from(now.as_secs()).ok()
-    })?;
-    jiff::Timestamp::from_second(seconds)
-        .ok()
-        .map(|time| time.to_string())
+    let stated = std::env::var("SOURCE_DATE_EPOCH").ok();
+    let stated = stated.and_then(|text| text.parse().ok());
+    let now = || jiff::Timestamp::now().as_second();
+    let time = jiff::Timestamp::from_second(stated.unwrap_or_else(now));
+    Some(time.ok()?.to_string())
 }
