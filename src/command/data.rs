@@ -443,6 +443,19 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
                 messages.push(refused::message(first, Some(found.count), words));
             }
         }
+        let kept = [
+            (&report.short_rows, "row without its last cells"),
+            (&report.notes, "row with a note behind it"),
+        ];
+        for (found, what) in kept {
+            // Where nearly all rows are such, that is how the log is.
+            let is_usual = found.count > 20 && report.rows.saturating_sub(found.count) <= 3;
+            if let Some(first) = found.first.as_ref().filter(|_| !is_usual) {
+                let n = count(found.count);
+                let words = format!("{file}: {n} × {what}; the first: {first}");
+                messages.push(refused::message(first, Some(found.count), words));
+            }
+        }
         if let Some(place) = &report.truncated {
             let words = format!(
                 "{place}: the last line has no end and was left out, since it was cut off or is still being written"
