@@ -58,12 +58,6 @@ impl Checkout {
         &self.folder
     }
 
-    /// The folder of the crate that nodes are written against.
-    #[must_use]
-    pub fn core(&self) -> PathBuf {
-        self.folder.join("core/framework")
-    }
-
     /// The version that the workspace states.
     fn version(&self) -> Option<String> {
         let manifest = std::fs::read_to_string(self.folder.join("Cargo.toml")).ok()?;

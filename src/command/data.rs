@@ -228,17 +228,14 @@ impl Data {
     /// When a file cannot be read.
     pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
         let reports = dataset.reports();
-        let mut cards = Vec::with_capacity(self.files.len());
-        for path in &self.files {
+        let card = |path: &PathBuf| {
             let name = path.display().to_string();
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
-            let card = DataCard::of(path, rows).map_err(|error| {
-                Failure::Outside(format!("cannot read {}: {error}", path.display()))
-            })?;
-            cards.push(card);
-        }
-        Ok(cards)
+            DataCard::of(path, rows)
+                .map_err(|error| Failure::Outside(format!("cannot read {name}: {error}")))
+        };
+        self.files.iter().map(card).collect()
     }
 }
 
@@ -405,9 +402,9 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
-            let some = match *rows {
-                rows if rows == report.rows => "all".to_owned(),
-                rows => count(rows),
+            let some = match *rows == report.rows {
+                true => "all".to_owned(),
+                false => count(*rows),
             };
             let lie = if *rows == 1 { "lies" } else { "lie" };
             let words = format!(
@@ -432,21 +429,30 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
         ];
         for headers in [&report.headers_moved, &report.headers] {
             if let Some(first) = &headers.first {
-                let in_all = match headers.count {
-                    more @ 2.. => format!("; {} in all", count(more)),
-                    _ => String::new(),
+                let words = match headers.count {
+                    more @ 2.. => format!("{first}; {} in all", count(more)),
+                    _ => first.to_string(),
                 };
-                messages.push(refused::message(
-                    first,
-                    Some(headers.count),
-                    format_args!("{first}{in_all}"),
-                ));
+                messages.push(refused::message(first, Some(headers.count), words));
             }
         }
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
                 let (n, taken) = (count(found.count), first.without_advice());
                 let words = format!("{file}: {n} × {what}, {then}; the first: {taken}");
+                messages.push(refused::message(first, Some(found.count), words));
+            }
+        }
+        let kept = [
+            (&report.short_rows, "row without its last cells"),
+            (&report.notes, "row with a note behind it"),
+        ];
+        for (found, what) in kept {
+            // Where nearly all rows are such, that is how the log is.
+            let is_usual = found.count > 20 && report.rows.saturating_sub(found.count) <= 3;
+            if let Some(first) = found.first.as_ref().filter(|_| !is_usual) {
+                let n = count(found.count);
+                let words = format!("{file}: {n} × {what}; the first: {first}");
                 messages.push(refused::message(first, Some(found.count), words));
             }
         }

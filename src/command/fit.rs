@@ -12,7 +12,7 @@ use athermal::files::Dataset;
 use athermal::run::fit::{
     BareOutput, EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit,
 };
-use athermal::run::model::{Card, EstimatorCard, Period};
+use athermal::run::model::{Card, EstimatorCard};
 use clap::Args;
 use serde_json::json;
 
@@ -27,7 +27,7 @@ use super::threads::Threads;
 use crate::invocation::{next, program, quoted};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal_analysis::figures::{count, counted, number, paragraph, seconds, table};
+use athermal_analysis::figures::{count, counted, number, paragraph, table};
 
 /// Fit a graph on recorded data
 ///
@@ -85,10 +85,7 @@ impl Fit {
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         // A model may take the place of one whose graph is fitted anew.
-        let is_model = self
-            .graph
-            .extension()
-            .is_some_and(|ending| ending == "json");
+        let is_model = self.graph.extension().is_some_and(|of| of == "json");
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
@@ -108,9 +105,7 @@ impl Fit {
             self.warn_of_no_model(terminal);
             return Ok(Answer::No);
         }
-        let text = model.to_text().map_err(|error| {
-            Failure::Outside(format!("the model cannot be written as JSON: {error}"))
-        })?;
+        let text = text_of(&model)?;
         let to_stdout = self.output.as_os_str() == "-";
         // First, or a reader that has seen enough, as `head` has, would end the program without a model.
         if !to_stdout {
@@ -186,12 +181,11 @@ impl Fit {
             let estimators: Vec<_> = report
                 .estimators
                 .iter()
-                .map(|fit| match (&fit.outcome, card(fit)) {
-                    (_, Some(card)) => json!(card),
-                    (Outcome::Failed(error), None) => {
+                .map(|fit| match &fit.outcome {
+                    Outcome::Fitted(_) => json!(EstimatorCard::of(fit)),
+                    Outcome::Failed(error) => {
                         json!({ "node": fit.node, "error": error.to_string() })
                     }
-                    (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
             let mut facts = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
@@ -213,6 +207,16 @@ impl Fit {
             }
         }
     }
+}
+
+/// A model as it is written to a file.
+///
+/// # Errors
+/// When it cannot be written as JSON.
+pub fn text_of(model: &Model) -> Result<String, Failure> {
+    model
+        .to_text()
+        .map_err(|error| Failure::Outside(format!("the model cannot be written as JSON: {error}")))
 }
 
 /// What came of a fit.
@@ -245,19 +249,7 @@ pub fn fit_on(
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());
     faults::warn(terminal, &outcome.faults);
-    model.card = Some(Card {
-        athermal: env!("CARGO_PKG_VERSION").to_owned(),
-        created: created(),
-        data: data.cards(dataset)?,
-        period: report.period.map(|(from, to)| Period {
-            from_s: seconds(from),
-            to_s: seconds(to),
-        }),
-        ticks: report.ticks,
-        ranges: report.ranges.clone(),
-        levels: report.levels.clone(),
-        estimators: report.estimators.iter().filter_map(short_card).collect(),
-    });
+    model.card = Some(Card::of(report, data.cards(dataset)?, created()));
     Ok(outcome)
 }
 
@@ -365,11 +357,8 @@ const BEST_ORDERS: usize = 8;
 fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
     let ranks = orders.ranked();
-    let shown = if all {
-        ranks.len()
-    } else {
-        BEST_ORDERS.min(ranks.len())
-    };
+    let most = if all { ranks.len() } else { BEST_ORDERS };
+    let shown = most.min(ranks.len());
     let cells = ranks[..shown].iter().map(|&nth| {
         let tried = &orders.tried[nth];
         let chosen = nth == orders.chosen;
@@ -403,9 +392,8 @@ fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
 /// How wide the longest name in a selection is.
 fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     let tried = steps.iter().flat_map(|step| &step.candidates);
-    let tried = tried
-        .filter(|_| candidates)
-        .map(|tried| tried.name.chars().count());
+    let tried = tried.filter(|_| candidates);
+    let tried = tried.map(|tried| tried.name.chars().count());
     let taken = steps.iter().map(|step| step.label().chars().count());
     // A width of `format!` ends there, and a name may be longer.
     let most = usize::from(u16::MAX);
@@ -432,11 +420,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];
-    let dropped: Vec<_> = dropped
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, why)| format!("{} {why}", count(*n)))
-        .collect();
+    let dropped = dropped.iter().filter(|(n, _)| *n > 0);
+    let dropped = dropped.map(|(n, why)| format!("{} {why}", count(*n)));
+    let dropped: Vec<_> = dropped.collect();
     text.push('\n');
     if !dropped.is_empty() {
         let _ = writeln!(text, "  left out: {}", dropped.join(", "));
@@ -452,11 +438,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let steps: Vec<_> = report.selection.iter().chain(refused).collect();
     let width = width(&steps, candidates);
     for (nth, step) in steps.into_iter().enumerate() {
-        let taken = nth < report.selection.len();
-        let nth = if taken {
-            (nth + 1).to_string()
-        } else {
-            "not".to_owned()
+        let nth = match nth < report.selection.len() {
+            true => (nth + 1).to_string(),
+            false => "not".to_owned(),
         };
         write_step(&mut text, &nth, step, (width, candidates));
     }
@@ -472,10 +456,8 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         facts.push(format!("in-sample RMSE {} {}", number(rmse), fit.unit));
     }
     if let Some(condition) = report.condition {
-        facts.push(format!(
-            "condition number of the regressors {}",
-            number(condition)
-        ));
+        let condition = number(condition);
+        facts.push(format!("condition number of the regressors {condition}"));
     }
     if fit.streamed {
         facts.push("rows streamed".to_owned());
@@ -489,47 +471,11 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     text
 }
 
-fn card(fit: &EstimatorFit) -> Option<EstimatorCard> {
-    let Outcome::Fitted(report) = &fit.outcome else {
-        return None;
-    };
-    Some(EstimatorCard {
-        node: fit.node.clone(),
-        kind: fit.kind.to_owned(),
-        truth: fit.truth.clone(),
-        unit: fit.unit.clone(),
-        rows: fit.rows,
-        dropped: fit.dropped,
-        dropped_candidates: fit.dropped_candidates.clone(),
-        report: report.clone(),
-    })
-}
-
-/// How many candidates of each step a model keeps: the one taken, and the next best.
-const CANDIDATES_KEPT: usize = 2;
-
-/// A card as a model keeps it.
-fn short_card(fit: &EstimatorFit) -> Option<EstimatorCard> {
-    let mut card = card(fit)?;
-    let report = &mut card.report;
-    for step in report.selection.iter_mut().chain(&mut report.refused) {
-        step.candidates.truncate(CANDIDATES_KEPT);
-    }
-    Some(card)
-}
-
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
 fn created() -> Option<String> {
-    let stated = std::env::var("SOURCE_DATE_EPOCH")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    let seconds = stated.or_else(|| {
-        let now = std::time::SystemTime::now()
-            .duration_since(std::time::UNIX_EPOCH)
-            .ok()?;
-        i64::try_from(now.as_secs()).ok()
-    })?;
-    jiff::Timestamp::from_second(seconds)
-        .ok()
-        .map(|time| time.to_string())
+    let stated = std::env::var("SOURCE_DATE_EPOCH").ok();
+    let stated = stated.and_then(|text| text.parse().ok());
+    let now = || jiff::Timestamp::now().as_second();
+    let time = jiff::Timestamp::from_second(stated.unwrap_or_else(now));
+    Some(time.ok()?.to_string())
 }

@@ -50,6 +50,8 @@ fn facts(error: &FileError) -> (&'static str, Value) {
             ),
         },
         FileError::StillRefused { newest, .. } => facts(newest),
+        FileError::CellsLacking { .. } => ("short_rows", json!({})),
+        FileError::CellBeyond { .. } => ("row_notes", json!({})),
         FileError::HeaderAgain { .. } => ("header_again", json!({})),
         FileError::MissingColumns { missing, .. } => {
             let columns: Vec<_> = missing.iter().map(|of| &of.name).collect();

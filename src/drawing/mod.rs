@@ -11,11 +11,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal::core::node::RoleName;
 use athermal::core::time::Duration;
+use athermal::diagnosis::text::grouped;
+use serde::Serialize;
 
 use athermal_analysis::figures::{counted, length};
 
 /// A graph as boxes and arrows, from what is measured to what comes out.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Diagram {
     /// The name of the graph.
     pub name: String,
@@ -26,9 +28,10 @@ pub struct Diagram {
 }
 
 /// A signal, a node or an output.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Box {
     /// Its name.
+    #[serde(rename = "name")]
     pub title: String,
     /// What it is.
     pub class: Class,
@@ -37,7 +40,8 @@ pub struct Box {
 }
 
 /// What a box stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Class {
     /// Something measured.
     Signal,
@@ -52,7 +56,7 @@ pub enum Class {
 }
 
 /// From one box to another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Arrow {
     /// The number of the box it comes from.
     pub from: usize,
@@ -63,7 +67,8 @@ pub struct Arrow {
 }
 
 /// What travels along an arrow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Flow {
     /// Values of this tick.
     Data,
@@ -71,6 +76,18 @@ pub enum Flow {
     Delayed,
     /// What is predicted, once it has been measured.
     Truth,
+}
+
+impl Flow {
+    /// Its name among the classes of a picture.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Delayed => "delayed",
+            Self::Truth => "truth",
+        }
+    }
 }
 
 /// The boxes and arrows of a plan; instances of one node share a box unless `expand`.
@@ -112,7 +129,7 @@ impl Drawn<'_> {
 
     fn signals(&mut self) {
         let sources = self.plan.sources.iter().enumerate();
-        let signals = grouped(sources.map(|(slot, source)| (&*source.name, slot)));
+        let signals = by_owner(sources.map(|(slot, source)| (&*source.name, slot)));
         for (signal, slots) in signals {
             let unit = &self.plan.channels[slots[0]].channel.unit;
             let lines = vec![format!(
@@ -131,31 +148,23 @@ impl Drawn<'_> {
         for node in &self.plan.nodes {
             *instances.entry(&node.name).or_default() += 1;
         }
-        let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+        let title = |node: &PlannedNode| match expand {
+            true => node.instance(),
+            false => node.name.clone(),
+        };
         for node in &self.plan.nodes {
-            let number = match numbers.get(node.name.as_str()) {
-                Some(&number) if !expand => number,
-                _ => {
-                    let number = if expand {
-                        self.node(&node.instance(), node, 1)
-                    } else {
-                        self.node(&node.name, node, instances[&*node.name])
-                    };
-                    numbers.insert(&node.name, number);
-                    number
-                }
-            };
+            let several = if expand { 1 } else { instances[&*node.name] };
+            let title = title(node);
+            let known = numbers.get(&title).copied();
+            let number = known.unwrap_or_else(|| self.node(&title, node, several));
+            numbers.insert(title, number);
             for slot in node.slots.clone() {
                 self.of_slot[slot] = Some(number);
             }
         }
-        let mut next = self.diagram.boxes.len() - if expand { self.plan.nodes.len() } else { 0 };
         for node in &self.plan.nodes {
-            if expand {
-                numbers.insert(&node.name, next);
-                next += 1;
-            }
-            self.arrows_to(node, numbers[node.name.as_str()]);
+            self.arrows_to(node, numbers[&title(node)]);
         }
     }
 
@@ -238,7 +247,7 @@ impl Drawn<'_> {
 
     fn outputs(&mut self) {
         let outputs = self.plan.outputs.iter();
-        let groups = grouped(outputs.map(|output| (&*output.name, output.slot)));
+        let groups = by_owner(outputs.map(|output| (&*output.name, output.slot)));
         for (name, slots) in groups {
             let unit = &self.plan.channels[slots[0]].channel.unit;
             let lines = vec![format!(
@@ -254,18 +263,12 @@ impl Drawn<'_> {
 }
 
 /// The slots of channels by what stands before the dot of their names, each in the order in which it first comes.
-fn grouped<'a>(channels: impl Iterator<Item = (&'a str, usize)>) -> Vec<(&'a str, Vec<usize>)> {
-    let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
-    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
-    for (channel, slot) in channels {
-        let name = channel.split('.').next().unwrap_or(channel);
-        let place = *places.entry(name).or_insert(groups.len());
-        if place == groups.len() {
-            groups.push((name, Vec::new()));
-        }
-        groups[place].1.push(slot);
-    }
-    groups
+fn by_owner<'a>(channels: impl Iterator<Item = (&'a str, usize)>) -> Vec<(&'a str, Vec<usize>)> {
+    let owned =
+        channels.map(|(channel, slot)| (channel.split('.').next().unwrap_or(channel), slot));
+    let groups = grouped(owned, |(owner, _)| *owner).into_iter();
+    let slots = |group: Vec<(&'a str, usize)>| group.into_iter().map(|(_, slot)| slot).collect();
+    groups.map(|group| (group[0].0, slots(group))).collect()
 }
 
 #[cfg(test)]

@@ -139,11 +139,7 @@ fn curve(way: &[[f64; 2]], kind: Flow, below: f64) -> String {
     let (Some(first), Some(last)) = (way.first(), way.last()) else {
         return String::new();
     };
-    let name = match kind {
-        Flow::Data => "data",
-        Flow::Truth => "truth",
-        Flow::Delayed => "delayed",
-    };
+    let name = kind.word();
     let mut path = format!("M{:.1} {:.1}", first[0], first[1] + below);
     let end = last[0] - 7.0;
     for pair in way.windows(2) {
@@ -173,18 +169,19 @@ fn curve(way: &[[f64; 2]], kind: Flow, below: f64) -> String {
 
 fn legend(diagram: &Diagram, y: f64) -> String {
     let flows = [
-        (Flow::Data, "data", "values"),
-        (Flow::Truth, "truth", "the truth, once measured"),
-        (Flow::Delayed, "delayed", "values of earlier ticks"),
+        (Flow::Data, "values"),
+        (Flow::Truth, "the truth, once measured"),
+        (Flow::Delayed, "values of earlier ticks"),
     ];
     let mut text = String::new();
     let mut x = MARGIN;
-    for (flow, class, label) in flows {
+    for (flow, label) in flows {
         if diagram.arrows.iter().any(|arrow| arrow.kind == flow) {
             let middle = y - 4.0;
             let _ = writeln!(
                 text,
-                "<path class=\"{class}\" d=\"M{x:.1} {middle:.1} h30\"/>\n<text x=\"{:.1}\" y=\"{y:.1}\">{label}</text>",
+                "<path class=\"{}\" d=\"M{x:.1} {middle:.1} h30\"/>\n<text x=\"{:.1}\" y=\"{y:.1}\">{label}</text>",
+                flow.word(),
                 x + 38.0
             );
             x += 38.0 + 7.0 * label.chars().count() as f64 + 24.0;

@@ -1,12 +1,12 @@
 //! Decides which column of a log gives the time, or which two, and in which form.
 
 use athermal::core::time::{Duration, TimeColumns, TimeFormat};
-use athermal::files::{Description, TimeForm, is_time_of_day};
+use athermal::files::{Description, NumberForm, TimeForm, is_time_of_day, zone_in_name, zone_of};
 
 use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
 use super::texts::Texts;
-use athermal_analysis::figures::time;
+use athermal_analysis::figures::{number, time};
 
 /// The time of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,8 @@ pub struct Clock {
     pub declared: Option<(&'static str, String)>,
     /// Whether these are dates and times that do not say how far they are from UTC.
     pub lacks_zone: bool,
+    /// The zone that the log states beside them.
+    pub zone: Option<String>,
     /// Why it was taken.
     pub(super) why: String,
     /// Another form that reads the first rows as well, and otherwise.
@@ -26,26 +28,23 @@ pub struct Clock {
 }
 
 /// What a time is called, the likeliest first.
-const NAMES: &str =
-    "time timestamp datetime date utc epoch ts t datum zeit uhrzeit clock elapsed sample index n";
+const NAMES: &str = "time timestamp datetime date utc epoch ts t datum zeit uhrzeit clock elapsed uptime jd mjd bjd hjd datenum filetime millis \
+     milliseconds micros microseconds ms us seconds secs minutes mins hours hrs days stunden minuten sekunden sample index n";
 
 /// The place of a word among the names of a time.
 fn place_of(word: &str) -> Option<usize> {
     NAMES.split(' ').position(|name| name == word)
 }
 
-/// A unit of a time column's name, as a graph file names it, in nanoseconds.
-type Unit = (&'static str, &'static str, i64);
-
-const UNITS: [Unit; 8] = [
-    ("ns", "ns", 1),
-    ("us", "us", 1_000),
-    ("ms", "ms", 1_000_000),
-    ("s", "s", 1_000_000_000),
-    ("sec", "s", 1_000_000_000),
-    ("min", "min", 60_000_000_000),
-    ("h", "h", 3_600_000_000_000),
-    ("d", "d", 86_400_000_000_000),
+/// What a column of zones beside the times is called.
+const ZONE_NAMES: [&str; 7] = [
+    "zone",
+    "tz",
+    "timezone",
+    "time zone",
+    "utc offset",
+    "utc_offset",
+    "zeitzone",
 ];
 
 /// How many nanoseconds stand for one sample, where a log only numbers them.
@@ -86,9 +85,34 @@ impl Clock {
             form: dates.form,
             declared: Some(dates.declared),
             lacks_zone: dates.lacks_zone,
+            zone: dates.zone,
             why: dates.why,
             other: dates.other,
         }
+    }
+
+    /// The same with the zone that the name of its column states, or that a column beside it has in each row.
+    fn with_zone(mut self, described: &Description) -> Self {
+        if !self.lacks_zone {
+            return self;
+        }
+        let mut names = self.columns.names().iter();
+        let in_name = names.find_map(|name| zone_in_name(name));
+        let is_zone = |name: &String| ZONE_NAMES.contains(&&*name.to_lowercase());
+        let beside = described.columns.iter().position(is_zone).and_then(|at| {
+            let mut cells = described.rows.iter().map(|row| row.get(at));
+            let first = cells.next()??;
+            cells
+                .all(|cell| cell == Some(first))
+                .then(|| zone_of(first))?
+        });
+        if let Some(zone) = in_name.or(beside).or_else(|| self.zone.clone()) {
+            self.why = self.why.replace(dates::WITHOUT_ZONE, "");
+            self.why = format!("{} in the zone {zone}", self.why.trim_end());
+            self.zone = Some(zone);
+            self.lacks_zone = false;
+        }
+        self
     }
 
     /// What was found, for people.
@@ -120,7 +144,8 @@ pub fn find(
     };
     if let Some(name) = named {
         let texts = Texts::named(described, name)?;
-        return clock(&texts).ok_or_else(|| no_clock(&texts, format));
+        let clock = clock(&texts).ok_or_else(|| no_clock(&texts, format))?;
+        return Ok(clock.with_zone(described));
     }
     // What is in degrees or in nanometres is no time, however steadily it grows. A name with braces cannot be that of a graph's
     // column of time.
@@ -136,7 +161,13 @@ pub fn find(
     let likely = (0..described.columns.len()).filter(may_be);
     let likely = likely.map(|index| (rank(index), Texts::of(described, index)));
     let mut likely: Vec<(usize, Texts)> = likely.collect();
-    likely.sort_by_key(|(rank, _)| *rank);
+    // A number that grows may count anything, a date is one.
+    let is_number = |texts: &Texts| {
+        texts
+            .first()
+            .is_some_and(|text| text.parse::<f64>().is_ok())
+    };
+    likely.sort_by_key(|(rank, texts)| (*rank, is_number(texts)));
     let texts = likely.iter().map(|(_, texts)| texts);
     let mut unread = texts.filter(|texts| dates::look_like_times(&texts.read()));
     let unread = unread.find(|texts| clock(texts).is_none());
@@ -146,7 +177,7 @@ pub fn find(
         .filter(|(rank, _)| unread.is_none() || *rank < usize::MAX)
         .filter_map(|(_, texts)| clock(texts));
     match (found.next(), unread) {
-        (Some(clock), _) => Ok(clock),
+        (Some(clock), _) => Ok(clock.with_zone(described)),
         (None, Some(unread)) => Err(no_clock(unread, format)),
         (None, None)
             if let Some(back) = likely
@@ -219,6 +250,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         let again = cells.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let is_clock = !(again * 2 >= cells.len() && cells.iter().all(|cell| dates::is_date(cell)));
         let dates = dates::of(&cells).filter(|_| is_clock);
+        let dates = dates.or_else(|| dates::elapsed(&cells, &texts.columns.title()));
         return dates.map(|dates| Clock::dated(texts.columns.clone(), dates));
     };
     let columns = texts.columns.clone();
@@ -236,31 +268,34 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
     if advance * 100 < all * 95 && !stands {
         return None;
     }
-    let known = |word: &&str| UNITS.iter().find(|(name, ..)| name == word);
-    let below = described.unit(&column);
-    let unit = known(&below).or_else(|| parts.iter().skip(1).rev().find_map(known));
+    let below = NumberForm::of_unit(described.unit(&column));
+    let x_value = (lower == "x_value").then(|| NumberForm::of_unit("s"));
+    let unit = below.or_else(|| x_value.unwrap_or_else(|| NumberForm::of_name(&parts)));
     // One wild cell says nothing of the unit that a name says.
-    let fits = |&&(_, _, ns_per_unit): &&Unit| {
-        let beyond = |number: &&f64| number.abs() * ns_per_unit as f64 >= i64::MAX as f64;
-        numbers.iter().filter(beyond).count() * 2 < numbers.len()
+    let fits = |form: &&NumberForm| {
+        let form = form.time_form();
+        let is_read = |cell: &&String| form.read(cell.as_bytes()).is_some();
+        cells.iter().filter(is_read).count() * 2 > cells.len()
     };
-    let counted = |name: &'static str, ns_per_unit, why| Clock {
+    let counted = |name: &'static str, form: TimeForm, why| Clock {
         columns: columns.clone(),
-        form: TimeForm::Numbers { ns_per_unit },
+        form,
         declared: (name != "s").then(|| ("unit", name.to_owned())),
         lacks_zone: false,
+        zone: None,
         why,
         other: None,
     };
-    if let Some(&(_, name, ns_per_unit)) = unit.filter(fits) {
-        let by = match known(&below) {
+    let of_number = |ns_per_unit| TimeForm::Numbers { ns_per_unit };
+    if let Some(form) = unit.filter(fits) {
+        let by = match below {
             Some(_) => "as the row below its name says",
             None => "by its name",
         };
         return Some(counted(
-            name,
-            ns_per_unit,
-            format!("numbers in {name}, {by}"),
+            form.unit,
+            form.time_form(),
+            format!("numbers in {}, {by}", form.title),
         ));
     }
     let numbered = parts
@@ -273,7 +308,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
             declared: Some(("step", "1s".to_owned())),
             ..counted(
                 "s",
-                SAMPLE_NS,
+                of_number(SAMPLE_NS),
                 "a sample number; how long a sample takes the log does not say".to_owned(),
             )
         });
@@ -284,7 +319,15 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
              name must say so: time_s, time_ms, time_min, time_h",
             numbers[0].floor()
         );
-        return Some(counted("d", 86_400_000_000_000, why));
+        return Some(counted("d", of_number(86_400_000_000_000), why));
+    }
+    if let Some(form) = NumberForm::of_size(&numbers).filter(|_| unit.is_none()) {
+        let why = format!(
+            "numbers from {} on, taken for {} since these lie between 1990 and 2100; if they are another unit, its name must say so: \
+             time_s, time_ms, time_min, time_h",
+            numbers[0], form.title
+        );
+        return Some(counted(form.unit, form.time_form(), why));
     }
     // Seconds since 1970 have ten digits before the point until 2286, milliseconds thirteen, and so on.
     let (name, ns_per_unit) = match numbers[0] {
@@ -294,14 +337,20 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         _ => ("s", 1_000_000_000),
     };
     let why = match unit {
-        Some((_, by_name, _)) => format!(
-            "numbers, taken for {name} since 1970: in {by_name}, as its name says, they lie centuries away"
+        Some(by_name) => format!(
+            "numbers, taken for {name} since 1970: in {}, as its name says, they lie centuries away",
+            by_name.title
         ),
-        None => format!(
-            "numbers, taken for {name} since its name does not say, as time_s, time_ms or time_min would"
-        ),
+        None => {
+            let mut steps: Vec<f64> = numbers.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            steps.sort_by(f64::total_cmp);
+            format!(
+                "numbers, taken for {name} since its name does not say, as time_s, time_ms or time_min would: a row every {} {name}",
+                number(steps[steps.len() / 2])
+            )
+        }
     };
-    Some(counted(name, ns_per_unit, why))
+    Some(counted(name, of_number(ns_per_unit), why))
 }
 
 /// Whether numbers look like the days of a spreadsheet, of which 40,000 is in 2009 and 60,000 in 2064, at a rate of more

@@ -55,11 +55,41 @@ enum Guess {
 const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
 const TEMPERATURES: [&str; 4] = ["t", "temp", "temperature", "tc"];
 const FACTORS: [&str; 6] = ["scale", "gain", "factor", "ratio", "coefficient", "coeff"];
-const DRIVES: [&str; 11] = [
+const DRIVES: [&str; 18] = [
     "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
-    "rpm",
+    "rpm", "bat", "batt", "battery", "batterie", "vbat", "supply", "akku",
 ];
-const AMBIENT: [&str; 7] = ["hum", "rh", "%rh", "pressure", "baro", "barometer", "druck"];
+const AMBIENT: [&str; 11] = [
+    "hum",
+    "rh",
+    "%rh",
+    "rh%",
+    "pressure",
+    "press",
+    "pres",
+    "baro",
+    "barometer",
+    "druck",
+    "rf",
+];
+/// What is an angle where its unit is a degree.
+const ANGLES: [&str; 13] = [
+    "tilt",
+    "angle",
+    "inc",
+    "incl",
+    "inclination",
+    "pitch",
+    "roll",
+    "yaw",
+    "rot",
+    "azimuth",
+    "theta",
+    "phi",
+    "winkel",
+];
+const MASSES: [&str; 6] = ["mass", "weight", "wt", "masse", "gewicht", "load"];
+const ACCELERATIONS: [&str; 4] = ["acc", "accel", "acceleration", "vib"];
 /// The same within a word: `Luftfeuchte`, `airhumidity`, `Luftdruck`.
 const WITHIN: [&str; 4] = ["humid", "feucht", "luftdruck", "airpressure"];
 
@@ -135,8 +165,15 @@ impl Column {
         Unit::parse(&self.unit).is_ok_and(|unit| unit.measures_same(&Unit::kelvin()))
     }
 
-    /// How little its name and unit speak for a position: lengths come before what is called one, that before what is neither, and
-    /// what mostly drives or flows only before shares.
+    /// Whether its unit is that of a temperature or a length.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        let unit = Unit::parse(&self.unit).ok().filter(|_| self.unit_known);
+        unit.is_some_and(|unit| measures(&unit, "K") || measures(&unit, "m"))
+    }
+
+    /// How little its name and unit speak for a position: lengths come before what is called one, that before what has a unit, as a
+    /// voltage or an angle has, that before what has none, and what mostly drives or flows only before shares.
     fn hardly_drifts(&self) -> u8 {
         let unit = Unit::parse(&self.unit).ok();
         let measures = |what: &str| unit.as_ref().is_some_and(|unit| measures(unit, what));
@@ -149,14 +186,11 @@ impl Column {
         } else if words(&self.name).iter().any(is_position) {
             1
         } else if self.unit == "%" {
+            5
+        } else if ["A", "W", "s", "m3/s", "m/s"].into_iter().any(measures) {
             4
-        } else if ["V", "A", "W", "s", "Hz", "m3/s", "m/s"]
-            .into_iter()
-            .any(measures)
-        {
-            3
         } else {
-            2
+            2 + u8::from(!self.unit_known)
         }
     }
 
@@ -216,8 +250,27 @@ fn guess(name: &str, below: &str) -> Column {
     };
     let by_name_alone = by_name.as_ref();
     let by_name_alone = by_name_alone.filter(|unit| !temp_named || is_of_temperature(unit));
-    let unit = below.as_ref().or(by_name_alone);
+    // What is a degree of either kind, or a gram or what falls with one, the quantity says.
+    let stated = name.rsplit_once(['[', '(']).map_or("", |(_, text)| text);
+    let stated = stated.trim_end().trim_end_matches([']', ')']).trim();
+    let last = lower.last().map_or("", String::as_str);
+    let by_quantity = match stated {
+        "deg" | "°" | "Deg" if !temp_named => Some("deg"),
+        "g" if has(&ACCELERATIONS) => Some("[g]"),
+        "g" if name.contains('[') || has(&MASSES) => Some("g"),
+        _ if last == "deg" && has(&ANGLES) => Some("deg"),
+        _ if last == "g" && has(&MASSES) => Some("g"),
+        _ => None,
+    };
+    let by_quantity = by_quantity.and_then(|unit| Unit::parse(unit).ok());
+    let unit = below.as_ref().or(by_name_alone).or(by_quantity.as_ref());
     let unit = unit.filter(|unit| !(temp_named && measures(unit, "rad")));
+    // A unit that is not known still says that it is no length.
+    let is_code = |text: &str| {
+        let letters = text.chars().any(char::is_alphabetic);
+        letters && text.len() <= 8 && !text.contains(char::is_whitespace)
+    };
+    let is_other = unit.is_none() && name.trim_end().ends_with(']') && is_code(stated);
     let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));
     let measures = |what: &str| unit.is_some_and(|unit| measures(unit, what));
     let is_number = unit.is_none_or(is_count);
@@ -240,7 +293,7 @@ fn guess(name: &str, below: &str) -> Column {
         (Guess::Drive, "by its name")
     } else if has(&AMBIENT) || within(&WITHIN) {
         (Guess::Ambient, "by its name")
-    } else if is_number && has(&POSITIONS) && !has(&FACTORS) {
+    } else if is_number && !is_other && has(&POSITIONS) && !has(&FACTORS) {
         (Guess::Position, "by its name")
     } else {
         (Guess::Other, "neither a temperature nor a length")
@@ -253,7 +306,7 @@ fn guess(name: &str, below: &str) -> Column {
     Column {
         name: name.to_owned(),
         place: 1,
-        unit: unit.map_or(fallback, Unit::text).to_owned(),
+        unit: unit.map_or(fallback, spelt).to_owned(),
         kind: Kind::Unused,
         why: match (&below, &by_name) {
             (Some(below), Some(by_name)) if below.text() != by_name.text() => {
@@ -268,6 +321,16 @@ fn guess(name: &str, below: &str) -> Column {
         unit_known: unit.is_some(),
         guess,
         named: guess,
+    }
+}
+
+/// A unit as people write it, where that is in a graph too.
+fn spelt(unit: &Unit) -> &str {
+    match unit.text() {
+        "Ao" => "\u{c5}",
+        "''" => "arcsec",
+        "10*-3.''" => "mas",
+        text => text,
     }
 }
 

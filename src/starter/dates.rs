@@ -1,7 +1,7 @@
 //! Decides in which form a column's dates and times are written; whether it is the time is decided beside it.
 
 use athermal::core::time::TimeFormat;
-use athermal::files::{TimeForm, has_clock, has_zone};
+use athermal::files::{TimeForm, has_clock, has_zone, zone_of};
 
 /// A remark on dates and times that do not say how far they are from UTC.
 pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, say whose, so that no hour is lost \
@@ -9,7 +9,7 @@ pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
 /// month that does, where only the numbers could decide.
-const FORMATS: [&str; 25] = [
+const FORMATS: [&str; 35] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
     "%d.%m.%y %H:%M:%S%.f",
@@ -34,6 +34,16 @@ const FORMATS: [&str; 25] = [
     "%m/%d/%y %I:%M:%S%.f %p",
     "%m/%d/%y %I:%M %p",
     "%Y-%m-%d_%H-%M-%S",
+    "%Y-%m-%d %H:%M",
+    "%Y-%m-%d %I:%M:%S%.f %p",
+    "%Y/%m/%d %I:%M:%S%.f %p",
+    "%d-%b-%y %H:%M:%S%.f",
+    "%d.%m.%Y %H:%M:%S%.f %z",
+    "%d/%m/%Y %H:%M:%S%.f %z",
+    "%m/%d/%Y %H:%M:%S%.f %z",
+    "%a %b %d %H:%M:%S %Y",
+    "%b %d, %Y %H:%M:%S%.f",
+    "%Y%m%d %H%M%S",
     "%Y%m%d_%H%M%S",
 ];
 
@@ -45,6 +55,8 @@ pub struct Dates {
     pub declared: (&'static str, String),
     /// Whether they do not say how far they are from UTC.
     pub lacks_zone: bool,
+    /// The zone that a word behind each says.
+    pub zone: Option<String>,
     /// Why it was taken.
     pub why: String,
     /// Another form that reads these cells as well, and otherwise.
@@ -64,6 +76,7 @@ pub fn of(cells: &[String]) -> Option<Dates> {
             form: TimeForm::Rfc3339,
             declared: ("unit", "rfc3339".to_owned()),
             lacks_zone: !zoned,
+            zone: None,
             why: format!("dates and times {which}"),
             other: None,
         });
@@ -71,11 +84,63 @@ pub fn of(cells: &[String]) -> Option<Dates> {
     let known = FORMATS.iter().filter_map(|format| format.parse().ok());
     let mut fitting =
         known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), cells));
-    let format = fitting.next()?;
+    let Some(format) = fitting.next() else {
+        return with_word(cells);
+    };
     let mut found = by(format);
     found.other = fitting.find(|other| reads_otherwise(&found.form, other, cells));
     Some(found)
 }
+
+/// That of dates and times with one word for a zone behind each: `2026-03-02 00:00:00 CET`.
+fn with_word(cells: &[String]) -> Option<Dates> {
+    let (_, word) = cells.first()?.rsplit_once(' ')?;
+    let zone = zone_of(word).filter(|_| word.starts_with(|c: char| c.is_ascii_alphabetic()))?;
+    let bare = cells.iter().map(|cell| {
+        cell.strip_suffix(word)
+            .map(|cell| cell.trim_end().to_owned())
+    });
+    let bare: Vec<String> = bare.collect::<Option<_>>()?;
+    let known = FORMATS.iter().filter_map(|format| format.parse().ok());
+    let mut known =
+        known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), &bare));
+    let format: TimeFormat = known.next()?;
+    let mut found = by(format!("{format} {word}").parse().ok()?);
+    found.zone = Some(zone);
+    Some(found)
+}
+
+/// What elapsed times are called.
+const ELAPSED: [&str; 8] = [
+    "elapsed", "duration", "dauer", "laufzeit", "runtime", "uptime", "run time", "h:m",
+];
+
+/// That of hours, minutes and seconds since a beginning: they grow, and begin at zero, or go beyond a day, or are called so.
+pub fn elapsed(cells: &[String], name: &str) -> Option<Dates> {
+    let form = TimeForm::Elapsed;
+    let times = cells.iter().filter_map(|cell| form.read(cell.as_bytes()));
+    let times: Vec<i64> = times.collect();
+    let last = *times.last()?;
+    let grow = times.windows(2).filter(|pair| pair[1] >= pair[0]).count();
+    let (name, step) = (name.to_lowercase(), last / times.len() as i64);
+    let is_called = ELAPSED.iter().any(|of| name.contains(of));
+    let begins = times[0] == 0 || last >= DAY_NS || is_called && times[0] <= 2 * step.max(1);
+    let fits = fits(&form, cells) && grow * 100 >= (times.len() - 1) * 95 && last > times[0];
+    (fits && (begins || is_called)).then(|| Dates {
+        form,
+        declared: ("unit", "h:min:s".to_owned()),
+        lacks_zone: false,
+        zone: None,
+        why: format!(
+            "hours, minutes and seconds that have elapsed, from {} on",
+            cells[0]
+        ),
+        other: None,
+    })
+}
+
+/// A day in ns.
+const DAY_NS: i64 = 86_400_000_000_000;
 
 /// That of a format.
 pub fn by(format: TimeFormat) -> Dates {
@@ -87,6 +152,7 @@ pub fn by(format: TimeFormat) -> Dates {
     Dates {
         declared: ("format", format.to_string()),
         lacks_zone,
+        zone: None,
         why,
         other: None,
         form: TimeForm::Format(format),

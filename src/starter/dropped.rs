@@ -9,6 +9,9 @@ use athermal_analysis::figures::{count, counted};
 /// So many rows whose time is out of order are no slips: the clock was set back.
 const SET_BACK: u64 = 10;
 
+/// Where all rows but so many are such, they are as the log is.
+const FEW: u64 = 3;
+
 /// Remarks on the rows of a log that were not taken, and on those that were put together.
 pub fn remarks(report: &Report, clock: &Clock) -> Vec<String> {
     let left_out = [
@@ -36,6 +39,24 @@ pub fn remarks(report: &Report, clock: &Clock) -> Vec<String> {
             };
             remarks.push(format!(
                 "{} of {} {what}, and {are} left out; the first: {first}{cause}",
+                count(found.count),
+                counted(all, "row")
+            ));
+        }
+    }
+    let kept = [
+        (
+            &report.short_rows,
+            "without their last cells",
+            "taken as missing",
+        ),
+        (&report.notes, "with a note behind them", "passed over"),
+    ];
+    for (found, what, then) in kept {
+        let is_usual = found.count > 20 && report.rows.saturating_sub(found.count) <= FEW;
+        if let Some(first) = found.first.as_ref().filter(|_| !is_usual) {
+            remarks.push(format!(
+                "{} of {} stand {what}, which are {then}; the first: {first}",
                 count(found.count),
                 counted(all, "row")
             ));

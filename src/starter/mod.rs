@@ -77,6 +77,13 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     if let Some(long) = described.long_format() {
         return Err(NoStarter::Unfit(long.to_string()));
     }
+    if described.lacks_names() {
+        return Err(NoStarter::Unfit(format!(
+            "its first line holds numbers, such as `{}`, and no names: write a line with the names of the columns above it, such as \
+             time_s,plate_degC,Z_nm",
+            described.columns[0]
+        )));
+    }
     if let Some(why) = too_few(&described) {
         return Err(NoStarter::Unfit(why));
     }

@@ -134,6 +134,47 @@ impl Series {
         Some(gaps[(share * last as f64).round() as usize])
     }
 
+    /// Whether it only counts rows, or the time: whole numbers that rise by the same step in nearly each row, by several where rows are
+    /// missing, and may start again; or what grows as evenly as the time does.
+    fn counts(&self) -> bool {
+        let steps = || self.values.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut sorted: Vec<f64> = steps().collect();
+        sorted.sort_by(f64::total_cmp);
+        let Some(&usual) = sorted.get(sorted.len() / 2).filter(|step| **step != 0.0) else {
+            return false;
+        };
+        let is_most = |such: usize, of_hundred: usize| such * 100 >= sorted.len() * of_hundred;
+        if self.values.iter().all(|value| value.fract() == 0.0) {
+            let same = steps().filter(|step| *step == usual).count();
+            let least = self.extremes().0;
+            let goes_on = |pair: &&[f64]| {
+                let times = (pair[1] - pair[0]) / usual;
+                times >= 1.0 && times.fract() == 0.0 || pair[1] <= least + 2.0 * usual.abs()
+            };
+            let falls = steps().filter(|step| step * usual < 0.0).count();
+            let regular = self.values.windows(2).filter(goes_on).count();
+            return is_most(same, 50) && is_most(regular, 95) && falls * 5 <= sorted.len();
+        }
+        let (Some(first), Some(last)) = (self.time_s.first(), self.time_s.last()) else {
+            return false;
+        };
+        let (from, to) = (self.values[0], self.values[self.values.len() - 1]);
+        let rate = (to - from) / (last - first);
+        let off = |(time_s, value): (&f64, &f64)| (value - from - rate * (time_s - first)).abs();
+        let pairs = self.time_s.iter().zip(&self.values);
+        rate != 0.0 && pairs.map(off).fold(0.0, f64::max) <= 1e-5 * (to - from).abs()
+    }
+
+    /// The stretches in s between gaps that a window of this width does not bridge.
+    #[must_use]
+    pub fn stretches(&self, width_s: f64) -> Vec<f64> {
+        let longest = (width_s / 2.0).max(2.5 * self.gap(0.5).unwrap_or(0.0));
+        let pieces = self.time_s.chunk_by(|a, b| b - a <= longest);
+        pieces
+            .map(|piece| piece[piece.len() - 1] - piece[0])
+            .collect()
+    }
+
     /// Where it leaps.
     fn leaps(&self) -> Option<Leaps> {
         let mut finder = Finder::default();
@@ -179,7 +220,7 @@ impl Survey {
             time: TimeColumn {
                 columns: clock.columns.clone(),
                 form: clock.form.clone(),
-                zone: None,
+                zone: clock.zone.as_ref().and_then(|zone| zone.parse().ok()),
             },
             channels: columns
                 .iter()
@@ -237,6 +278,14 @@ impl Survey {
         })
     }
 
+    /// Whether none of these has a gap that a window of this width does not bridge.
+    #[must_use]
+    pub fn has_no_gap(&self, series: &[&Series], width_s: f64) -> bool {
+        series
+            .iter()
+            .all(|series| series.stretches(width_s).len() <= 1)
+    }
+
     /// Leaves out the columns that say nothing, and warns of cells that cannot be read in those that stay.
     pub fn judge(&self, columns: &mut [Column]) {
         for (series, column) in self.series.iter().zip(columns) {
@@ -284,6 +333,10 @@ impl Survey {
                 ));
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));
+            } else if !column.is_measured() && series.counts() {
+                column.leave_out(
+                    "it rises by the same step in nearly each row, and so counts rows or the time, and nothing of the machine".to_owned(),
+                );
             } else if series.unreadable > 0 {
                 let (cells, all) = (counted(series.unreadable, "cell"), count(cells));
                 let such = if series.unreadable > 1 {

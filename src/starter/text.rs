@@ -48,8 +48,13 @@ pub fn graph(
     writer.time(&mut text);
     lay_out(table, &mut text);
     writer.signals(&mut text);
-    writer.features(&mut text);
-    writer.estimators(&mut text);
+    match &choice.levels {
+        Some(why) => writer.levels(why, &mut text),
+        None => {
+            writer.features(&mut text);
+            writer.estimators(&mut text);
+        }
+    }
     text
 }
 
@@ -134,6 +139,10 @@ impl Writer<'_> {
                 text.push_str("                        # the log does not say how long a sample takes: state it here");
             }
             text.push('\n');
+        }
+        if let Some(zone) = &self.clock.zone {
+            let line = format!("zone = {}", toml_string(zone));
+            let _ = writeln!(text, "{}", beside(&line, "as the log states"));
         }
         if self.clock.lacks_zone {
             text.push_str(
@@ -235,6 +244,51 @@ impl Writer<'_> {
         // To whole seconds, or where that is too coarse to whole milliseconds.
         let step = if age > 2.0 { 1.0 } else { 1e-3 };
         step * (age / step).ceil()
+    }
+
+    /// What drifts as it stands, from the values of what may explain it.
+    fn levels(&self, why: &str, text: &mut String) {
+        let causes = self.temperatures.iter().chain(&self.drives);
+        let causes: Vec<String> = causes.map(|group| toml_string(&group.signal)).collect();
+        let _ = writeln!(text, "\n# {why}.\n# So levels are predicted, not slopes.");
+        let many = self.drifting.len() > 1;
+        for group in &self.drifting {
+            let (node, each, truth) = match group.channels.as_slice() {
+                [one] if !many => ("level".to_owned(), "", format!("{}.{one}", group.signal)),
+                [one] => (
+                    format!("level-{one}"),
+                    "",
+                    format!("{}.{one}", group.signal),
+                ),
+                _ => (
+                    "level".to_owned(),
+                    "each = \"axis\"\n",
+                    format!("{}.{{axis}}", group.signal),
+                ),
+            };
+            let _ = writeln!(
+                text,
+                "{}\ntype = \"linear\"\n{each}inputs.features = {}\ninputs.truth = \"{truth}\"\n{}",
+                beside(
+                    &format!("\n[nodes.{node}]"),
+                    &format!("from {}", causes.join(", ").replace('"', ""))
+                ),
+                list(&causes),
+                beside("ahead = \"0s\"", "the value of now: a virtual sensor"),
+            );
+        }
+        let nodes = self
+            .drifting
+            .iter()
+            .map(|group| match group.channels.as_slice() {
+                [one] if many => toml_string(&format!("level-{one}")),
+                _ => toml_string("level"),
+            });
+        let _ = writeln!(
+            text,
+            "\n[outputs]\npredicted = {}",
+            list(&nodes.collect::<Vec<_>>())
+        );
     }
 
     fn features(&self, text: &mut String) {

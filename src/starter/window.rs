@@ -23,6 +23,20 @@ pub(super) const ENOUGH: f64 = 2.0;
 const FEWEST_OF_FEATURE: f64 = 3.0;
 /// The longest window of a temperature may take up such a share of the log.
 const SHARE_OF_LOG: f64 = 0.15;
+/// Windows fit into a log with gaps where rows of such a share of its stretches have them.
+const SHARE_OF_STRETCHES: f64 = 0.1;
+
+/// The share of what is measured between gaps that has so many windows of a width before it.
+fn share(series: &[&Series], width_s: f64, windows: f64) -> f64 {
+    let share = |series: &&Series| {
+        let stretches = series.stretches(width_s);
+        let within = stretches
+            .iter()
+            .map(|length| (length - windows * width_s).max(0.0));
+        within.sum::<f64>() / stretches.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    };
+    series.iter().map(share).fold(1.0, f64::min)
+}
 
 /// How wide windows are, and what was measured to choose it.
 #[derive(Debug)]
@@ -41,6 +55,8 @@ pub struct Choice {
     pub extreme: Vec<f64>,
     /// Whether the drift rises above its standard error.
     pub enough: bool,
+    /// Why what drifts is predicted as it stands, and not its slope: no window fits between the gaps.
+    pub levels: Option<String>,
     /// Inputs with values too far apart for slopes over the drift window, by number: their last value stands for them.
     pub rare: BTreeSet<usize>,
     /// The temperature whose rate kept narrower windows than the chosen one from being tried.
@@ -95,9 +111,12 @@ impl Choice {
             .max(FEWEST_OF_FEATURE * slowest(&drifting, 0.9));
         let narrowest = of_drifting.max(FEWEST_OF_FEATURE * slowest(&temperatures, 0.9));
         let widest = survey.duration_s / WINDOWS_IN_RECORDING;
-        let widths: Vec<f64> = nice_widths()
+        let mut widths: Vec<f64> = nice_widths()
             .filter(|width| (narrowest..=widest).contains(width))
             .collect();
+        if widths.is_empty() && narrowest <= widest {
+            widths.push(rounded(narrowest));
+        }
         if widths.is_empty() {
             return Err(format!(
                 "it is too short: a drift over {}, the least at the rate of its samples, would fit only {:.0} times into it, \
@@ -105,6 +124,27 @@ impl Choice {
                 time(narrowest),
                 survey.duration_s / narrowest.max(f64::MIN_POSITIVE)
             ));
+        }
+        let measured = [&*drifting, &*temperatures].concat();
+        let fits = |width: &f64| share(&measured, *width, 2.0) >= SHARE_OF_STRETCHES;
+        let between: Vec<f64> = widths.iter().copied().filter(fits).collect();
+        let narrowest_try = widths[0];
+        let levels = (between.is_empty() && !temperatures.is_empty()).then(|| {
+            let mut stretches = drifting
+                .iter()
+                .flat_map(|series| series.stretches(narrowest_try))
+                .collect::<Vec<_>>();
+            stretches.sort_by(f64::total_cmp);
+            format!(
+                "no window fits: the narrowest at the rate of the samples is {}, and half of the {} stretches between gaps are shorter \
+                 than {}",
+                time(narrowest_try),
+                stretches.len(),
+                time(stretches.get(stretches.len() / 2).copied().unwrap_or(0.0))
+            )
+        });
+        if !between.is_empty() {
+            widths = between;
         }
         let candidates: Vec<(f64, Vec<f64>)> = widths
             .iter()
@@ -152,9 +192,15 @@ impl Choice {
                 column: column.name.clone(),
                 gap_s: series.gap(0.9).unwrap_or(0.0),
             });
+        let has_room = |harmonic: f64| {
+            let windows = 1.0 + harmonic;
+            survey.has_no_gap(&measured, drift_s)
+                || share(&measured, drift_s, windows) >= 3.0 * SHARE_OF_STRETCHES
+        };
         let fitting = HARMONICS
             .iter()
-            .filter(|harmonic| *harmonic * drift_s <= SHARE_OF_LOG * survey.duration_s);
+            .filter(|harmonic| *harmonic * drift_s <= SHARE_OF_LOG * survey.duration_s)
+            .filter(|harmonic| has_room(**harmonic));
         let harmonics = fitting.count().max(1);
         let drifts: Vec<Drift> = drifting
             .iter()
@@ -168,6 +214,7 @@ impl Choice {
             extreme: drifts.iter().map(Drift::extreme).collect(),
             candidates,
             enough,
+            levels,
             rare,
             bound,
         })
@@ -201,6 +248,12 @@ impl Choice {
             .filter(|column| column.kind == Kind::Drifting);
         let names: Vec<&str> = drifting.map(|column| column.name.as_str()).collect();
         let width = clock.length(self.drift_s);
+        if let Some(why) = &self.levels {
+            let names = names.join(", ");
+            return vec![format!(
+                "{why}; so the graph predicts {names} itself from the values of what may explain it, and not how fast it drifts"
+            )];
+        }
         let here = self.candidates.iter().find(|(at, _)| *at == self.drift_s);
         let ratios = here.map_or(&[][..], |(_, ratios)| ratios);
         let names: Vec<String> = names
@@ -236,6 +289,15 @@ impl Choice {
         }
         remarks
     }
+}
+
+/// A width that people would choose, not below this one.
+fn rounded(width_s: f64) -> f64 {
+    let unit = [86_400.0, 3600.0, 60.0, 1.0, 1e-3]
+        .into_iter()
+        .find(|unit| width_s >= *unit);
+    let unit = unit.unwrap_or(1e-3);
+    unit * (width_s / unit - 1e-6).ceil()
 }
 
 /// The shortest window of what explains a drift over `drift_s`, at least what its rate needs: to whole seconds, or where

@@ -50,7 +50,7 @@ fn a_log_of_years_is_told_to_be_short_in_days() {
 }
 
 #[test]
-fn names_beyond_the_longest_row_and_names_that_stand_twice_are_told() {
+fn names_beyond_the_longest_row_are_refused_and_names_that_stand_twice_are_numbered() {
     let names: String = (0..80_000)
         .map(|nth| format!(",column_{nth}_degC"))
         .collect();
@@ -62,7 +62,7 @@ fn names_beyond_the_longest_row_and_names_that_stand_twice_are_told() {
     says(
         "twice",
         "time_s,plate_degC,plate_degC\n0,1,2\n",
-        "the name `plate_degC` stands at columns 2 and 3",
+        "below the names of its columns (time_s, plate_degC[1], plate_degC[2])",
     );
 }
 

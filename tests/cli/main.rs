@@ -19,6 +19,7 @@ mod explain;
 mod faulty_logs;
 mod first_minutes;
 mod fit_json;
+mod forms_of_logs;
 mod graph_file_page;
 mod init_refuses;
 mod init_warnings;

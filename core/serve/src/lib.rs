@@ -5,7 +5,8 @@
 //! # A reader's path
 //!
 //! [`sequencer::Sequencer`] first: it decides which samples make a tick, and when. Then [`journal::Record`], which is such a decision in
-//! the journal, and [`replay::Replay`], which applies it again.
+//! the journal, and [`replay::Replay`], which applies it again. [`worker::Worker`] is all that the engine thread does at a tick,
+//! [`keeper::Keeper`] what the control thread does beside it, and [`recovery::Recovered`] what a start does.
 //!
 //! # The layers
 //!
@@ -15,11 +16,19 @@
 //! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
 //! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
 //! | [`replay`] | a log through an engine, to the same bits |
+//! | [`worker`] | the engine thread: samples in, ticks through the engine, decisions into the journal |
+//! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
+//! | [`recovery`] | from there to where the service was |
 
+pub mod checkpoint;
+pub mod folder;
 pub mod journal;
+pub mod keeper;
 pub mod moment;
+pub mod recovery;
 pub mod replay;
 pub mod sequencer;
+pub mod worker;
 
 // The layers below, by the names that they have for everybody.
 use athermal_core::{channel, compile, engine, time};

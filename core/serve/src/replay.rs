@@ -123,10 +123,16 @@ impl Replay {
         self.find_places(&feed);
     }
 
-    /// The engine and what waits.
+    /// The channels and sources of the log.
     #[must_use]
-    pub fn into_parts(self) -> (Engine, Timeline) {
-        (self.engine, self.timeline)
+    pub fn feed(&self) -> &FeedNames {
+        &self.feed
+    }
+
+    /// The engine.
+    #[must_use]
+    pub fn into_engine(self) -> Engine {
+        self.engine
     }
 
     fn find_places(&mut self, feed: &FeedNames) {

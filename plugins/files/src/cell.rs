@@ -35,6 +35,19 @@ fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     if cell.is_empty() || cell.eq_ignore_ascii_case(b"null") {
         return Some(f64::NAN);
     }
+    // Some recorders write signs where a value is beyond the range, and one apart from its number.
+    if let [sign @ (b'+' | b'-'), rest @ ..] = cell {
+        if rest.len() >= 2 && rest.iter().all(|byte| byte == sign) {
+            return Some(f64::NAN);
+        }
+        let number = rest.trim_ascii_start();
+        let is_apart = number.len() < rest.len();
+        let begins = |byte: &u8| byte.is_ascii_digit() || *byte == b'.';
+        if is_apart && number.first().is_some_and(begins) {
+            let size = value(number, decimal_comma)?;
+            return Some(if *sign == b'-' { -size } else { size });
+        }
+    }
     if cell.eq_ignore_ascii_case(b"true") {
         return Some(1.0);
     }
@@ -53,7 +66,7 @@ fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
 
 /// Whether a cell holds a value, whichever its decimal mark: neither text nor nothing.
 pub(crate) fn is_number(cell: &str) -> bool {
-    !cell.is_empty() && value(cell.as_bytes(), true).is_some()
+    cell.contains(char::is_alphanumeric) && value(cell.as_bytes(), true).is_some()
 }
 
 /// A time with a point for a decimal comma, as a reader takes it where something else than a comma separates cells.
@@ -147,6 +160,19 @@ mod tests {
         assert_eq!(value(b" 21.5\t", false), Some(21.5));
         assert_eq!(value(b"+3", false), Some(3.0));
         assert_eq!(value(b" \"4\" ", false), Some(4.0));
+    }
+
+    #[test]
+    fn a_sign_may_stand_apart_and_signs_alone_are_no_value() {
+        assert_eq!(value(b"+   21.20", false), Some(21.2));
+        assert_eq!(value(b" -  0,5", true), Some(-0.5));
+        assert_eq!(value(b"- .5", false), Some(-0.5));
+        for text in ["+++++++", "-------"] {
+            assert!(value(text.as_bytes(), false).is_some_and(f64::is_nan));
+        }
+        for text in ["- -5", "+-5", "-", "--", "+ x", "5 -"] {
+            assert_eq!(value(text.as_bytes(), false), None, "{text}");
+        }
     }
 
     #[test]

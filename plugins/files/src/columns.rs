@@ -89,24 +89,52 @@ impl Columns {
     }
 }
 
-/// Refuses names that stand twice; columns without a name may be many.
-pub(crate) fn check_unique(
-    names: &[String],
-    place: impl FnOnce() -> Place,
-) -> Result<(), FileError> {
-    let mut sorted: Vec<usize> = (0..names.len()).filter(|&i| !names[i].is_empty()).collect();
-    sorted.sort_by(|&a, &b| names[a].cmp(&names[b]).then(a.cmp(&b)));
-    match sorted
-        .windows(2)
-        .find(|pair| names[pair[0]] == names[pair[1]])
+/// Names of which each stands once: one that stands at several columns has the number of its place among them, `Temp[1]`,
+/// `Temp[2]`. Columns without a name may be many.
+pub(crate) fn numbered(mut names: Vec<String>) -> Vec<String> {
+    let mut places: HashMap<&str, Vec<usize>> = HashMap::new();
+    for (at, name) in names
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| !name.is_empty())
     {
-        None => Ok(()),
-        Some(pair) => Err(FileError::DuplicateColumn {
-            place: place(),
-            column: excerpt(names[pair[0]].as_bytes()),
-            positions: [pair[0] + 1, pair[1] + 1],
-        }),
+        places.entry(name).or_default().push(at);
     }
+    if places.values().all(|at| at.len() == 1) {
+        return names;
+    }
+    let known: HashSet<&str> = places.keys().copied().collect();
+    let mut others = Vec::new();
+    for (name, places) in places.iter().filter(|(_, places)| places.len() > 1) {
+        let free = (1..).map(|number| format!("{name}[{number}]"));
+        let free = free.filter(|name| !known.contains(name.as_str()));
+        others.extend(places.iter().copied().zip(free));
+    }
+    for (at, name) in others {
+        names[at] = name;
+    }
+    names
+}
+
+/// The error for a wanted name that stands at several columns, where one does.
+pub(crate) fn ambiguous(place: Place, wanted: &[&str], names: &[String]) -> Option<FileError> {
+    let numbers = |column: &str, name: &str| {
+        let number = name
+            .strip_prefix(column)?
+            .strip_prefix('[')?
+            .strip_suffix(']')?;
+        number.parse::<usize>().ok()
+    };
+    wanted.iter().find_map(|column| {
+        let places = names.iter().enumerate();
+        let places = places.filter(|(_, name)| numbers(column, name).is_some());
+        let mut places = places.map(|(at, _)| at + 1);
+        Some(FileError::DuplicateColumn {
+            place: place.clone(),
+            column: excerpt(column.as_bytes()),
+            positions: [places.next()?, places.next()?],
+        })
+    })
 }
 
 /// Columns that are not among the names found, each with the one that is most like it.
@@ -178,22 +206,20 @@ mod tests {
     }
 
     #[test]
-    fn a_doubled_name_is_refused_with_both_places() {
-        let names = ["a", "b", "", "", "a"].map(str::to_owned);
-        let place = || Place {
+    fn a_doubled_name_is_numbered_and_refused_where_it_is_read_without_its_number() {
+        let names = numbered(["a", "b", "", "", "a", "a[1]"].map(str::to_owned).to_vec());
+        assert_eq!(names, ["a[2]", "b", "", "", "a[3]", "a[1]"]);
+        let names = numbered(["a", "b", "", "", "a"].map(str::to_owned).to_vec());
+        assert_eq!(names, ["a[1]", "b", "", "", "a[2]"]);
+        let place = Place {
             file: "f".into(),
             line: 1,
         };
-        let error = check_unique(&names, place).unwrap_err();
+        let error = ambiguous(place.clone(), &["b", "a"], &names).unwrap();
         assert_eq!(
             error.to_string(),
-            "f:1: the name `a` stands at columns 1 and 5; give each column a name of its own"
+            "f:1: the name `a` stands at columns 1 and 5; write `a[1]` or `a[2]` for one of them, by its place among these"
         );
-        assert!(check_unique(&names[..4], place).is_ok());
-        let pairs = ["Time", "a", "Time", "b"].map(str::to_owned);
-        assert_eq!(
-            check_unique(&pairs, place).unwrap_err().to_string(),
-            "f:1: the name `Time` stands at columns 1 and 3; export the log with one time for all columns"
-        );
+        assert!(ambiguous(place, &["b", "c"], &names).is_none());
     }
 }

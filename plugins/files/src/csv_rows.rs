@@ -6,7 +6,8 @@ use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 use crate::cell::{self, is_number};
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
-use crate::detect::{self, Head, LongFormat, are_units};
+use crate::detect::{self, Head, LongFormat, are_units, is_of_processing};
+use crate::error::excerpt;
 use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
 use crate::{FileError, Layout, Place};
@@ -27,8 +28,10 @@ pub(crate) struct CsvRows {
     below_names: Option<u32>,
     /// How many cells a row has; 0 until the first row below the names.
     width: usize,
-    /// Whether rows, but not the names, end in a separator.
+    /// Whether rows, but not the names, end in a separator, or in a note behind it.
     ends_in_separator: bool,
+    /// Which row from the names on has the units, where one has; the names are 1.
+    units_row: u32,
     /// Whether the names are not in UTF-8.
     windows_1252: bool,
     layout: Option<Layout>,
@@ -62,6 +65,9 @@ impl CsvRows {
         let lacking = rows.columns.lacking(layout);
         if lacking.is_empty() {
             return Ok(rows);
+        }
+        if let Some(ambiguous) = columns::ambiguous(rows.place(), &lacking, &rows.names) {
+            return Err(ambiguous);
         }
         let missing = rows.missing(lacking, &rows.names);
         if rows.columns.channels.iter().any(Option::is_some) {
@@ -120,6 +126,7 @@ impl CsvRows {
             below_names: None,
             width: 0,
             ends_in_separator: false,
+            units_row: 1,
             windows_1252: false,
             layout: layout.cloned(),
             columns: Columns::default(),
@@ -145,9 +152,8 @@ impl CsvRows {
                 found: "these names are not in UTF-8".to_owned(),
             });
         }
-        rows.names = rows.current(cells);
+        rows.names = columns::numbered(rows.current(cells));
         rows.expect_below_names();
-        columns::check_unique(&rows.names, || rows.place())?;
         Ok(rows)
     }
 
@@ -172,6 +178,11 @@ impl CsvRows {
     /// The units in the row below the names; none where there is no such row, known once a row was read.
     pub fn units(&self) -> &[String] {
         &self.units
+    }
+
+    /// Which row from the names on has the units; the names are 1.
+    pub fn units_row(&self) -> u32 {
+        self.units_row
     }
 
     /// What stands between cells.
@@ -216,8 +227,8 @@ impl CsvRows {
                 return Ok(None);
             }
             self.width = expected;
-            self.ends_in_separator = cells == expected + 1 && row[expected].is_empty();
-            if cells == expected || self.ends_in_separator {
+            self.ends_in_separator = cells == expected + 1 && !is_number(&row[expected]);
+            if cells == expected {
                 return Ok(Some(true));
             }
         }
@@ -225,6 +236,26 @@ impl CsvRows {
         if !complete && cells < expected {
             ledger.report.truncated = Some(place);
             return Ok(Some(false));
+        }
+        if cells == expected + 1 && self.ends_in_separator {
+            let beyond = columns::name(self.column(expected));
+            if !is_number(&beyond) {
+                if !beyond.is_empty() {
+                    ledger.note(|| FileError::CellBeyond {
+                        place,
+                        found: excerpt(beyond.as_bytes()),
+                    });
+                }
+                return Ok(Some(true));
+            }
+        } else if cells < expected && self.may_lack(cells) {
+            ledger.short_row(|| FileError::CellsLacking {
+                place,
+                expected,
+                found: cells,
+            });
+            self.fill(cells);
+            return Ok(Some(true));
         }
         ledger.refuse_row(|| FileError::CellCount {
             place,
@@ -234,22 +265,40 @@ impl CsvRows {
         Ok(None)
     }
 
+    /// Whether a row of so few cells has a time, and more.
+    fn may_lack(&self, cells: usize) -> bool {
+        let begins = |at: &usize| {
+            let mut cell = cell::trim(self.column(*at)).iter();
+            let first = cell.find(|byte| !b"+-.".contains(byte));
+            first.is_some_and(u8::is_ascii_digit)
+        };
+        let mut time = self.columns.time.iter().flatten();
+        cells > 1 && time.all(|at| *at < cells && begins(at))
+    }
+
+    /// Gives the current row of so many cells empty ones for the columns behind them.
+    fn fill(&mut self, cells: usize) {
+        let end = cells.checked_sub(1).map_or(0, |last| self.ends[last]);
+        let width = self.names.len();
+        self.ends.resize(self.ends.len().max(width), 0);
+        self.ends[cells..width].fill(end);
+    }
+
     /// Whether this row, below the names and above the data, is one of units, or one that is declared to be no data.
     fn takes_units(&mut self, row: &[String], ledger: &mut Ledger) -> Result<bool, FileError> {
         let is_units = match &mut self.below_names {
-            Some(0) => return Ok(false),
+            _ if row.len() > self.names.len() + 1 => return Ok(false),
+            Some(0) => return Ok(!self.units.is_empty() && is_of_processing(row)),
             Some(rows) => {
                 *rows -= 1;
                 *rows == 0
             }
-            None => {
-                let fits = self.units.is_empty() && row.len() <= self.names.len() + 1;
-                if !fits || !are_units(row) {
-                    return Ok(false);
-                }
-                true
-            }
+            None if !self.units.is_empty() => return Ok(is_of_processing(row)),
+            None if is_of_processing(row) => false,
+            None if are_units(row) => true,
+            None => return Ok(false),
         };
+        self.units_row += 1;
         if !is_units {
             return Ok(true);
         }
@@ -301,6 +350,7 @@ impl CsvRows {
             let first = names[0].trim_start().trim_start_matches('#');
             names[0] = first.trim().to_owned();
         }
+        let names = columns::numbered(names);
         let columns = Columns::of(layout, &names);
         let lacking = columns.lacking(layout);
         if !lacking.is_empty() && is_above || !columns.are_named(layout) {
@@ -312,10 +362,10 @@ impl CsvRows {
         }
         // Shorter names that lack columns were cut off, or rows below them will not fit those before.
         let is_whole = cells >= self.names.len() && columns.have_time();
-        let unusable = match columns::check_unique(&names, || self.place()) {
-            Ok(()) if lacking.is_empty() || ledger.is_lenient() && is_whole => None,
-            Ok(()) => Some(self.missing(lacking.clone(), &names)),
-            Err(error) => Some(error),
+        let unusable = match columns::ambiguous(self.place(), &lacking, &names) {
+            None if lacking.is_empty() || ledger.is_lenient() && is_whole => None,
+            None => Some(self.missing(lacking.clone(), &names)),
+            ambiguous => ambiguous,
         };
         if let Some(error) = unusable {
             ledger.refuse_header(error)?;
@@ -332,6 +382,7 @@ impl CsvRows {
         });
         (self.names, self.columns) = (names, columns);
         self.units.clear();
+        self.units_row = 1;
         self.expect_below_names();
         self.width = 0;
         self.ends_in_separator = false;

@@ -22,6 +22,11 @@ impl From<&Declared> for TimeForm {
                 ns_per_unit: unit.as_ns(),
             },
             Declared::Rfc3339 => Self::Rfc3339,
+            Declared::Elapsed => Self::Elapsed,
+            Declared::Since { unit, origin_ns } => Self::Since {
+                ns_per_unit: unit.as_ns(),
+                origin_ns: *origin_ns,
+            },
             Declared::Format(format) => Self::Format(format.clone()),
             Declared::Samples { step } => Self::Samples {
                 step_ns: step.unwrap_or(ONE_SECOND).as_ns(),

@@ -53,6 +53,11 @@ impl Decimal {
 
     /// The number times `factor`, rounded to the nearest whole number, halves away from zero; `None` when it does not fit.
     pub fn times(self, factor: i64) -> Option<i64> {
+        i64::try_from(self.product(factor)?).ok()
+    }
+
+    /// The same in 128 bits.
+    pub fn product(self, factor: i64) -> Option<i128> {
         let negative = self.negative != (factor < 0);
         let factor = u128::from(factor.unsigned_abs());
         let (mut mantissa, mut exponent) = (self.mantissa, self.exponent);
@@ -72,7 +77,7 @@ impl Decimal {
             None => product = 0,
         }
         let size = i128::try_from(product).ok()?;
-        i64::try_from(if negative { -size } else { size }).ok()
+        Some(if negative { -size } else { size })
     }
 
     /// Whether nothing stands behind the decimal point but zeros.

@@ -246,6 +246,34 @@ pub enum FileError {
         /// The number of cells in the row.
         found: usize,
     },
+    /// A row that ends before its last columns.
+    CellsLacking {
+        /// The row.
+        place: Place,
+        /// The number of columns in the header.
+        expected: usize,
+        /// The number of cells in the row.
+        found: usize,
+    },
+    /// A text behind the last column that has a name.
+    CellBeyond {
+        /// The row.
+        place: Place,
+        /// The text.
+        found: String,
+    },
+    /// The file is of a kind that is no table of text.
+    NoTable {
+        /// The name of the file.
+        file: Arc<str>,
+        /// What it is, and what to do.
+        what: &'static str,
+    },
+    /// A table whose cells are parted by spaces.
+    CellsOfSpaces {
+        /// The header.
+        place: Place,
+    },
     /// A line that is not one JSON object.
     BadObject {
         /// The line.
@@ -295,6 +323,7 @@ impl FileError {
             | Self::Merge(_)
             | Self::Empty { .. }
             | Self::NotBegun { .. }
+            | Self::NoTable { .. }
             | Self::ValueCount { .. } => None,
             Self::StillRefused { newest, .. } => newest.place(),
             Self::Read { place, .. }
@@ -312,6 +341,9 @@ impl FileError {
             | Self::LongOutOfOrder { place, .. }
             | Self::LongFormat { place, .. }
             | Self::CellCount { place, .. }
+            | Self::CellsLacking { place, .. }
+            | Self::CellBeyond { place, .. }
+            | Self::CellsOfSpaces { place }
             | Self::BadObject { place, .. }
             | Self::JsonArray { place } => Some(place),
         }

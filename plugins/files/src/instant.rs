@@ -12,6 +12,9 @@ use crate::{TimeColumn, TimeForm};
 /// A civil date is ten characters long; only behind it can a sign belong to an offset.
 const DATE_LENGTH: usize = 10;
 
+/// Behind a date and time these say that it is UTC.
+const WORDS_OF_UTC: [&[u8]; 4] = [b" UTC", b" GMT", b"UTC", b" Z"];
+
 impl TimeColumn {
     /// What a trimmed cell stands for, or `None` if it is not of this form. Where times come twice, `last` says which is meant: the
     /// instant before, with the time from one to the next in ns.
@@ -40,6 +43,14 @@ impl TimeForm {
                 number.is_whole().then(|| number.times(step_ns))?
             }
             Self::Rfc3339 => i64::try_from(timestamp(text)?.as_nanosecond()).ok(),
+            Self::Elapsed => i64::try_from(elapsed(text)?).ok(),
+            Self::Since {
+                ns_per_unit,
+                origin_ns,
+            } => {
+                let since = Decimal::parse(text)?.product(ns_per_unit)?;
+                i64::try_from(since.checked_sub(origin_ns)?).ok()
+            }
             Self::Format(ref format) => i64::try_from(format.read(text)?).ok(),
         }
     }
@@ -48,7 +59,8 @@ impl TimeForm {
     fn is_beyond(&self, text: &[u8]) -> bool {
         let is_of_form = match self {
             Self::Format(format) => format.read(text).is_some(),
-            Self::Numbers { .. } => Decimal::parse(text).is_some(),
+            Self::Numbers { .. } | Self::Since { .. } => Decimal::parse(text).is_some(),
+            Self::Elapsed => elapsed(text).is_some(),
             Self::Samples { .. } => Decimal::parse(text).is_some_and(Decimal::is_whole),
             Self::Rfc3339 => timestamp(text).is_some(),
         };
@@ -60,14 +72,17 @@ impl TimeForm {
         match self {
             Self::Rfc3339 => Some(has_zone(text)),
             Self::Format(format) => Some(format.has_offset()),
-            Self::Numbers { .. } | Self::Samples { .. } => None,
+            Self::Numbers { .. } | Self::Samples { .. } | Self::Elapsed | Self::Since { .. } => {
+                None
+            }
         }
     }
 
     /// What a cell should look like, for a message.
     pub(crate) fn expected(&self) -> String {
         match self {
-            Self::Numbers { .. } => "a decimal number".to_owned(),
+            Self::Numbers { .. } | Self::Since { .. } => "a decimal number".to_owned(),
+            Self::Elapsed => "hours, minutes and seconds such as 29:59:00".to_owned(),
             Self::Samples { .. } => "a whole sample number".to_owned(),
             Self::Rfc3339 => "a date and time such as 2013-07-04T00:00:00Z".to_owned(),
             Self::Format(format) => format!("a date and time as `{format}` says"),
@@ -78,6 +93,9 @@ impl TimeForm {
 /// Whether a date and time says how far it is from UTC. The name of a region in brackets does not: twice a year it says two things.
 #[must_use]
 pub fn has_zone(text: &[u8]) -> bool {
+    if is_in_utc(text).is_some() {
+        return true;
+    }
     let behind_date = text.iter().skip(DATE_LENGTH);
     let mut clock = behind_date.take_while(|b| **b != b'[');
     clock.any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'))
@@ -100,8 +118,63 @@ pub fn is_time_of_day(text: &str) -> bool {
     has_clock(clock) && clock.bytes().all(is_part)
 }
 
+/// The date and time before a word that says UTC.
+fn is_in_utc(text: &[u8]) -> Option<&[u8]> {
+    let last = text.last()?;
+    if !b"CTZ".contains(last) {
+        return None;
+    }
+    let mut words = WORDS_OF_UTC.iter();
+    words.find_map(|word| text.strip_suffix(*word))
+}
+
+/// The time in ns that hours, minutes and seconds say, with days before them or without.
+fn elapsed(text: &[u8]) -> Option<i128> {
+    let text = std::str::from_utf8(text).ok()?;
+    let (sign, text) = match text.strip_prefix('-') {
+        Some(rest) => (-1, rest),
+        None => (1, text),
+    };
+    let (before, clock) = match text.rsplit_once(' ') {
+        Some((days, clock)) => {
+            let (number, word) = days.split_once(' ').unwrap_or((days, "d"));
+            let is_day = ["d", "day", "days", "day,", "days,"].contains(&word);
+            (is_day.then_some(number)?, clock)
+        }
+        None => match text.split_once(':')?.0.split_once('.') {
+            Some((days, _)) => (days, &text[days.len() + 1..]),
+            None => ("0", text),
+        },
+    };
+    let whole = |part: &str| {
+        let digits = !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+        digits.then(|| part.parse::<i64>().ok())?.map(i128::from)
+    };
+    let mut parts = clock.splitn(3, ':');
+    let (hours, minutes) = (whole(parts.next()?)?, whole(parts.next()?)?);
+    let seconds = parts.next().unwrap_or("0");
+    let begins = seconds.starts_with(|first: char| first.is_ascii_digit());
+    let seconds = Decimal::parse(seconds.as_bytes()).filter(|_| begins)?;
+    let seconds = seconds.product(1_000_000_000)?;
+    let is_clock = minutes < 60 && (0..60_000_000_000).contains(&seconds);
+    let minutes = (whole(before)? * 24 + hours) * 60 + minutes;
+    is_clock.then_some(sign * (minutes * 60_000_000_000 + seconds))
+}
+
 fn timestamp(text: &[u8]) -> Option<Timestamp> {
     static PARSER: DateTimeParser = DateTimeParser::new();
+    if let Some(civil) = is_in_utc(text) {
+        let civil = PARSER.parse_datetime(civil.trim_ascii_end()).ok();
+        return civil.and_then(|civil| Offset::UTC.to_timestamp(civil).ok());
+    }
+    // Some write the offset apart.
+    if let Some(at) = text.iter().rposition(|byte| *byte == b' ')
+        && at > DATE_LENGTH
+        && matches!(text.get(at + 1), Some(b'+' | b'-'))
+    {
+        let whole = [&text[..at], &text[at + 1..]].concat();
+        return PARSER.parse_timestamp(&whole).ok();
+    }
     if has_zone(text) {
         return PARSER.parse_timestamp(text).ok();
     }
@@ -129,6 +202,59 @@ mod tests {
             "2013-07-04T00:00:00Z",
         ] {
             assert_eq!(TimeForm::Rfc3339.read(text.as_bytes()), Some(DAY), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_word_or_an_offset_apart_says_the_zone() {
+        let two_hours = 7_200_000_000_000;
+        for (text, ns) in [
+            ("2013-07-04 00:00:00 UTC", DAY),
+            ("2013-07-04T00:00:00UTC", DAY),
+            ("2013-07-04 00:00 GMT", DAY),
+            ("2013-07-04 00:00:00 Z", DAY),
+            ("2013-07-04 00:00:00 +02:00", DAY - two_hours),
+            ("2013-07-04 00:00:00 -0200", DAY + two_hours),
+        ] {
+            assert_eq!(TimeForm::Rfc3339.read(text.as_bytes()), Some(ns), "{text}");
+            assert!(has_zone(text.as_bytes()), "{text}");
+        }
+        assert_eq!(TimeForm::Rfc3339.read(b" UTC"), None);
+        assert_eq!(TimeForm::Rfc3339.read(b"2013-07-04 00:00:00 CET"), None);
+    }
+
+    #[test]
+    fn elapsed_times_go_beyond_a_day_and_other_times_have_origins_of_their_own() {
+        let read = |text: &str| TimeForm::Elapsed.read(text.as_bytes());
+        let hours = |hours: i64| Some(hours * 3_600_000_000_000);
+        for (text, ns) in [
+            ("29:00:00", hours(29)),
+            ("1.05:00:00", hours(29)),
+            ("1 05:00:00", hours(29)),
+            ("1 day, 5:00:00", hours(29)),
+            ("2 days 05:00:00.0", hours(53)),
+            ("0:00:00.5", Some(500_000_000)),
+            ("-1:00", hours(-1)),
+            ("1:60:00", None),
+            ("1:00:60", None),
+            ("1 week 1:00:00", None),
+            ("1::00", None),
+            ("12", None),
+            ("99999999999999999999:00:00", None),
+        ] {
+            assert_eq!(read(text), ns, "{text}");
+        }
+        for (ns_per_unit, origin_ns, text) in [
+            (100, 11_644_473_600_000_000_000, "130173696000000000"),
+            (100, 62_135_596_800_000_000_000, "635084928000000000"),
+            (86_400_000_000_000, 210_866_760_000_000_000_000, "2456477.5"),
+        ] {
+            let form = TimeForm::Since {
+                ns_per_unit,
+                origin_ns,
+            };
+            assert_eq!(form.read(text.as_bytes()), Some(DAY), "{text}");
+            assert_eq!(form.read(b"1e99"), None);
         }
     }
 

@@ -52,6 +52,15 @@ pub enum TimeForm {
     Rfc3339,
     /// Dates and times in another form, such as `04.07.2013 00:00:00`.
     Format(TimeFormat),
+    /// Hours, minutes and seconds since a beginning, with days before them or without: `29:59:00`, `1.05:59:00`, `1 day, 5:59:00`.
+    Elapsed,
+    /// Decimal numbers of a unit that count from another origin than 1970, as Julian days do.
+    Since {
+        /// Nanoseconds in one unit.
+        ns_per_unit: i64,
+        /// How far before 1970 the origin lies, in ns.
+        origin_ns: i128,
+    },
     /// Whole sample numbers, a fixed time apart.
     Samples {
         /// Nanoseconds from one sample to the next.

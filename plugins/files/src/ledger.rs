@@ -26,6 +26,10 @@ pub struct Report {
     pub bad_cells_of: Vec<Count>,
     /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
     pub refused_rows: Count,
+    /// Rows that ended before their last columns, which are taken as missing ([`FileError::CellsLacking`]).
+    pub short_rows: Count,
+    /// Rows with a text behind the last column that has a name ([`FileError::CellBeyond`]).
+    pub notes: Count,
     /// Rows within the recording that name its columns again as before ([`FileError::HeaderAgain`]).
     pub headers: Count,
     /// Those that name them in other places, unless each was reported at once.
@@ -341,6 +345,16 @@ impl Ledger {
             return Ok(());
         }
         Err(error)
+    }
+
+    /// A row that is taken without its last cells.
+    pub fn short_row(&mut self, error: impl FnOnce() -> FileError) {
+        self.report.short_rows.add(error, &mut self.on_first);
+    }
+
+    /// A text that is passed over, behind a row that is taken.
+    pub fn note(&mut self, error: impl FnOnce() -> FileError) {
+        self.report.notes.add(error, &mut self.on_first);
     }
 
     /// A row that cannot be used.

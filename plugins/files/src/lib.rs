@@ -45,12 +45,13 @@ mod merge;
 mod reader;
 mod recording;
 mod stream;
+mod unpacked;
 mod writer;
 
 pub use begun::begun_columns;
 pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
-pub use detect::{Description, Format, LongFormat};
+pub use detect::{Description, Format, LongFormat, NumberForm, zone_in_name, zone_of};
 pub use error::{Again, CellFault, FileError, MissingColumn, Place};
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};

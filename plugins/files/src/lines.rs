@@ -11,6 +11,7 @@ use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::detect::begins_json_array;
+use crate::unpacked::{NoText, Unpacked};
 use crate::{FileError, Format, Place};
 
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
@@ -58,7 +59,7 @@ impl Lines {
             .bom_sniffing(encoding.is_none())
             .utf8_passthru(true)
             .strip_bom(true)
-            .build(input);
+            .build(Unpacked::New(Box::new(input)));
         Self {
             file,
             input: BufReader::with_capacity(BUFFER, Box::new(decoded)),
@@ -112,6 +113,13 @@ impl Lines {
             .take(limit)
             .read_until(b'\n', &mut self.line);
         if let Err(source) = read {
+            let inner = source.get_ref().and_then(|inner| inner.downcast_ref());
+            if let Some(NoText(what)) = inner {
+                return Err(FileError::NoTable {
+                    file: self.file.clone(),
+                    what,
+                });
+            }
             return Err(FileError::Read {
                 place: self.place_of(self.number + 1),
                 source: Arc::new(source),

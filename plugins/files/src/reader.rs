@@ -146,7 +146,7 @@ impl Reader {
         through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
-        let format = options.format.or_else(|| Format::from_path(path));
+        let format = options.format.or_else(|| Format::of_file(path));
         let options = Options { format, ..options };
         let table = layout.table_of(path).clone();
         let lines = Lines::open_through(path, table.encoding, through)?;

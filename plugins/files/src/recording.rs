@@ -167,8 +167,8 @@ fn offset_of(path: &Path, options: &Options) -> i64 {
 pub(crate) fn is_dated(layout: &Layout, time_ns: i64) -> bool {
     match layout.time.form {
         TimeForm::Rfc3339 | TimeForm::Format(_) => true,
-        TimeForm::Numbers { .. } => time_ns >= DATED_NS,
-        TimeForm::Samples { .. } => false,
+        TimeForm::Numbers { .. } | TimeForm::Since { .. } => time_ns >= DATED_NS,
+        TimeForm::Samples { .. } | TimeForm::Elapsed => false,
     }
 }
 

@@ -26,16 +26,14 @@ impl Cargo {
         }
     }
 
-    /// What cargo knows of the crate in a folder; with its dependencies, all of them resolved.
+    /// What cargo knows of the crate in a folder and of all that it depends on.
     ///
     /// # Errors
     /// When cargo is not there, or the crates cannot be put together.
-    pub(super) fn metadata(&self, folder: &Path, dependencies: bool) -> Result<Value, Failure> {
+    pub(super) fn metadata(&self, folder: &Path) -> Result<Value, Failure> {
         let mut command = self.command(folder, "metadata");
         command.args(["--format-version", "1"]);
-        if !dependencies {
-            command.arg("--no-deps");
-        } else if let Some(host) = self.host() {
+        if let Some(host) = self.host() {
             // Else cargo wants the crates of all platforms, which no build here has downloaded.
             command.args(["--filter-platform", &host]);
         }

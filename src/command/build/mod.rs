@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal::run::live::store::copy_whole;
 use cargo::Cargo;
-use project::Project;
 use wish::Wish;
 
 /// Build this program with plugin crates of your choice
@@ -57,28 +57,17 @@ impl Build {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let checkout = Checkout::find(self.athermal.as_deref())?;
         let cargo = Cargo::new(self.offline || self.vendored.is_some(), terminal.quiet);
-        let (mut wishes, mut registry) = (Vec::new(), false);
-        for text in &self.with {
-            let wish = Wish::read(text)?;
-            registry |= wish.check(&cargo, &checkout)?;
-            wishes.push(wish);
-        }
-        let manifest = project::manifest(&wishes, &checkout, registry);
-        let project = Project::write(
-            &self.folder(),
-            &manifest,
-            &wishes,
-            &checkout,
-            self.vendored.as_deref(),
-        )?;
-        let resolved = cargo.metadata(project.folder(), true)?;
+        let wishes = self.with.iter().map(|text| Wish::read(text));
+        let wishes: Vec<Wish> = wishes.collect::<Result<_, _>>()?;
+        let folder = self.folder();
+        project::write(&folder, &wishes, &checkout, self.vendored.as_deref())?;
+        let resolved = cargo.metadata(&folder)?;
         one_core(&resolved, &wishes)?;
-        wish::without_testkit(resolved["packages"].as_array().into_iter().flatten())?;
-        cargo.build(project.folder())?;
+        without_testkit(&resolved)?;
+        cargo.build(&folder)?;
         let target = resolved["target_directory"].as_str().unwrap_or_default();
-        let built = Path::new(target)
-            .join("release")
-            .join(project::executable());
+        let executable = format!("athermal{}", std::env::consts::EXE_SUFFIX);
+        let built = Path::new(target).join("release").join(executable);
         let kinds = known(&built, "nodes", "nodes")?;
         twice("node type", &kinds)?;
         let written = known(&built, "nodes", "written")?;
@@ -89,7 +78,31 @@ impl Build {
         let machines = known(&built, "simulate", "machines")?;
         twice("machine", &machines)?;
         place(&built, &self.output)?;
-        self.report(terminal, &wishes, &resolved, &kinds, &machines);
+        if terminal.format == Format::Json {
+            println!(
+                "{:#}",
+                json!({ "binary": self.output, "project": folder, "nodes": kinds, "machines": machines })
+            );
+            return Ok(Answer::Fine);
+        }
+        println!(
+            "{} has {} node types and {} machines",
+            self.output.display(),
+            kinds.len(),
+            machines.len()
+        );
+        let all = [kinds, machines].concat();
+        for Wish { package, .. } in &wishes {
+            let version = packages(&resolved, package).next();
+            let version = version
+                .and_then(|of| of["version"].as_str())
+                .unwrap_or_default();
+            println!("  from {package} {version}: {}", brought(&all, package));
+        }
+        terminal.note(format!(
+            "its cargo project is {}; keep it, with its Cargo.lock, to build the same again",
+            folder.display()
+        ));
         Ok(Answer::Fine)
     }
 
@@ -100,58 +113,10 @@ impl Build {
             self.output.with_file_name(name)
         })
     }
-
-    /// Prints what the new binary has.
-    fn report(
-        &self,
-        terminal: &Terminal,
-        wishes: &[Wish],
-        resolved: &Value,
-        kinds: &[Known],
-        machines: &[Known],
-    ) {
-        if terminal.format == Format::Json {
-            println!(
-                "{:#}",
-                json!({ "binary": self.output, "project": self.folder(), "nodes": kinds, "machines": machines })
-            );
-            return;
-        }
-        println!(
-            "{} has {} node types and {} machines",
-            self.output.display(),
-            kinds.len(),
-            machines.len()
-        );
-        for wish in wishes {
-            let version = packages(resolved, wish.package()).next();
-            let version = version.and_then(|package| package["version"].as_str());
-            let brought: Vec<String> = kinds
-                .iter()
-                .chain(machines)
-                .filter(|known| known.package == wish.package())
-                .map(|known| format!("{} ({})", known.name, known.role))
-                .collect();
-            let brought = if brought.is_empty() {
-                "no node type and no machine; they are made known by `athermal_core::register!` and `register_machine!`".to_owned()
-            } else {
-                brought.join(", ")
-            };
-            println!(
-                "  from {} {}: {brought}",
-                wish.package(),
-                version.unwrap_or_default()
-            );
-        }
-        terminal.note(format!(
-            "its cargo project is {}; keep it, with its Cargo.lock, to build the same again",
-            self.folder().display()
-        ));
-    }
 }
 
 /// A kind, a machine, or a name under which something is written, of a binary.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     name: String,
     #[serde(default = "machine")]
@@ -164,22 +129,32 @@ fn machine() -> String {
     "machine".to_owned()
 }
 
+/// What a binary has from a crate.
+fn brought(all: &[Known], package: &str) -> String {
+    let own = all.iter().filter(|known| known.package == package);
+    let own = own.map(|known| format!("{} ({})", known.name, known.role));
+    let own: Vec<String> = own.collect();
+    if own.is_empty() {
+        return "no node type and no machine; they are made known by `athermal_core::register!` and `register_machine!`".to_owned();
+    }
+    own.join(", ")
+}
+
 /// Asks a binary's command for what it lists under a key.
 fn known(binary: &Path, command: &str, what: &str) -> Result<Vec<Known>, Failure> {
-    let binary = std::fs::canonicalize(binary).unwrap_or_else(|_| binary.to_owned());
-    let failed = |reason: String| {
+    let listed = || -> Result<Vec<Known>, std::io::Error> {
+        let program = std::fs::canonicalize(binary)?;
+        let mut call = Command::new(program);
+        let output = call.args([command, "--format", "json"]).output()?;
+        let mut listed: Value = serde_json::from_slice(&output.stdout)?;
+        Ok(serde_json::from_value(listed[what].take())?)
+    };
+    listed().map_err(|error| {
         Failure::Outside(format!(
-            "{} was built and cannot list its {what}: {reason}",
+            "{} was built and cannot list its {what}: {error}",
             binary.display()
         ))
-    };
-    let output = Command::new(&binary)
-        .args([command, "--format", "json"])
-        .output()
-        .map_err(|error| failed(error.to_string()))?;
-    let listed: Value =
-        serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))?;
-    serde_json::from_value(listed[what].clone()).map_err(|error| failed(error.to_string()))
+    })
 }
 
 /// Refuses a name that two crates use for the same sort of thing.
@@ -211,7 +186,7 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
     if cores.len() == 1 {
         return Ok(());
     }
-    let with: Vec<_> = wishes.iter().map(Wish::package).collect();
+    let with: Vec<_> = wishes.iter().map(|wish| wish.package.as_str()).collect();
     Err(Failure::Request(format!(
         "{} would bring {} copies of athermal-core, which do not know each other's nodes: {}; this program is {VERSION}. \
          Let every crate depend on the same one",
@@ -219,6 +194,24 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
         cores.len(),
         cores.join(", ")
     )))
+}
+
+/// The conformance kit is for the tests of a crate: it counts what a program allocates.
+fn without_testkit(resolved: &Value) -> Result<(), Failure> {
+    for package in resolved["packages"].as_array().into_iter().flatten() {
+        let mut dependencies = package["dependencies"].as_array().into_iter().flatten();
+        let brings_it = dependencies.any(|of| {
+            of["name"] == "athermal-testkit" && of["kind"].is_null() && of["optional"] != true
+        });
+        if brings_it {
+            let name = package["name"].as_str().unwrap_or_default();
+            return Err(Failure::Request(format!(
+                "{name} has athermal-testkit under `[dependencies]`, which would count every allocation of the program: move it to \
+                 `[dev-dependencies]`"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Puts the binary where it was asked for, all at once.

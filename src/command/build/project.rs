@@ -1,7 +1,7 @@
 //! What the cargo project of a binary with chosen plugins consists of.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::wish::Wish;
 use crate::checkout::{Checkout, in_toml};
@@ -10,120 +10,95 @@ use crate::terminal::Failure;
 /// What every manifest written here begins with, so that no other is written over.
 const MARK: &str = "# Written by `athermal build`, which writes it again.\n";
 
-/// The project, written.
-#[derive(Debug)]
-pub(super) struct Project {
-    folder: PathBuf,
-}
+/// The crates of athermal that a plugin may ask a registry for.
+const CRATES: [(&str, &str); 6] = [
+    ("athermal-core", "core/framework"),
+    ("athermal-graph", "core/graph"),
+    ("athermal-run", "core/run"),
+    ("athermal-trial", "core/trial"),
+    ("athermal-testkit", "core/testkit"),
+    ("athermal-numerics", "core/numerics"),
+];
 
-/// The name of the binary in the target folder.
-pub(super) fn executable() -> String {
-    format!("athermal{}", std::env::consts::EXE_SUFFIX)
-}
-
-impl Project {
-    /// Writes it into a folder, which is new or has one already. A lock file that is there stays; a new one begins as that of
-    /// athermal, so that what is common is the same.
-    ///
-    /// # Errors
-    /// When the folder holds something else, or cannot be written.
-    pub(super) fn write(
-        folder: &Path,
-        manifest: &str,
-        wishes: &[Wish],
-        checkout: &Checkout,
-        vendored: Option<&Path>,
-    ) -> Result<Self, Failure> {
-        let failed = |error: std::io::Error| {
-            Failure::Outside(format!(
-                "cannot write the project into {}: {error}",
-                folder.display()
-            ))
-        };
-        let there = fs::read_to_string(folder.join("Cargo.toml"));
-        if there.is_ok_and(|manifest| !manifest.starts_with(MARK)) {
-            return Err(Failure::Request(format!(
-                "{} has a Cargo.toml that `athermal build` did not write; name another folder with --project",
-                folder.display()
-            )));
-        }
-        fs::create_dir_all(folder.join("src")).map_err(failed)?;
-        fs::create_dir_all(folder.join(".cargo")).map_err(failed)?;
-        let config = match vendored {
-            Some(vendored) => source(vendored)?,
-            None => String::new(),
-        };
-        let files = [
-            ("Cargo.toml", manifest.to_owned()),
-            ("src/main.rs", program(wishes)),
-            (".cargo/config.toml", config),
-        ];
-        for (path, text) in files {
-            fs::write(folder.join(path), text).map_err(failed)?;
-        }
-        let lock = folder.join("Cargo.lock");
-        if !lock.exists() {
-            fs::copy(checkout.folder().join("Cargo.lock"), lock).map_err(failed)?;
-        }
-        Ok(Self {
-            folder: folder.to_owned(),
-        })
+/// Writes the project into a folder, which is new or has one already. A lock file that is there stays; a new one begins as that of
+/// athermal, so that what is common is the same.
+///
+/// # Errors
+/// When the folder holds something else, or cannot be written.
+pub(super) fn write(
+    folder: &Path,
+    wishes: &[Wish],
+    checkout: &Checkout,
+    vendored: Option<&Path>,
+) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| {
+        Failure::Outside(format!(
+            "cannot write the project into {}: {error}",
+            folder.display()
+        ))
+    };
+    let there = fs::read_to_string(folder.join("Cargo.toml"));
+    if there.is_ok_and(|manifest| !manifest.starts_with(MARK)) {
+        return Err(Failure::Request(format!(
+            "{} has a Cargo.toml that `athermal build` did not write; name another folder with --project",
+            folder.display()
+        )));
     }
-
-    /// Where it is.
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
+    let config = vendored.map_or(Ok(String::new()), source)?;
+    fs::create_dir_all(folder.join("src")).map_err(failed)?;
+    fs::create_dir_all(folder.join(".cargo")).map_err(failed)?;
+    for (path, text) in [
+        ("Cargo.toml", manifest(wishes, checkout)),
+        ("src/main.rs", program(wishes)),
+        (".cargo/config.toml", config),
+    ] {
+        fs::write(folder.join(path), text).map_err(failed)?;
     }
+    let lock = folder.join("Cargo.lock");
+    if !lock.exists() {
+        fs::copy(checkout.folder().join("Cargo.lock"), lock).map_err(failed)?;
+    }
+    Ok(())
 }
 
-/// The manifest. With `registry`, crates that ask a registry for the core get the one at hand.
-pub(super) fn manifest(wishes: &[Wish], checkout: &Checkout, registry: bool) -> String {
+/// The manifest. Crates that ask a registry for athermal get the one at hand.
+fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
     let athermal = in_toml(checkout.folder());
-    let crates: String = [
-        ("athermal-core", "core/framework"),
-        ("athermal-graph", "core/graph"),
-        ("athermal-run", "core/run"),
-        ("athermal-trial", "core/trial"),
-        ("athermal-testkit", "core/testkit"),
-        ("athermal-numerics", "core/numerics"),
-    ]
-    .map(|(name, folder)| {
+    let plugins: String = wishes.iter().map(Wish::dependency).collect();
+    let crates = CRATES.map(|(name, folder)| {
+        let folder = in_toml(&checkout.folder().join(folder));
+        format!("{name} = {{ path = {folder} }}\n")
+    });
+    let patch = if wishes.iter().any(|wish| wish.asks_registry) {
         format!(
-            "{name} = {{ path = {} }}\n",
-            in_toml(&checkout.folder().join(folder))
+            "# A plugin that asks a registry for athermal gets this one.\n[patch.crates-io]\n{}\n",
+            crates.concat()
         )
-    })
-    .concat();
-    let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
-    let patch = format!(
-        "# A plugin that asks a registry for athermal gets this one.\n\
-         [patch.crates-io]\n\
-         {crates}\n"
-    );
-    let patch = if registry { patch.as_str() } else { "" };
+    } else {
+        String::new()
+    };
     format!(
-        "{MARK}\
-         [package]\n\
-         name = \"athermal-with-plugins\"\n\
-         version = \"0.0.0\"\n\
-         edition = \"2024\"\n\
-         publish = false\n\n\
-         [[bin]]\n\
-         name = \"athermal\"\n\
-         path = \"src/main.rs\"\n\n\
-         [dependencies]\n\
-         athermal = {{ path = {athermal} }}\n\
-         {plugins}\n\
-         {patch}\
-         [workspace]\n"
+        r#"{MARK}[package]
+name = "athermal-with-plugins"
+version = "0.0.0"
+edition = "2024"
+publish = false
+
+[[bin]]
+name = "athermal"
+path = "src/main.rs"
+
+[dependencies]
+athermal = {{ path = {athermal} }}
+{plugins}
+{patch}[workspace]
+"#
     )
 }
 
 fn program(wishes: &[Wish]) -> String {
-    let uses: String = wishes
-        .iter()
-        .map(|wish| format!("use {} as _;\n", wish.package().replace('-', "_")))
-        .collect();
+    let library = |wish: &Wish| format!("use {} as _;\n", wish.package.replace('-', "_"));
+    let uses: String = wishes.iter().map(library).collect();
     format!(
         "//! athermal with plugins. A plugin that no code names is left out by the linker.\n\n\
          {uses}\n\

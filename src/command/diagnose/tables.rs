@@ -3,10 +3,11 @@
 use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::{Residuals, UNLIKELY};
-use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
+use athermal::diagnosis::sensor::Contribution;
+use athermal::diagnosis::text::{self, axis_of, grouped, is_of};
+use athermal::diagnosis::window::Windows;
+use athermal::diagnosis::{Diagnosis, Main, is_called};
 
-use super::instances::{axis_of, grouped, is_of};
-use super::{days, responses};
 use athermal_analysis::figures::{count, counted, matrix, number, or_dash, rounded, table};
 
 /// Features that are named of each truth.
@@ -16,108 +17,113 @@ const INFLATED: f64 = 10.0;
 
 /// The tables of a diagnosis, of the predictions asked for.
 pub struct Tables<'a> {
-    diagnosis: &'a Diagnosis,
-    asked: &'a [String],
+    /// With what was not asked for.
+    all: &'a Diagnosis,
+    shown: Diagnosis,
+    /// Whether all predictions are shown that are left, and not only the first of each truth.
+    is_asked: bool,
 }
 
 impl<'a> Tables<'a> {
-    pub fn new(diagnosis: &'a Diagnosis, asked: &'a [String]) -> Self {
-        Self { diagnosis, asked }
+    pub fn new(all: &'a Diagnosis, asked: &[String]) -> Self {
+        let mut shown = all.clone();
+        shown.keep_only(asked);
+        Self {
+            all,
+            shown,
+            is_asked: !asked.is_empty(),
+        }
+    }
+
+    /// What was asked for, for programs.
+    pub fn shown(&self) -> &Diagnosis {
+        &self.shown
     }
 
     /// Everything, section by section.
     pub fn text(&self) -> String {
+        let answers: Vec<_> = self.shown.responses.iter().collect();
+        let days = |days| self.of_each_unit(|unit, shown| text::days(days, unit, shown));
         let sections = [
             self.residuals(),
             self.lags(),
-            self.responses(),
+            text::responses(&answers),
             self.designs(),
-            self.contributions(),
+            self.of_each_unit(|unit, shown| self.contributions(unit, shown)),
             self.silent_nodes(),
-            self.days(),
+            self.shown.days.as_ref().map_or_else(String::new, days),
             self.windows(),
         ];
         let sections: Vec<String> = sections.into_iter().filter(|of| !of.is_empty()).collect();
         sections.join("\n")
     }
 
-    fn shows(&self, prediction: &str) -> bool {
-        if self.asked.is_empty() {
-            return self.main().any(|main| main.prediction == prediction);
-        }
-        is_asked(prediction, self.asked)
+    /// What predictions left.
+    fn left(&self) -> impl Iterator<Item = &Residuals> {
+        let is_main = |of: &Residuals| {
+            self.shown
+                .main
+                .iter()
+                .any(|main| main.prediction == of.prediction)
+        };
+        let all = self.shown.residuals.iter();
+        all.filter(move |of| self.is_asked || is_main(of))
     }
 
     /// The truths of which something is shown.
-    pub(super) fn main(&self) -> impl Iterator<Item = &'a Main> {
-        let shown = |main: &&Main| {
-            let residuals = self.diagnosis.residuals.iter();
-            let mut of_truth = residuals.filter(|of| of.truth == main.truth);
-            of_truth.any(|of| is_asked(&of.prediction, self.asked))
-        };
-        self.diagnosis.main.iter().filter(shown)
-    }
-
-    /// Estimators are shown with the truths that they predict, or where they are asked for.
-    fn shows_estimator(&self, node: &str) -> bool {
-        is_asked(node, self.asked)
+    pub(super) fn main(&self) -> impl Iterator<Item = &Main> {
+        self.shown.main.iter()
     }
 
     /// A text for the predictions of each unit, which stands in the heading.
     fn of_each_unit(&self, text: impl Fn(&str, &[&str]) -> String) -> String {
-        let all = self.diagnosis.residuals.iter();
-        let shown = all.filter(|of| self.shows(&of.prediction));
-        let mut texts = Vec::new();
-        for group in grouped(shown, |of| of.unit.clone()) {
+        let of_group = |group: &Vec<&Residuals>| {
             let names: Vec<&str> = group.iter().map(|of| of.prediction.as_str()).collect();
-            texts.push(text(&group[0].unit, &names));
-        }
+            text(&group[0].unit, &names)
+        };
+        let groups = grouped(self.left(), |of| of.unit.clone());
+        let mut texts: Vec<String> = groups.iter().map(of_group).collect();
         texts.retain(|text| !text.is_empty());
         texts.join("\n")
     }
 
     fn residuals(&self) -> String {
-        let all = self.diagnosis.residuals.iter();
-        let shown = all.filter(|of| self.shows(&of.prediction));
-        let groups = grouped(shown, |of| (of.unit.clone(), of.spacing_s));
+        let groups = grouped(self.left(), |of| (of.unit.clone(), of.spacing_s));
         let tables: Vec<String> = groups.iter().map(|of| residuals(of)).collect();
         tables.join("\n")
     }
 
     /// The correlations of a truth with features; none where it has no features.
-    pub(super) fn lags_of(&self, main: &Main) -> Option<&'a Lags> {
-        let mut all = self.diagnosis.lags.iter();
+    pub(super) fn lags_of(&self, main: &Main) -> Option<&Lags> {
+        let mut all = self.shown.lags.iter();
         all.find(|of| of.truth == main.truth)
     }
 
     /// The estimators of a truth among whose regressors a feature is.
-    pub(super) fn users_of(&self, main: &'a Main, feature: &str) -> impl Iterator<Item = &'a str> {
-        let designs = self.diagnosis.designs.iter();
+    pub(super) fn users_of(&self, main: &Main, feature: &str) -> impl Iterator<Item = &'a str> {
         let uses = move |of: &&Design| of.regressors.iter().any(|of| of.name == feature);
-        let users = designs.filter(uses).map(|of| of.node.as_str());
+        let users = self.all.designs.iter().filter(uses);
+        let users = users.map(|of| of.node.as_str());
         users.filter(|node| !node.contains('.') || is_called(node, &main.name))
     }
 
     /// Whether a prediction is that of an estimator, and not a vote of several.
     pub(super) fn is_estimator(&self, main: &Main) -> bool {
-        let mut designs = self.diagnosis.designs.iter();
+        let mut designs = self.all.designs.iter();
         designs.any(|of| is_of(&main.prediction, &of.node))
     }
 
     /// Whether all that is left of any truth is white.
     pub(super) fn all_white(&self) -> bool {
-        let all = self.diagnosis.residuals.iter();
-        let mut shown = all.filter(|of| self.shows(&of.prediction)).peekable();
-        shown.peek().is_some() && shown.all(|of| of.white == Some(true))
+        let mut left = self.left().peekable();
+        left.peek().is_some() && left.all(|of| of.white == Some(true))
     }
 
     /// Whether fits on fewer days than there are were too far from those on all others.
     pub(super) fn more_days_may_help(&self) -> bool {
-        let all = self.diagnosis.residuals.iter();
-        let shown = all.filter(|of| self.shows(&of.prediction));
-        let shown: Vec<&str> = shown.map(|of| of.prediction.as_str()).collect();
-        let days = self.diagnosis.days.as_ref();
-        days.is_some_and(|days| days.count > 2 && days::enough(days, &shown).is_none())
+        let shown: Vec<&str> = self.left().map(|of| of.prediction.as_str()).collect();
+        let days = self.shown.days.as_ref();
+        days.is_some_and(|days| days.count > 2 && text::enough(days, &shown).is_none())
     }
 
     fn lags(&self) -> String {
@@ -181,15 +187,8 @@ impl<'a> Tables<'a> {
         )
     }
 
-    fn responses(&self) -> String {
-        let all = self.diagnosis.responses.iter();
-        let shown: Vec<_> = all.filter(|of| self.shows_estimator(&of.node)).collect();
-        responses::text(&shown)
-    }
-
     fn designs(&self) -> String {
-        let all = self.diagnosis.designs.iter();
-        let shown: Vec<_> = all.filter(|of| self.shows_estimator(&of.node)).collect();
+        let shown = &self.shown.designs;
         if shown.is_empty() {
             return String::new();
         }
@@ -219,52 +218,35 @@ impl<'a> Tables<'a> {
             .collect();
         let header = ["  estimator", "rows", "regressors", "condition", "VIF", ""];
         text.push_str(&table(&header, &rows));
-        if !self.asked.is_empty() {
+        if self.is_asked {
             shown.iter().for_each(|of| text.push_str(&regressors(of)));
         }
         text
     }
 
-    fn contributions(&self) -> String {
-        self.of_each_unit(|unit, shown| self.contributions_in(unit, shown))
-    }
-
-    fn contributions_in(&self, unit: &str, shown: &[&str]) -> String {
-        let all = &self.diagnosis.contributions;
+    fn contributions(&self, unit: &str, shown: &[&str]) -> String {
+        let all = || self.shown.contributions.iter();
         let of = |sensor: &str, prediction: &str| {
-            let mut all = all.iter();
-            all.find(|of| of.sensor == sensor && of.prediction == prediction)
+            all().find(|of| of.sensor == sensor && of.prediction == prediction)
         };
-        let mut sensors: Vec<&str> = Vec::new();
-        for of in all
-            .iter()
-            .filter(|of| shown.contains(&of.prediction.as_str()))
-        {
-            if !sensors.contains(&of.sensor.as_str()) {
-                sensors.push(&of.sensor);
-            }
-        }
+        let of_shown = all().filter(|of| shown.contains(&of.prediction.as_str()));
+        let sensors = grouped(of_shown, |of| of.sensor.as_str());
+        let sensors: Vec<&str> = sensors.iter().map(|of| of[0].sensor.as_str()).collect();
         if sensors.is_empty() {
             return String::new();
         }
         let columns: Vec<String> = shown.iter().map(|name| (*name).to_owned()).collect();
-        let row =
-            |sensor: &&str, cell: &dyn Fn(&athermal::diagnosis::sensor::Contribution) -> String| {
-                let cells = shown
-                    .iter()
-                    .map(|name| of(sensor, name).map_or("-".to_owned(), cell));
-                ((*sensor).to_owned(), cells.collect::<Vec<String>>())
+        let rows = |value: fn(&Contribution) -> f64| -> Vec<(String, Vec<String>)> {
+            let cell = |sensor: &str, name: &str| or_dash(of(sensor, name).map(value));
+            let row = |sensor: &&str| {
+                let cells = shown.iter().map(|name| cell(sensor, name));
+                ((*sensor).to_owned(), cells.collect())
             };
-        let moves: Vec<_> = sensors
-            .iter()
-            .map(|sensor| row(sensor, &|of| number(of.moves)))
-            .collect();
-        let mut errors: Vec<_> = sensors
-            .iter()
-            .map(|sensor| row(sensor, &|of| number(of.rmse_at_rest)))
-            .collect();
+            sensors.iter().map(row).collect()
+        };
+        let (moves, mut errors) = (rows(|of| of.moves), rows(|of| of.rmse_at_rest));
         let as_it_is = shown.iter().map(|name| {
-            let mut residuals = self.diagnosis.residuals.iter();
+            let mut residuals = self.shown.residuals.iter();
             let residuals = residuals.find(|of| of.prediction == *name);
             or_dash(residuals.and_then(|of| defined(of.rms)))
         });
@@ -279,12 +261,7 @@ impl<'a> Tables<'a> {
 
     /// Which sensors could not be tried.
     fn silent_nodes(&self) -> String {
-        let all = self.diagnosis.silent_nodes.iter();
-        let shown = all.filter(|of| {
-            let node = of.estimator.as_ref();
-            node.is_none_or(|node| self.shows_estimator(node))
-        });
-        let rows = shown.map(|of| {
+        let rows = self.shown.silent_nodes.iter().map(|of| {
             let silent = &of.silent;
             match (&of.estimator, &of.sensor) {
                 (Some(node), Some(sensor)) => {
@@ -302,21 +279,12 @@ impl<'a> Tables<'a> {
         rows.collect()
     }
 
-    fn days(&self) -> String {
-        let Some(days) = &self.diagnosis.days else {
-            return String::new();
-        };
-        self.of_each_unit(|unit, shown| days::text(days, unit, shown))
-    }
-
     fn windows(&self) -> String {
-        let shown: Vec<_> = self
-            .main()
-            .filter_map(|main| {
-                let mut windows = self.diagnosis.windows.iter();
-                windows.find(|of| of.truth == main.truth)
-            })
-            .collect();
+        let windows = |main: &Main| {
+            let mut windows = self.shown.windows.iter();
+            windows.find(|of| of.truth == main.truth)
+        };
+        let shown: Vec<&Windows> = self.main().filter_map(windows).collect();
         let mut widths: Vec<f64> = shown
             .iter()
             .flat_map(|of| of.widths.iter().map(|width| width.window_s))
@@ -339,7 +307,7 @@ impl<'a> Tables<'a> {
         };
         let columns: Vec<String> = shown.iter().map(|of| column(&of.truth)).collect();
         let rows = widths.iter().map(|&width| {
-            let cell = |of: &&athermal::diagnosis::window::Windows| {
+            let cell = |of: &&Windows| {
                 let here = of.widths.iter().find(|of| of.window_s == width);
                 let own = if of.window_s == width { "*" } else { "" };
                 here.map_or("-".to_owned(), |of| format!("{own}{}", number(of.ratio)))

@@ -8,7 +8,7 @@ use athermal::trial::machine::machines;
 use clap::Args;
 use serde_json::json;
 
-use super::template::{Athermal, Names, Role, files};
+use super::template::{Names, Role, files};
 use crate::checkout::{Checkout, VERSION, in_toml};
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -56,20 +56,17 @@ impl Plugin {
                 folder.display()
             )));
         }
-        let athermal = Athermal {
-            folder: in_toml(checkout.folder()),
-            crates: [
-                ("CORE", "core/framework"),
-                ("RUN", "core/run"),
-                ("TRIAL", "core/trial"),
-                ("TESTKIT", "core/testkit"),
-            ]
-            .map(|(word, folder)| (word, in_toml(&checkout.folder().join(folder))))
-            .to_vec(),
-            version: VERSION,
-        };
+        let of = |folder| in_toml(&checkout.folder().join(folder));
+        let words = [
+            ("VERSION", VERSION.to_owned()),
+            ("CORE", of("core/framework")),
+            ("RUN", of("core/run")),
+            ("TRIAL", of("core/trial")),
+            ("TESTKIT", of("core/testkit")),
+            ("ATHERMAL", in_toml(checkout.folder())),
+        ];
         let mut written = Vec::new();
-        for (path, text) in files(&names, self.role, &athermal) {
+        for (path, text) in files(&names, self.role, &words) {
             let path = folder.join(path);
             write(&path, &text)?;
             written.push(path);
@@ -85,7 +82,7 @@ impl Plugin {
                 "{:#}",
                 json!({
                     "folder": folder,
-                    "role": self.role.word(),
+                    "role": self.role,
                     "kind": self.role.is_node().then_some(names.kind),
                     "files": written,
                 })
@@ -105,11 +102,6 @@ impl Plugin {
             ))
         })?;
         self.free(&names)?;
-        if names.clash() {
-            return Err(Failure::Request(format!(
-                "`{name}` means something else already, to Rust or to athermal; take a name such as `my-{name}`"
-            )));
-        }
         Ok(names)
     }
 
@@ -120,15 +112,8 @@ impl Plugin {
             .get(self.name.as_str())
             .and_then(|all| all.first());
         let (what, name, package, version) = match (self.role, kind, machine) {
-            (Role::Machine, _, Some(known)) => (
-                "machine",
-                known.machine.name(),
-                known.package,
-                known.version,
-            ),
-            (Role::Feature | Role::Estimator | Role::Combiner, Some(kind), _) => {
-                ("node type", kind.name, kind.package, kind.version)
-            }
+            (Role::Machine, _, Some(of)) => ("machine", of.machine.name(), of.package, of.version),
+            (role, Some(of), _) if role.is_node() => ("node type", of.name, of.package, of.version),
             _ => return Ok(()),
         };
         Err(Failure::Request(format!(
@@ -156,10 +141,8 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
             format!("the machine `{package}`"),
             "build a binary that has it, and try a graph on it",
         ),
-        Role::Source | Role::Sink => (
-            format!("a {}", role.word()),
-            "run a graph with it (see README.md)",
-        ),
+        Role::Source => ("a source".to_owned(), "run a graph with it (see README.md)"),
+        Role::Sink => ("a sink".to_owned(), "run a graph with it (see README.md)"),
     };
     let graph = format!("graphs/{package}.toml");
     let mut lines = vec![

@@ -2,9 +2,11 @@
 //! name, and `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
+use serde::Serialize;
 
 /// What a new crate brings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Channels from channels: filters, monitors, corrections
     Feature,
@@ -25,19 +27,6 @@ impl Role {
     #[must_use]
     pub fn is_node(self) -> bool {
         matches!(self, Self::Feature | Self::Estimator | Self::Combiner)
-    }
-
-    /// Its name.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Feature => "feature",
-            Self::Estimator => "estimator",
-            Self::Combiner => "combiner",
-            Self::Source => "source",
-            Self::Sink => "sink",
-            Self::Machine => "machine",
-        }
     }
 }
 
@@ -72,23 +61,6 @@ impl Names {
         })
     }
 
-    /// Whether the templates, or Rust, use one of the names for something else.
-    #[must_use]
-    pub fn clash(&self) -> bool {
-        let texts = ROLES.map(texts).concat();
-        let taken = |word: &str| {
-            let is = |c: char| c.is_alphanumeric() || c == '_';
-            texts
-                .iter()
-                .filter(|(path, _)| path.ends_with(".rs"))
-                .any(|(_, text)| text.split(|c| !is(c)).any(|known| known == word))
-        };
-        taken(&self.spec)
-            || taken(&format!("{}Fitted", self.spec))
-            || KEYWORDS.contains(&self.kind.as_str())
-            || CRATES.contains(&self.kind.as_str())
-    }
-
     fn put_into(&self, text: &str) -> String {
         text.replace("my-node", &self.package)
             .replace("my_node", &self.kind)
@@ -96,78 +68,25 @@ impl Names {
     }
 }
 
-const ROLES: [Role; 6] = [
-    Role::Feature,
-    Role::Estimator,
-    Role::Combiner,
-    Role::Source,
-    Role::Sink,
-    Role::Machine,
-];
-
-/// The words that Rust keeps for itself.
-const KEYWORDS: [&str; 51] = [
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
-    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl",
-    "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
-    "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
-    "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
-];
-
-/// The crates and modules that a new one cannot be called, because it uses them.
-const CRATES: [&str; 12] = [
-    "athermal",
-    "athermal_core",
-    "athermal_run",
-    "athermal_testkit",
-    "athermal_trial",
-    "alloc",
-    "core",
-    "live",
-    "schemars",
-    "serde",
-    "std",
-    "test",
-];
-
-/// The athermal that a crate is written for, as it stands in a manifest.
-#[derive(Debug, Clone)]
-pub struct Athermal<'a> {
-    /// The folder of its sources.
-    pub folder: String,
-    /// The folders of the crates that a plugin may build on, by the words that stand for them in a manifest.
-    pub crates: Vec<(&'static str, String)>,
-    /// Its version.
-    pub version: &'a str,
-}
-
-/// The files of a crate: paths in it, and their texts.
+/// The files of a crate: paths in it, and their texts. In the manifest `words` are replaced by what they stand for.
 #[must_use]
-pub fn files(names: &Names, role: Role, athermal: &Athermal<'_>) -> Vec<(String, String)> {
+pub fn files(names: &Names, role: Role, words: &[(&str, String)]) -> Vec<(String, String)> {
     let texts = texts(role).into_iter().map(|(path, text)| {
         let (path, text) = (names.put_into(path), names.put_into(text));
-        if path != "Cargo.toml" {
-            return (path, text);
+        match path.as_str() {
+            "Cargo.toml" => (path, put(&text, words)),
+            _ => (path, text),
         }
-        let mut words = vec![("VERSION", athermal.version)];
-        words.extend(
-            athermal
-                .crates
-                .iter()
-                .map(|(word, folder)| (*word, folder.as_str())),
-        );
-        words.push(("ATHERMAL", &athermal.folder));
-        (path, put(&text, &words))
     });
     texts.collect()
 }
 
 /// Puts what they stand for in the place of words. What is put in is not looked through again: a folder may be called anything.
-fn put(text: &str, words: &[(&str, &str)]) -> String {
+fn put(text: &str, words: &[(&str, String)]) -> String {
     let Some(((word, meaning), others)) = words.split_first() else {
         return text.to_owned();
     };
-    let parts: Vec<String> = text.split(word).map(|part| put(part, others)).collect();
+    let parts: Vec<String> = text.split(*word).map(|part| put(part, others)).collect();
     parts.join(meaning)
 }
 
@@ -239,31 +158,14 @@ mod tests {
     }
 
     #[test]
-    fn names_that_mean_something_else_already_are_known() {
-        for taken in [
-            "feature",
-            "votes",
-            "instant",
-            "type",
-            "errors",
-            "vec-deque",
-            "frame",
-            "warming",
-        ] {
-            assert!(Names::of(taken).unwrap().clash(), "{taken}");
-        }
-        assert!(!Names::of("room-lag").unwrap().clash());
-    }
-
-    #[test]
     fn a_folder_may_be_called_like_what_is_replaced() {
         let names = Names::of("room-lag").unwrap();
-        let athermal = Athermal {
-            folder: "\"/srv/my-node\"".to_owned(),
-            crates: vec![("CORE", "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned())],
-            version: "1.2.3",
-        };
-        let (path, text) = files(&names, Role::Source, &athermal).swap_remove(0);
+        let words = [
+            ("VERSION", "1.2.3".to_owned()),
+            ("CORE", "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned()),
+            ("ATHERMAL", "\"/srv/my-node\"".to_owned()),
+        ];
+        let (path, text) = files(&names, Role::Source, &words).swap_remove(0);
         assert_eq!(path, "Cargo.toml");
         for line in [
             "athermal-core = { path = \"/srv/my-node/ATHERMAL/CORE/VERSION\", version = \"1.2.3\" }\n",
@@ -276,15 +178,10 @@ mod tests {
     #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
-        let athermal = Athermal {
-            folder: "\"/sources\"".to_owned(),
-            crates: ["CORE", "RUN", "TRIAL", "TESTKIT"]
-                .map(|word| (word, "\"/sources/core\"".to_owned()))
-                .to_vec(),
-            version: "1.2.3",
-        };
-        for role in ROLES {
-            for (path, text) in files(&names, role, &athermal) {
+        let words = ["VERSION", "CORE", "RUN", "TRIAL", "TESTKIT", "ATHERMAL"]
+            .map(|word| (word, "\"/sources\"".to_owned()));
+        for role in Role::value_variants() {
+            for (path, text) in files(&names, *role, &words) {
                 for left in [
                     "my_node", "my-node", "MyNode", "CORE", "RUN", "TRIAL", "TESTKIT", "VERSION",
                     "ATHERMAL",

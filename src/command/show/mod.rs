@@ -11,10 +11,11 @@ use athermal::diagnosis::{is_asked, is_called};
 use athermal::run::model::FittedEstimator;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
 use super::model::{self, load_fitted};
-use crate::drawing::{Class, Diagram, Flow, diagram, dot, mermaid, plan, svg};
+use crate::drawing::{Diagram, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
 
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
@@ -86,7 +87,16 @@ impl Show {
             "mermaid" => mermaid::text(&drawn()),
             "dot" => dot::text(&drawn()),
             "svg" => svg::text(&drawn()),
-            "json" => format!("{:#}\n", facts(&drawn(), &self.estimators(&model)?)),
+            "json" => {
+                let (diagram, estimators) = (&drawn(), &*self.estimators(&model)?);
+                format!(
+                    "{:#}\n",
+                    json!(Facts {
+                        diagram,
+                        estimators
+                    })
+                )
+            }
             _ => plan::text(&model.plan, self.expand),
         };
         print(text.as_bytes())?;
@@ -124,36 +134,11 @@ fn no_estimator(name: &str, known: &[&str]) -> String {
     format!("there is no fitted estimator `{name}`{near} ({there})")
 }
 
-fn facts(diagram: &Diagram, estimators: &[FittedEstimator]) -> Value {
-    let boxes: Vec<Value> = diagram
-        .boxes
-        .iter()
-        .map(|shown| {
-            let class = match shown.class {
-                Class::Signal => "signal",
-                Class::Feature => "feature",
-                Class::Estimator => "estimator",
-                Class::Combiner => "combiner",
-                Class::Output => "output",
-            };
-            json!({ "name": shown.title, "class": class, "lines": shown.lines })
-        })
-        .collect();
-    let arrows: Vec<Value> = diagram
-        .arrows
-        .iter()
-        .map(|arrow| {
-            let kind = match arrow.kind {
-                Flow::Data => "data",
-                Flow::Delayed => "delayed",
-                Flow::Truth => "truth",
-            };
-            json!({ "from": arrow.from, "to": arrow.to, "kind": kind })
-        })
-        .collect();
-    let mut facts = json!({ "name": diagram.name, "boxes": boxes, "arrows": arrows });
-    if !estimators.is_empty() {
-        facts["estimators"] = json!(estimators);
-    }
-    facts
+/// The boxes and arrows, and the coefficients where there are any, for programs.
+#[derive(Serialize)]
+struct Facts<'a> {
+    #[serde(flatten)]
+    diagram: &'a Diagram,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    estimators: &'a [FittedEstimator],
 }

@@ -1,8 +1,9 @@
 //! Which thread fits what and runs which test. Results come in the order of the files; a fit that several tests share is made once.
 
+use std::collections::BTreeMap;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{OnceLock, mpsc};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use athermal::core::diagnostic::panic_text;
@@ -77,13 +78,6 @@ fn caught<T>(job: impl FnOnce() -> Result<T, Broken>) -> Result<T, Broken> {
     })
 }
 
-/// A fit that some tests need.
-struct Fit<'a> {
-    suite: usize,
-    data: &'a DataSet,
-    made: OnceLock<Result<Made, Broken>>,
-}
-
 /// What came of a fit.
 #[derive(Clone, Default)]
 struct Made {
@@ -92,66 +86,72 @@ struct Made {
     warnings: Vec<String>,
 }
 
-/// Runs all tests; `report` is called for each as soon as it and all before it are done.
-pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) -> Vec<Ran> {
-    let tests: Vec<(usize, usize)> = suites
-        .iter()
-        .enumerate()
-        .flat_map(|(suite, of)| (0..of.trials.len()).map(move |trial| (suite, trial)))
-        .collect();
-    let mut fits: Vec<Fit<'_>> = Vec::new();
+/// Runs all tests; `show` is called for each as soon as it and all before it are done.
+pub(super) fn run(suites: &[Suite], threads: usize, show: &mut dyn FnMut(&Ran)) -> Vec<Ran> {
+    let mut fits: Vec<(usize, &DataSet)> = Vec::new();
+    let mut tests = Vec::new();
     for (suite, of) in suites.iter().enumerate() {
-        for data in of.trials.iter().filter_map(|trial| trial.fit.as_ref()) {
-            let known = |fit: &Fit<'_>| fit.suite == suite && fit.data == data;
-            if !fits.iter().any(known) {
-                fits.push(Fit {
-                    suite,
-                    data,
-                    made: OnceLock::new(),
-                });
-            }
+        for (trial, declared) in of.trials.iter().enumerate() {
+            let fit = declared.fit.as_ref().map(|data| {
+                let known = fits.iter().position(|fit| *fit == (suite, data));
+                known.unwrap_or_else(|| {
+                    fits.push((suite, data));
+                    fits.len() - 1
+                })
+            });
+            tests.push((suite, trial, fit));
         }
     }
     let options = FitOptions {
         threads: if fits.len() > 1 { 1 } else { threads },
         ..FitOptions::default()
     };
+    let mut made = Vec::new();
+    let make = |&(suite, data): &(usize, &DataSet)| caught(|| make(&suites[suite], data, &options));
+    in_parallel(&fits, threads, make, |of| made.push(of));
+    let none = Ok(Made::default());
+    let test = |&(suite, trial, fit): &(usize, usize, Option<usize>)| {
+        let made = fit.and_then(|fit| made.get(fit)).unwrap_or(&none);
+        test(suites, (suite, trial), made)
+    };
+    let mut results = Vec::new();
+    in_parallel(&tests, threads, test, |ran| {
+        show(&ran);
+        results.push(ran);
+    });
+    results
+}
+
+/// Does jobs in several threads. Their results come in the order of the jobs, each as soon as it and all before it are there.
+fn in_parallel<J: Sync, R: Send>(
+    jobs: &[J],
+    threads: usize,
+    run: impl Fn(&J) -> R + Sync,
+    mut done: impl FnMut(R),
+) {
     let next = AtomicUsize::new(0);
-    let (done, results) = mpsc::channel();
-    let mut waiting: Vec<Option<Ran>> = tests.iter().map(|_| None).collect();
+    let (give, results) = mpsc::channel();
     std::thread::scope(|scope| {
-        for _ in 0..threads.min(fits.len() + tests.len()).max(1) {
-            let (done, next, fits, tests, options) = (done.clone(), &next, &fits, &tests, &options);
+        for _ in 0..threads.min(jobs.len()) {
+            let (give, next, run) = (give.clone(), &next, &run);
             scope.spawn(move || {
-                // All fits are begun before any test, so that a test never waits for one that nobody makes.
-                loop {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    if let Some(fit) = fits.get(job) {
-                        let made = caught(|| make(&suites[fit.suite], fit.data, options));
-                        let _ = fit.made.set(made);
-                        continue;
-                    }
-                    let Some(&(suite, trial)) = tests.get(job - fits.len()) else {
-                        break;
-                    };
-                    let ran = test(suites, fits, suite, trial);
-                    if done.send((job - fits.len(), ran)).is_err() {
-                        break;
-                    }
-                }
+                let take = || {
+                    let nth = next.fetch_add(1, Ordering::Relaxed);
+                    Some((nth, run(jobs.get(nth)?)))
+                };
+                while take().is_some_and(|result| give.send(result).is_ok()) {}
             });
         }
-        drop(done);
-        let mut shown = 0;
-        for (number, ran) in results {
-            waiting[number] = Some(ran);
-            while let Some(Some(ran)) = waiting.get(shown) {
-                tell(ran);
+        drop(give);
+        let (mut waiting, mut shown) = (BTreeMap::new(), 0);
+        for (nth, result) in results {
+            waiting.insert(nth, result);
+            while let Some(result) = waiting.remove(&shown) {
+                done(result);
                 shown += 1;
             }
         }
     });
-    waiting.into_iter().flatten().collect()
 }
 
 /// Data that a test names.
@@ -208,15 +208,9 @@ fn make(suite: &Suite, data: &DataSet, options: &FitOptions) -> Result<Made, Bro
     })
 }
 
-fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
+fn test(suites: &[Suite], (suite, trial): (usize, usize), made: &Result<Made, Broken>) -> Ran {
     let of = &suites[suite];
     let declared = &of.trials[trial];
-    let none = Made::default();
-    let fit = declared.fit.as_ref().and_then(|data| {
-        let same = |fit: &&Fit<'_>| fit.suite == suite && fit.data == data;
-        fits.iter().find(same)
-    });
-    let made = fit.map_or(Ok(&none), |fit| fit.made.wait().as_ref());
     let began = Instant::now();
     let run = |made: &Made| {
         let mut warnings = made.warnings.clone();
@@ -231,7 +225,7 @@ fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
         };
         Ok((verdict.map_err(Broken::of)?, made.notes.clone(), warnings))
     };
-    let verdict = made.map_err(Clone::clone);
+    let verdict = made.as_ref().map_err(Clone::clone);
     let verdict = verdict.and_then(|made| caught(|| run(made)));
     let (status, findings, notes, warnings) = match verdict {
         Err(broken) => (Status::Broken(broken), Vec::new(), Vec::new(), Vec::new()),

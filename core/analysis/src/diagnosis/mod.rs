@@ -17,6 +17,7 @@ pub mod residual;
 pub mod response;
 mod rest;
 pub mod sensor;
+pub mod text;
 pub mod watch;
 pub mod window;
 

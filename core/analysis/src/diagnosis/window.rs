@@ -152,7 +152,7 @@ pub(crate) fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
         .map(|of| of.slot)
 }
 
-/// Round lengths from a hundredth of a second to a week, as people choose windows; in s.
+/// Round lengths from a hundredth of a second to a quarter of a year, as people choose windows; in s.
 pub fn nice_widths() -> impl Iterator<Item = f64> {
     const STEPS: [f64; 12] = [
         1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0,
@@ -164,12 +164,14 @@ pub fn nice_widths() -> impl Iterator<Item = f64> {
         .skip(1)
         .map(|step| 60.0 * step)
         .chain([5400.0]);
-    let hours = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 24.0, 48.0, 72.0, 168.0];
+    let hours = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0];
+    let days = [1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 14.0, 30.0, 60.0, 90.0];
     below_a_second
         .chain(seconds)
         .chain([90.0])
         .chain(minutes)
         .chain(hours.into_iter().map(|step| 3600.0 * step))
+        .chain(days.into_iter().map(|step| 86_400.0 * step))
 }
 
 /// The slopes of a series over windows of one width.

@@ -3,7 +3,7 @@
 use crate::unit::Unit;
 
 /// The unit at the end of a column pattern, as in `{channel}_degC` or `Z [mm]`. A single letter is none but for `K` and `%`: `_m` may as
-/// well stand for measured.
+/// well stand for measured. A number is none, nor what stands in brackets with a serial number.
 fn of_name(column: &str) -> Option<Unit> {
     let ending = match column.rsplit_once('}') {
         Some((_, ending)) => ending,
@@ -13,7 +13,15 @@ fn of_name(column: &str) -> Option<Unit> {
     if ending.chars().count() < 2 && !["K", "%"].contains(&ending) {
         return None;
     }
-    Unit::in_words(ending)
+    let behind = column
+        .rsplit_once(['[', '('])
+        .map_or("", |(_, behind)| behind);
+    let is_serial = ["S/N", "SN:", "serial", "Serial"]
+        .iter()
+        .any(|of| behind.contains(of));
+    let letters = ending.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_label = letters.is_empty() || ending.len() - letters.len() > 1;
+    Unit::in_words(ending).filter(|_| !is_serial && !is_label)
 }
 
 /// The unit that columns are named for, where it is another one than the signal's that measures the same, or the scale of

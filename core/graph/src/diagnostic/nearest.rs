@@ -1,15 +1,10 @@
 //! Which known name an unknown one may have meant; it never decides that a name is wrong.
 
 /// Longest name that is compared, in bytes: a longer text is not a misspelt name, and comparing takes time in the product of the lengths.
-pub(super) const LONGEST: usize = 64;
+const LONGEST: usize = 64;
 
 /// Shortest name that another may continue, in bytes.
-pub(super) const SHORTEST: usize = 3;
-
-/// The largest distance of two names, the longer of so many letters, at which they are near.
-pub(super) fn farthest(longer: usize) -> usize {
-    (longer / 3).max(1)
-}
+const SHORTEST: usize = 3;
 
 /// The candidate that is spelt most like `name`, if one is near enough to be meant.
 ///
@@ -28,7 +23,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         let known = candidate.to_lowercase();
         let (one, other) = (wanted.chars().count(), known.chars().count());
         let longer = one.max(other);
-        let farthest = farthest(longer);
+        let farthest = (longer / 3).max(1);
         let shorter = wanted.len().min(known.len());
         let continues =
             shorter >= SHORTEST && (wanted.starts_with(&known) || known.starts_with(&wanted));

@@ -68,6 +68,15 @@ pub enum TimeForm {
     Rfc3339,
     /// A date and time in another form.
     Format(TimeFormat),
+    /// Hours, minutes and seconds since a beginning, beyond a day: `29:59:00`, `1.05:59:00`, `1 day, 5:59:00`.
+    Elapsed,
+    /// A number that counts from another origin than 1970, as Julian days do.
+    Since {
+        /// Length of 1.
+        unit: Duration,
+        /// How far before 1970 the origin lies, in ns.
+        origin_ns: i128,
+    },
     /// A sample number.
     Samples {
         /// Time from one sample to the next; without it, one sample is carried as one second.
@@ -81,7 +90,10 @@ impl fmt::Display for TimeBase {
         let TimeBase::Column { column, form, .. } = self;
         write!(f, "the column `{column}` ")?;
         match form {
-            TimeForm::Numbers { unit } => write!(f, "in steps of {unit}"),
+            TimeForm::Numbers { unit } | TimeForm::Since { unit, .. } => {
+                write!(f, "in steps of {unit}")
+            }
+            TimeForm::Elapsed => f.write_str("of hours, minutes and seconds"),
             TimeForm::Rfc3339 | TimeForm::Format(_) => f.write_str("of dates and times"),
             TimeForm::Samples { step: None } => f.write_str("of sample numbers"),
             TimeForm::Samples { step: Some(step) } => write!(f, "of samples {step} apart"),
@@ -95,7 +107,11 @@ impl TimeBase {
         let TimeBase::Column { form, .. } = self;
         match form {
             TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
-            TimeForm::Numbers { .. } | TimeForm::Rfc3339 | TimeForm::Format(_) => None,
+            TimeForm::Numbers { .. }
+            | TimeForm::Rfc3339
+            | TimeForm::Format(_)
+            | TimeForm::Elapsed
+            | TimeForm::Since { .. } => None,
         }
     }
 }

@@ -31,41 +31,45 @@ pub(super) fn merge(
 
 /// The nodes of a module merge as those of a graph do.
 fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
-    let Entry {
-        key: key_place,
-        value: Value {
-            place,
-            data: Data::Table(above),
-        },
-    } = entry
-    else {
-        merged.insert(key, entry);
+    let Some((below, above)) = both(merged, key, entry) else {
         return;
     };
-    let mut below = match merged.get_mut(&key).map(|value| &mut value.data) {
-        Some(Data::Table(below)) => std::mem::take(below),
-        _ => Table::new(),
-    };
-    for (name, Entry { key, value }) in above {
-        let Value { place, data } = value;
-        let data = match data {
-            Data::Table(over) => {
-                let inherited = below.get(&name).and_then(Value::as_table).cloned();
-                // What is inside of a module has no name outside of it.
-                let laid = merge(inherited, over, &mut Vec::new(), diagnostics);
-                Data::Table(laid)
-            }
-            other => other,
-        };
-        let value = Value::new(place, data);
-        below.insert(name, Entry { key, value });
+    for (name, mut entry) in above {
+        if let Data::Table(over) = &mut entry.value.data {
+            let inherited = below.get(&name).and_then(Value::as_table).cloned();
+            // What is inside of a module has no name outside of it.
+            *over = merge(
+                inherited,
+                std::mem::take(over),
+                &mut Vec::new(),
+                diagnostics,
+            );
+        }
+        below.insert(name, entry);
     }
-    let value = Value::new(place, Data::Table(below));
-    let entry = Entry {
-        key: key_place,
-        value,
+}
+
+/// The inherited table of a key and the one that is laid over it; without the latter what is written replaces.
+fn both(merged: &mut Table, key: String, entry: Entry) -> Option<(&mut Table, Table)> {
+    let Data::Table(above) = entry.value.data else {
+        merged.insert(key, entry);
+        return None;
     };
-    merged.insert(key, entry);
+    if merged.get(&key).and_then(Value::as_table).is_none() {
+        let value = Value::new(entry.value.place, Data::Table(Table::new()));
+        let key_place = entry.key;
+        merged.insert(
+            key.clone(),
+            Entry {
+                key: key_place,
+                value,
+            },
+        );
+    }
+    match merged.get_mut(&key).map(|value| &mut value.data) {
+        Some(Data::Table(below)) => Some((below, above)),
+        _ => None,
+    }
 }
 
 /// Nodes, or outputs.
@@ -77,32 +81,8 @@ fn merge_named(
     diagnostics: &mut Diagnostics,
 ) {
     let role = if key == "nodes" { "node" } else { "output" };
-    let Entry {
-        key: key_place,
-        value: Value {
-            place,
-            data: Data::Table(named),
-        },
-    } = entry
-    else {
-        merged.insert(key, entry);
+    let Some((inherited, named)) = both(merged, key, entry) else {
         return;
-    };
-    let inherited = match merged.get_mut(&key).map(|value| &mut value.data) {
-        Some(Data::Table(table)) => table,
-        _ => {
-            merged.insert(
-                key.clone(),
-                Entry {
-                    key: key_place,
-                    value: Value::new(place, Data::Table(Table::new())),
-                },
-            );
-            match merged.get_mut(&key).map(|value| &mut value.data) {
-                Some(Data::Table(table)) => table,
-                _ => return,
-            }
-        }
     };
     let names: Arc<Names> = Arc::new(inherited.keys().map(str::to_owned).collect());
     for (name, over) in named {
@@ -142,23 +122,16 @@ fn is_another_kind(old: &Value, new: &Value) -> bool {
 }
 
 fn lay(merged: &mut Table, key: String, entry: Entry) {
-    match (merged.get_mut(&key).map(|value| &mut value.data), entry) {
-        (
-            Some(Data::Table(below)),
-            Entry {
-                value:
-                    Value {
-                        data: Data::Table(above),
-                        ..
-                    },
-                ..
-            },
-        ) => {
-            for (key, entry) in above {
+    match (
+        merged.get_mut(&key).map(|value| &mut value.data),
+        &entry.value.data,
+    ) {
+        (Some(Data::Table(below)), Data::Table(above)) => {
+            for (key, entry) in above.clone() {
                 lay(below, key, entry);
             }
         }
-        (_, entry) => {
+        _ => {
             merged.insert(key, entry);
         }
     }

@@ -4,7 +4,7 @@ use super::Unit;
 use super::spelling::MICROINCH;
 
 /// Words, and the UCUM codes that they mean; the case counts for single letters, and where words differ in nothing else.
-const WORDS: [(&str, &str); 102] = [
+const WORDS: [(&str, &str); 137] = [
     ("degC", "Cel"),
     ("°C", "Cel"),
     ("celsius", "Cel"),
@@ -107,6 +107,41 @@ const WORDS: [(&str, &str); 102] = [
     ("pixel", "1"),
     ("pixels", "1"),
     ("px", "1"),
+    ("kelvin", "K"),
+    ("Å", "Ao"),
+    ("\u{212b}", "Ao"),
+    ("angstrom", "Ao"),
+    ("angstroms", "Ao"),
+    ("mas", "mas"),
+    ("arcseconds", "arcsec"),
+    ("arcsecond", "arcsec"),
+    ("asec", "arcsec"),
+    ("VDC", "V"),
+    ("VAC", "V"),
+    ("mVDC", "mV"),
+    ("volts", "V"),
+    ("volt", "V"),
+    ("millivolts", "mV"),
+    ("amps", "A"),
+    ("watts", "W"),
+    ("ohms", "Ohm"),
+    ("Ω", "Ohm"),
+    ("\u{2126}", "Ohm"),
+    ("kΩ", "kOhm"),
+    ("mΩ", "mOhm"),
+    ("RH%", "%"),
+    ("rF%", "%"),
+    ("millimeter", "mm"),
+    ("millimeters", "mm"),
+    ("micrometer", "um"),
+    ("micrometers", "um"),
+    ("nanometer", "nm"),
+    ("nanometers", "nm"),
+    ("mmHg", "mm[Hg]"),
+    ("mg", "mg"),
+    ("mGal", "mGal"),
+    ("uGal", "uGal"),
+    ("µGal", "uGal"),
 ];
 
 impl Unit {
@@ -124,9 +159,22 @@ impl Unit {
         Self::parse(code).ok()
     }
 
-    /// The unit that a text means which is meant to be one: a word as in names, or a spelling as in graph files.
+    /// The unit that a text means which is meant to be one: a word as in names, a spelling as in graph files, or one in full
+    /// such as `Deg C`.
     #[must_use]
     pub fn in_words(text: &str) -> Option<Self> {
-        Self::in_name(text).or_else(|| Self::parse(text).ok())
+        let code = || Self::parse(text).ok();
+        let in_full = || {
+            let squeezed = text.to_lowercase().replace([' ', '.', '^'], "");
+            let rest = squeezed.strip_prefix("degrees");
+            let rest = rest.or_else(|| squeezed.strip_prefix("degree"));
+            let short = rest.map_or(squeezed.clone(), |rest| match rest {
+                "" => "deg".to_owned(),
+                "celsius" => "degC".to_owned(),
+                rest => format!("deg{rest}"),
+            });
+            Self::in_name(&short).or_else(|| Self::parse(&short).ok().filter(|_| rest.is_some()))
+        };
+        Self::in_name(text).or_else(code).or_else(in_full)
     }
 }

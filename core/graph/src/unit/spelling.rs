@@ -3,7 +3,7 @@
 use crate::diagnostic::nearest;
 
 /// Spellings of whole symbols, and the UCUM symbols they stand for.
-const SPELLINGS: [(&str, &str); 65] = [
+const SPELLINGS: [(&str, &str); 66] = [
     ("degC", "Cel"),
     ("\u{b0}C", "Cel"),
     ("\u{2103}", "Cel"),
@@ -38,6 +38,7 @@ const SPELLINGS: [(&str, &str); 65] = [
     ("ppm", "[ppm]"),
     ("arcsec", "''"),
     ("arcmin", "'"),
+    ("mas", "10*-3.''"),
     ("rpm", "/min"),
     ("RPM", "/min"),
     ("rps", "/s"),

@@ -296,6 +296,12 @@ impl Control {
         self.replica.as_ref().map(|replica| &replica.engine)
     }
 
+    /// How many ticks, segment breaks and freezes have been taken in: the replica is that of the running graph after so many.
+    #[must_use]
+    pub fn events(&self) -> u64 {
+        self.event
+    }
+
     /// How much of the past is retained.
     #[must_use]
     pub fn retained(&self) -> Duration {

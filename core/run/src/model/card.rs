@@ -9,7 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::engine::{Fnv1a, SampleRange};
-use crate::fit::Dropped;
+use crate::fit::{Dropped, EstimatorFit, FitReport, Outcome};
 use crate::node::TrainingReport;
 use crate::score::Levels;
 
@@ -125,4 +125,57 @@ pub struct EstimatorCard {
     /// The outcome.
     #[serde(flatten)]
     pub report: TrainingReport,
+}
+
+/// How many candidates of each step a model keeps: the one taken, and the next best.
+const CANDIDATES_KEPT: usize = 2;
+
+impl Card {
+    /// The card of a model that was fitted, by a program of this version at this time, on these data.
+    #[must_use]
+    pub fn of(report: &FitReport, data: Vec<DataCard>, created: Option<String>) -> Self {
+        let mut estimators: Vec<_> = report
+            .estimators
+            .iter()
+            .filter_map(EstimatorCard::of)
+            .collect();
+        for EstimatorCard { report, .. } in &mut estimators {
+            for step in report.selection.iter_mut().chain(&mut report.refused) {
+                step.candidates.truncate(CANDIDATES_KEPT);
+            }
+        }
+        Self {
+            athermal: env!("CARGO_PKG_VERSION").to_owned(),
+            created,
+            data,
+            period: report.period.map(|(from, to)| Period {
+                from_s: from.as_ns() as f64 / 1e9,
+                to_s: to.as_ns() as f64 / 1e9,
+            }),
+            ticks: report.ticks,
+            ranges: report.ranges.clone(),
+            levels: report.levels.clone(),
+            estimators,
+        }
+    }
+}
+
+impl EstimatorCard {
+    /// The card of a node with all of its candidates; none of one that could not be fitted.
+    #[must_use]
+    pub fn of(fit: &EstimatorFit) -> Option<Self> {
+        let Outcome::Fitted(report) = &fit.outcome else {
+            return None;
+        };
+        Some(Self {
+            node: fit.node.clone(),
+            kind: fit.kind.to_owned(),
+            truth: fit.truth.clone(),
+            unit: fit.unit.clone(),
+            rows: fit.rows,
+            dropped: fit.dropped,
+            dropped_candidates: fit.dropped_candidates.clone(),
+            report: report.clone(),
+        })
+    }
 }

@@ -27,6 +27,31 @@ impl FeedNames {
         }
     }
 
+    /// A timeline of these channels and sources as one of others, by name. What waits for a channel that is not there is dropped.
+    #[must_use]
+    pub fn map(&self, timeline: &Timeline, to: &Self) -> Timeline {
+        let place = |channel| self.channels.iter().position(|of| of == channel);
+        let places: Vec<_> = to.channels.iter().map(place).collect();
+        let stamp = |place: &Option<usize>| place.map_or(Instant::MIN, |of| timeline.stamps()[of]);
+        let offset = |source| {
+            let place = self.sources.iter().position(|of| of == source);
+            place.and_then(|place| timeline.offsets()[place])
+        };
+        let moved = |sample: &Sample| {
+            let channel = places
+                .iter()
+                .position(|of| *of == Some(sample.channel as usize));
+            channel.map(|channel| Sample {
+                channel: channel as u32,
+                ..*sample
+            })
+        };
+        let pending: Vec<_> = timeline.pending().filter_map(moved).collect();
+        let offsets = to.sources.iter().map(offset).collect();
+        let stamps = places.iter().map(stamp).collect();
+        Timeline::resume(timeline.last(), stamps, offsets, &pending)
+    }
+
     /// A hash, for the header of a file.
     pub(super) fn hash(&self) -> u64 {
         let mut text = String::new();
@@ -91,6 +116,18 @@ impl Begin {
         begin
     }
 
+    /// Before the first file.
+    pub(crate) fn nothing() -> Self {
+        let timeline = Timeline::new(0, 0, 0);
+        Self::new(
+            FeedNames::default(),
+            String::new(),
+            (0, 0),
+            false,
+            &timeline,
+        )
+    }
+
     /// Takes over where a timeline is.
     pub(super) fn set(&mut self, timeline: &Timeline) {
         let sample = |of: &Sample| (of.channel, of.stamp, of.value.to_bits());
@@ -111,6 +148,8 @@ impl Begin {
             value: f64::from_bits(bits),
         };
         let pending: Vec<_> = self.pending.iter().map(sample).collect();
-        Timeline::resume(self.last, self.stamps.clone(), offsets.collect(), &pending)
+        let mut stamps = self.stamps.clone();
+        stamps.resize(self.feed.channels.len(), Instant::MIN);
+        Timeline::resume(self.last, stamps, offsets.collect(), &pending)
     }
 }

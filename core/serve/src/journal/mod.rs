@@ -20,6 +20,7 @@ mod progress;
 mod record;
 mod recorder;
 mod recording;
+mod retention;
 mod segment;
 mod sync;
 mod writer;
@@ -31,3 +32,6 @@ pub use progress::{JournalStatus, Progress};
 pub use record::{Record, output_hash};
 pub use recorder::{JournalOptions, Recorder};
 pub use recording::JournalRecording;
+pub use retention::{Keep, retire};
+
+pub(crate) use writer::sync_folder;

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant as Clock};
 pub struct Progress {
     written: AtomicU64,
     synced: AtomicU64,
+    synced_happenings: AtomicU64,
     lost: AtomicU64,
     failures: AtomicU64,
     /// Whether the disk has failed, and it is not yet time to try again.
@@ -48,6 +49,18 @@ impl Progress {
         self.synced.load(Ordering::Acquire)
     }
 
+    /// So many ticks, beats, breaks and freezes are on the disk.
+    #[must_use]
+    pub fn synced_happenings(&self) -> u64 {
+        self.synced_happenings.load(Ordering::Acquire)
+    }
+
+    /// Whether the program goes on without its journal at the moment.
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        self.failed() || self.is_stuck.load(Ordering::Acquire)
+    }
+
     /// Waits until all records below a number are written, but no longer than so long: what comes of them may leave then. False where
     /// they are not written. While the disk fails or hangs, nobody waits again.
     #[must_use]
@@ -57,7 +70,7 @@ impl Progress {
             if self.written() >= below {
                 return true;
             }
-            if self.failed() || self.is_stuck.load(Ordering::Acquire) {
+            if self.is_degraded() {
                 return false;
             }
             if began.elapsed() >= patience {
@@ -77,7 +90,7 @@ impl Progress {
             synced: self.synced(),
             lost: self.lost.load(Ordering::Relaxed),
             failures: self.failures.load(Ordering::Relaxed),
-            is_degraded: self.failed() || self.is_stuck.load(Ordering::Relaxed),
+            is_degraded: self.is_degraded(),
             error,
         }
     }
@@ -91,7 +104,9 @@ impl Progress {
         self.is_stuck.store(false, Ordering::Release);
     }
 
-    pub(super) fn set_synced(&self, below: u64) {
+    pub(super) fn set_synced(&self, below: u64, happenings: u64) {
+        self.synced_happenings
+            .fetch_max(happenings, Ordering::AcqRel);
         self.synced.fetch_max(below, Ordering::AcqRel);
     }
 

@@ -91,7 +91,7 @@ impl Recorder {
         let (queue, messages) = RingBuffer::new(options.queue.max(16));
         let progress = Arc::new(Progress::default());
         progress.set_written(begin.event);
-        progress.set_synced(begin.event);
+        progress.set_synced(begin.event, begin.happenings);
         let (event, happenings, frozen) = (begin.event, begin.happenings, begin.frozen);
         let writer = Writer::begin(folder, begin, options, messages, Arc::clone(&progress))?;
         let thread = std::thread::Builder::new()

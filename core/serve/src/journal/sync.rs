@@ -11,6 +11,7 @@ pub(super) struct Mark {
     pub(super) file: u64,
     pub(super) offset: u64,
     pub(super) event: u64,
+    pub(super) happenings: u64,
 }
 
 /// The other end of the thread that syncs.

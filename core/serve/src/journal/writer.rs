@@ -181,7 +181,7 @@ impl Writer {
             && self.file.as_ref().is_some_and(|of| of.number == mark.file)
         {
             result?;
-            self.progress.set_synced(mark.event);
+            self.progress.set_synced(mark.event, mark.happenings);
             segment::append_synced(&mut self.bytes, mark.offset);
             self.write()?;
         }
@@ -194,6 +194,7 @@ impl Writer {
                 file: open.number,
                 offset: open.at,
                 event,
+                happenings: self.begin.happenings,
             };
             if self.syncer.ask(&open.file, mark)? {
                 open.asked = event;
@@ -208,7 +209,8 @@ impl Writer {
         if let Some(open) = self.file.take() {
             open.file.set_len(open.at)?;
             open.file.sync_all()?;
-            self.progress.set_synced(self.begin.event);
+            self.progress
+                .set_synced(self.begin.event, self.begin.happenings);
         }
         Ok(())
     }

@@ -224,6 +224,12 @@ impl Sequencer {
         self.cut(now)
     }
 
+    /// The newest stamp that was accepted and the time since: what time it is at the sources. None before the first.
+    #[must_use]
+    pub fn newest(&self, now: Moment) -> Option<Instant> {
+        self.newest.map(|(newest, when)| newest + (now - when))
+    }
+
     /// What waits, and where the log is.
     #[must_use]
     pub fn timeline(&self) -> &Timeline {
@@ -267,8 +273,8 @@ impl Sequencer {
         if is_late && (is_too_late() || self.timeline.len() >= self.rules.most) {
             return Admission::Late(sample);
         }
-        if let Some((newest, when)) = self.newest {
-            let ahead = sample.stamp - (newest + (now - when));
+        if let Some(newest) = self.newest(now) {
+            let ahead = sample.stamp - newest;
             if ahead > self.rules.future {
                 return Admission::Refused(sample, Refusal::Future { ahead });
             }

@@ -100,6 +100,12 @@ impl Timeline {
         }
     }
 
+    /// Nothing is stepped up to an instant any more: what waits there is dropped.
+    pub fn not_before(&mut self, last: Instant) {
+        self.pending.retain(|of| of.stamp > last);
+        self.last = self.last.max(last);
+    }
+
     /// The last tick; [`Instant::MIN`] before the first.
     #[must_use]
     pub fn last(&self) -> Instant {

@@ -2,6 +2,8 @@
 
 mod damage;
 mod failures;
+mod kills;
+mod recoveries;
 mod replays;
 
 use std::path::{Path, PathBuf};

@@ -216,15 +216,45 @@ fn an_optional_column_that_is_missing_is_absent_throughout() {
 
 #[test]
 fn a_row_of_another_length_is_an_error_or_left_out() {
-    let text = "t,a,b\n0,1,2.5\n5,1\n6,1,2,3\n1,3,\n";
+    let text = "t,a,b\n0,1,2.5\n5\n6,1,2,3\n,1\n1,3,\n";
     assert_eq!(
         error(text),
-        "f.csv:3: 2 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
+        "f.csv:3: 1 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
     );
     let (rows, reader) = read_with(text, lenient());
     assert_eq!(rows, TWO_ROWS);
-    assert_eq!(reader.report().refused_rows.count, 2);
+    assert_eq!(reader.report().refused_rows.count, 3);
     assert_eq!(reader.report().rows, 2);
+}
+
+#[test]
+fn a_row_may_end_behind_its_last_value_and_is_counted() {
+    let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3\n", Options::default());
+    assert_eq!(rows, TWO_ROWS);
+    let short = &reader.report().short_rows;
+    let first = short.first.as_ref().unwrap().to_string();
+    assert_eq!(short.count, 1);
+    assert_eq!(
+        first,
+        "f.csv:3: 2 cells where the header has 3; those behind them are taken as missing"
+    );
+    // Cells of the row before are none of this one.
+    assert_eq!(read("t,b,a\n0,2.5,1\n1\t,,3\n"), TWO_ROWS);
+    let (rows, reader) = read_with("t,b,a\n0,2.5,1\n1,7\n2,8,9\n", Options::default());
+    assert_eq!(rows, "0 [1.0, 2.5]; 1 [NaN, 7.0]; 2 [9.0, 8.0]");
+    assert_eq!(reader.report().short_rows.count, 1);
+}
+
+#[test]
+fn a_note_behind_the_named_columns_is_passed_over_where_the_first_row_has_one() {
+    let (rows, reader) = read_with("t,a,b\n0,1,2.5,began\n1,3,,\n", Options::default());
+    assert_eq!(rows, TWO_ROWS);
+    let first = reader.report().notes.first.as_ref().unwrap().to_string();
+    assert!(
+        first.starts_with("f.csv:2: `began` stands behind the last column"),
+        "{first}"
+    );
+    assert!(error("t,a,b\n0,1,2.5\n1,3,5,note\n").contains("4 cells where the header has 3"));
 }
 
 #[test]
@@ -519,7 +549,7 @@ fn a_logger_that_begins_anew_writes_all_that_stood_above_its_table_again() {
     let like_a_name = "t;12:00;\nt;a;b\n0;1;2,5\nt;13:00;\nt;b;a\n1;;3\n";
     assert_eq!(read(like_a_name), TWO_ROWS);
     let numbered = "1;Plate\nt;a;b\n0;1;2,5\n1;3\n";
-    assert!(error(numbered).contains("2 cells where the header has 3"));
+    assert_eq!(read(numbered), TWO_ROWS);
     let unknown = "Device;5\nt;a;b\n0;1;2,5\nSerial;7\n";
     assert!(error(unknown).contains("2 cells where the header has 3"));
 }

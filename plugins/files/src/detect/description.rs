@@ -9,11 +9,13 @@ use serde_json::{Map, Value};
 
 use crate::cell::{decimal_mark, is_number};
 use crate::cells::Cells;
+use crate::columns::numbered;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 
-use super::{Format, LongFormat, units};
+use super::header::is_value;
+use super::{Format, LongFormat, begins_json_array, units};
 use crate::FileError;
 
 /// The columns of a file and the texts of its first rows.
@@ -38,7 +40,7 @@ impl Description {
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
         let path = path.as_ref();
-        let mut described = of_lines(Lines::open(path, None)?, Format::from_path(path), rows)?;
+        let mut described = of_lines(Lines::open(path, None)?, Format::of_file(path), rows)?;
         if let Some(encoding) = marked(path) {
             described.table.encoding = Some(encoding);
         }
@@ -58,16 +60,31 @@ impl Description {
         of_lines(Lines::new(name.into(), None, input), format, rows)
     }
 
-    /// The decimal mark of all columns but those of the time, where it is a comma.
+    /// Whether numbers stand where the names of the columns should.
+    #[must_use]
+    pub fn lacks_names(&self) -> bool {
+        let named = self.columns.iter().filter(|name| !name.is_empty());
+        named.clone().count() > 1 && named.clone().all(|name| is_value(name))
+    }
+
+    /// The decimal mark of all columns but those of the time, where it is a comma. Where a comma separates cells too, others stand in
+    /// quotes, and may stand between thousands: only such as cannot are decimal marks.
     #[must_use]
     pub fn decimal(&self, time: &[String]) -> Option<DecimalMark> {
-        self.table.separator?;
         let is_value = |at: usize| self.columns.get(at).is_some_and(|of| !time.contains(of));
         let cells = self.rows.iter().flat_map(|row| row.iter().enumerate());
         let numbers = cells.filter(|(at, cell)| is_value(*at) && is_number(cell));
-        let mut marks = numbers.filter_map(|(_, cell)| decimal_mark(cell.as_bytes()));
+        let mut marks = numbers
+            .clone()
+            .filter_map(|(_, cell)| decimal_mark(cell.as_bytes()));
         let first = marks.next()?;
-        (first == b',' && marks.all(|mark| mark == first)).then_some(DecimalMark::Comma)
+        let all = first == b',' && marks.all(|mark| mark == first);
+        let is_decimal = || {
+            numbers
+                .map(|(_, cell)| cell)
+                .any(|cell| is_no_thousand(cell))
+        };
+        (all && (self.table.separator.is_some() || is_decimal())).then_some(DecimalMark::Comma)
     }
 
     /// What the columns are where the file is in long format.
@@ -83,6 +100,15 @@ impl Description {
         let text = at.and_then(|at| self.units.get(at));
         text.map_or("", |text| units::bare(text))
     }
+}
+
+/// Whether the comma of a number cannot stand between thousands.
+fn is_no_thousand(number: &str) -> bool {
+    number.split_once(',').is_some_and(|(whole, rest)| {
+        let whole = whole.trim_start_matches(['+', '-', ' ']);
+        let digits = rest.len() == 3 && rest.bytes().all(|byte| byte.is_ascii_digit());
+        !digits || whole.starts_with('0') || whole.len() > 3 || whole.is_empty()
+    })
 }
 
 /// The encoding that the first bytes of a file say, other than UTF-8.
@@ -113,11 +139,12 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
     let mut texts = Vec::new();
     while texts.len() < rows && csv.advance(&mut ledger)? {
         let row = csv.texts();
-        if row == csv.names() || is_rule(&row) {
+        let named = numbered(row.clone());
+        if named == csv.names() || is_rule(&row) {
             continue;
         }
         // From there on columns may stand elsewhere.
-        if row.iter().all(|cell| csv.names().contains(cell)) {
+        if named.iter().all(|cell| csv.names().contains(cell)) {
             break;
         }
         texts.push(row);
@@ -130,7 +157,7 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
                 .map(Separator),
             encoding: csv.is_windows_1252().then_some(Encoding::Windows1252),
             skip: Some(csv.skip()).filter(|skip| *skip > 0),
-            units: (!csv.units().is_empty()).then_some(2),
+            units: (!csv.units().is_empty()).then(|| csv.units_row()),
             ..TableFormat::default()
         },
         columns: csv.names().to_vec(),
@@ -149,6 +176,10 @@ fn of_json(mut lines: Lines, rows: usize) -> Result<Description, FileError> {
     let mut columns: Vec<String> = Vec::new();
     let mut texts: Vec<Vec<String>> = Vec::new();
     while texts.len() < rows.max(1) && lines.advance_to_content()? {
+        if texts.is_empty() && begins_json_array(lines.text()) {
+            let place = lines.place();
+            return Err(FileError::JsonArray { place });
+        }
         let Ok(object) = serde_json::from_slice::<Map<String, Value>>(lines.text()) else {
             continue;
         };

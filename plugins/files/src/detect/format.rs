@@ -22,6 +22,13 @@ impl Format {
         }
     }
 
+    /// The same of a file that is read, which may be packed: `.csv.gz`.
+    pub(crate) fn of_file(path: &Path) -> Option<Self> {
+        let is_packed = path.extension().is_some_and(|ending| ending == "gz");
+        let inner = path.file_stem().filter(|_| is_packed).map(Path::new);
+        Self::from_path(inner.unwrap_or(path))
+    }
+
     /// The format of a text that starts with this line.
     pub(crate) fn from_first_line(line: &[u8]) -> Self {
         match line.trim_ascii_start().first() {
@@ -59,5 +66,7 @@ mod tests {
             );
         }
         assert_eq!(Format::from_path(Path::new("recording")), None);
+        assert_eq!(Format::from_path(Path::new("a.csv.gz")), None);
+        assert_eq!(Format::of_file(Path::new("a.csv.gz")), Some(Format::Csv));
     }
 }

@@ -63,8 +63,15 @@ pub(crate) fn seek(
             seen.push(line);
         }
     }
-    if !declared {
-        found = found.or_else(|| longest_table(&seen, separator));
+    if !declared && found.is_none() {
+        if let Some(line) = seen.iter().find(|line| !line.is_comment())
+            && separator.is_none()
+            && are_of_spaces(&seen)
+        {
+            let place = lines.place_of(line.number);
+            return Err(FileError::CellsOfSpaces { place });
+        }
+        found = behind_labview(&seen).or_else(|| longest_table(&seen, separator));
     }
     let Some((first, separator)) = found else {
         return Err(match seen.last() {
@@ -106,6 +113,42 @@ pub(crate) fn seek(
         skip,
         above,
     })
+}
+
+/// A measurement file of LabVIEW: its names stand behind the last of these lines, among cells that the file names.
+const END_OF_LABVIEW_HEADER: &[u8] = b"***End_of_Header***";
+
+fn behind_labview(seen: &[Line]) -> Option<(usize, u8)> {
+    let first = seen.first()?;
+    first
+        .text
+        .starts_with(b"LabVIEW Measurement")
+        .then_some(())?;
+    let is_end = |line: &Line| line.text.starts_with(END_OF_LABVIEW_HEADER);
+    let end = seen.iter().rposition(is_end)?;
+    let names = (end + 1..seen.len()).find(|&at| !seen[at].is_comment())?;
+    let by_comma = |line: &Line| line.text.trim_ascii() == b"Separator,Comma";
+    let separator = if seen.iter().any(by_comma) {
+        b','
+    } else {
+        b'\t'
+    };
+    Some((names, separator))
+}
+
+/// Whether the cells of most rows are parted by spaces: words of values in lines without a separator.
+fn are_of_spaces(seen: &[Line]) -> bool {
+    let content = seen.iter().filter(|line| !line.is_comment()).skip(1);
+    let (mut rows, mut such) = (0, 0);
+    for line in content {
+        rows += 1;
+        let text = String::from_utf8_lossy(&line.text);
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let is_one = !text.trim().contains(SEPARATORS.map(char::from));
+        let enough = words.len() > 2 || words.len() == 2 && !text.contains(':');
+        such += usize::from(is_one && enough && words.iter().all(|word| is_value(word)));
+    }
+    rows > 0 && such * 2 > rows
 }
 
 /// With this a first line names the separator, for spreadsheets.
@@ -216,9 +259,9 @@ fn longest_table(seen: &[Line], declared: Option<u8>) -> Option<(usize, u8)> {
     found.or_else(|| Some((first, of_first())))
 }
 
-/// Whether a row has so many cells, or one more that is empty: some loggers end rows, but not the names, with a separator.
+/// Whether a row has so many cells, or one more that is empty or a note: some loggers end rows, but not the names, with a separator.
 fn is_of_width(row: &[String], width: usize) -> bool {
-    row.len() == width || row.len() == width + 1 && row[width].is_empty()
+    row.len() == width || row.len() == width + 1 && !is_value(&row[width])
 }
 
 /// Whether a row may hold the names of columns, and no values.
@@ -227,7 +270,7 @@ fn can_name(row: &[String]) -> bool {
 }
 
 /// Whether a cell holds a number, a date or a time.
-fn is_value(cell: &str) -> bool {
+pub(super) fn is_value(cell: &str) -> bool {
     let begins = cell.starts_with(|first: char| first.is_ascii_digit());
     begins && !cell.contains(char::is_alphabetic) || is_number(cell)
 }

@@ -5,12 +5,14 @@ mod description;
 mod format;
 mod header;
 mod long;
+mod times;
 mod units;
 
 pub use description::Description;
 pub use format::Format;
 pub use long::LongFormat;
+pub use times::{NumberForm, zone_in_name, zone_of};
 
 pub(crate) use format::begins_json_array;
 pub(crate) use header::{Head, seek};
-pub(crate) use units::{are_units, unit};
+pub(crate) use units::{are_units, is_of_processing, unit};

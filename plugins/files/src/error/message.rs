@@ -118,14 +118,10 @@ impl FileError {
                 positions: [first, second],
                 ..
             } => {
-                let is_time = ["time", "timestamp", "datetime", "zeit"];
-                let advice = match is_time.contains(&&*column.to_lowercase()) {
-                    true => "export the log with one time for all columns",
-                    false => "give each column a name of its own",
-                };
                 write!(
                     f,
-                    "the name `{column}` stands at columns {first} and {second}; {advice}"
+                    "the name `{column}` stands at columns {first} and {second}; write `{column}[1]` or `{column}[2]` for one of \
+                     them, by its place among these"
                 )
             }
             Self::MissingColumns {
@@ -225,6 +221,21 @@ impl FileError {
                 )?;
                 or_leniently(f, strict, "leave it out")
             }
+            Self::CellsLacking {
+                expected, found, ..
+            } => write!(
+                f,
+                "{found} cells where the header has {expected}; those behind them are taken as missing"
+            ),
+            Self::CellBeyond { found, .. } => write!(
+                f,
+                "`{found}` stands behind the last column that has a name; it is passed over"
+            ),
+            Self::NoTable { file, what } => write!(f, "{file}: {what}"),
+            Self::CellsOfSpaces { .. } => write!(
+                f,
+                "the cells are parted by spaces, which is not read; write commas between them, as `tr -s ' ' ',' < LOG` does"
+            ),
             Self::BadObject { reason, .. } => {
                 write!(
                     f,

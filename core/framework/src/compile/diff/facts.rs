@@ -168,6 +168,10 @@ pub(super) fn time(plan: &Plan) -> Facts {
     match form {
         TimeForm::Numbers { unit } => facts.plain("unit", unit.to_string()),
         TimeForm::Rfc3339 => facts.plain("unit", "RFC 3339"),
+        TimeForm::Elapsed => facts.plain("unit", "h:min:s"),
+        TimeForm::Since { unit, origin_ns } => {
+            facts.plain("unit", format!("{unit}, from {origin_ns} ns before 1970"));
+        }
         TimeForm::Format(format) => facts.plain("format", format.as_str()),
         TimeForm::Samples { step } => {
             facts.plain("unit", "sample");

@@ -14,9 +14,21 @@ const SECOND: Duration = Duration::from_ns(1_000_000_000);
 /// What `unit` may be, beside the units of time.
 const SAMPLE: &str = "sample";
 const RFC_3339: &str = "rfc3339";
+const ELAPSED: &str = "h:min:s";
+const DAY_NS: i64 = 86_400_000_000_000;
+/// Numbers that count from another origin than 1970: the length of one, and how far before 1970 the origin lies, both in ns. Julian days
+/// and modified ones, those of MATLAB since the year 0, steps of 100 ns of Windows since 1601, and of .NET since the year 1.
+const SINCE: [(&str, i64, i128); 5] = [
+    ("jd", DAY_NS, 210_866_760_000_000_000_000),
+    ("mjd", DAY_NS, 3_506_716_800_000_000_000),
+    ("datenum", DAY_NS, 62_167_305_600_000_000_000),
+    ("filetime", 100, 11_644_473_600_000_000_000),
+    ("ticks", 100, 62_135_596_800_000_000_000),
+];
 /// What `unit` of `[time]` may be.
-pub const UNITS: [&str; 11] = [
-    "ns", "us", "\u{b5}s", "\u{3bc}s", "ms", "s", "min", "h", "d", SAMPLE, RFC_3339,
+pub const UNITS: [&str; 17] = [
+    "ns", "us", "\u{b5}s", "\u{3bc}s", "ms", "s", "min", "h", "d", SAMPLE, RFC_3339, ELAPSED,
+    SINCE[0].0, SINCE[1].0, SINCE[2].0, SINCE[3].0, SINCE[4].0,
 ];
 
 pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> TimeBase {
@@ -50,6 +62,7 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
         None => match (&form, unit) {
             (TimeForm::Samples { .. }, _) => TimeColumns::one(SAMPLE),
             (TimeForm::Rfc3339 | TimeForm::Format(_), _) => TimeColumns::one("time"),
+            (TimeForm::Elapsed | TimeForm::Since { .. }, _) => TimeColumns::one("time"),
             (TimeForm::Numbers { .. }, Some((name, _))) => TimeColumns::one(format!("time_{name}")),
             (TimeForm::Numbers { .. }, None) => TimeColumns::one("time_s"),
         },
@@ -62,7 +75,8 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
 fn zone(time: &Table, form: &TimeForm, diagnostics: &mut Diagnostics) -> Option<Zone> {
     let entry = time.entry("zone")?;
     let with = match form {
-        TimeForm::Numbers { .. } => Some("times that are numbers"),
+        TimeForm::Numbers { .. } | TimeForm::Since { .. } => Some("times that are numbers"),
+        TimeForm::Elapsed => Some("times that have elapsed"),
         TimeForm::Samples { .. } => Some("times that are sample numbers"),
         TimeForm::Format(format) if format.has_offset() => Some("a format that has the offset"),
         TimeForm::Format(_) | TimeForm::Rfc3339 => None,
@@ -123,8 +137,15 @@ fn form(
             TimeForm::Samples { step }
         }
         (Some((RFC_3339, _)), None) => TimeForm::Rfc3339,
-        (Some((name, _)), None) => TimeForm::Numbers {
-            unit: format!("1{name}").parse().unwrap_or(SECOND),
+        (Some((ELAPSED, _)), None) => TimeForm::Elapsed,
+        (Some((name, _)), None) => match SINCE.iter().find(|(since, ..)| *since == name) {
+            Some(&(_, ns, origin_ns)) => TimeForm::Since {
+                unit: Duration::from_ns(ns),
+                origin_ns,
+            },
+            None => TimeForm::Numbers {
+                unit: format!("1{name}").parse().unwrap_or(SECOND),
+            },
         },
         (None, None) => TimeForm::Numbers { unit: SECOND },
     }

@@ -130,7 +130,7 @@ fn a_long_layout_is_read_in_order_of_time_and_refused_in_any_other() {
 fn a_table_that_is_declared_lenient_needs_no_option() {
     let lenient = of(|table| table.lenient = true);
     assert_eq!(
-        declared_read(lenient, "t,a,b\n0,1,2.5\n5,1\n1,3,off\n"),
+        declared_read(lenient, "t,a,b\n0,1,2.5\n5\n1,3,off\n"),
         TWO_ROWS
     );
 }

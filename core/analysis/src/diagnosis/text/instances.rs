@@ -1,16 +1,14 @@
 //! How instances of a node are named, and what belongs together.
 
 /// Whether a prediction is what an instance puts out: `thermal.Z1` is, of itself and of `thermal`.
-pub(super) fn is_of(prediction: &str, node: &str) -> bool {
+#[must_use]
+pub fn is_of(prediction: &str, node: &str) -> bool {
     let rest = prediction.strip_prefix(node);
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
 /// What is alike in `by` together, in the order in which the first of each comes.
-pub(super) fn grouped<T, K: PartialEq>(
-    all: impl Iterator<Item = T>,
-    by: impl Fn(&T) -> K,
-) -> Vec<Vec<T>> {
+pub fn grouped<T, K: PartialEq>(all: impl Iterator<Item = T>, by: impl Fn(&T) -> K) -> Vec<Vec<T>> {
     let mut groups: Vec<(K, Vec<T>)> = Vec::new();
     for one in all {
         let key = by(&one);
@@ -27,7 +25,9 @@ pub(super) fn name_of(instance: &str) -> &str {
     instance.split_once('.').map_or(instance, |(node, _)| node)
 }
 
-pub(super) fn axis_of(channel: &str) -> String {
+/// The axis of a channel: `Z1` of `thermal.Z1`, and the whole of a name without one.
+#[must_use]
+pub fn axis_of(channel: &str) -> String {
     let axis = channel.split_once('.').map_or(channel, |(_, axis)| axis);
     axis.to_owned()
 }

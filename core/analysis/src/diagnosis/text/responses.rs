@@ -3,17 +3,18 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use athermal::core::unit::Unit;
-use athermal::diagnosis::response::{Response, Responses};
+use athermal_core::unit::Unit;
 
 use super::instances::{axis_of, grouped, name_of};
-use athermal_analysis::figures::{TimeUnit, matrix, number};
+use crate::diagnosis::response::{Response, Responses};
+use crate::figures::{TimeUnit, matrix, number};
 
 /// By how much answers to a step up and down differ at least where it is worth a word.
 const BENT: f64 = 0.005;
 
 /// The tables of all estimators, node by node.
-pub(super) fn text(shown: &[&Responses]) -> String {
+#[must_use]
+pub fn responses(shown: &[&Responses]) -> String {
     let nodes = grouped(shown.iter().copied(), |of| name_of(&of.node).to_owned());
     let nodes = nodes.into_iter().filter_map(Node::of);
     nodes.map(|node| node.text()).collect()
@@ -251,7 +252,7 @@ mod tests {
             (share, "a step of 1 moves"),
             (answer("a", Some(2.0), 60.0), "a step of 1 K moves"),
         ] {
-            let table = text(&[&instance("X", "nm/min", vec![of])]);
+            let table = responses(&[&instance("X", "nm/min", vec![of])]);
             assert!(table.contains(step), "{table}");
         }
     }
@@ -269,7 +270,7 @@ mod tests {
             instance("Y", "nm/min", vec![heater]),
             instance("Z", "nm/min", endless),
         ];
-        let table = text(&of.iter().collect::<Vec<_>>());
+        let table = responses(&of.iter().collect::<Vec<_>>());
         let together = table.lines().find(|line| line.contains("all together"));
         let cells: Vec<&str> = together.unwrap().split("  ").collect();
         let cells: Vec<&str> = cells.into_iter().map(str::trim).collect();
@@ -287,7 +288,7 @@ mod tests {
             instance("X", "nm", vec![stays]),
             instance("Z", "nm", vec![answer("a", Some(2.0), 60.0)]),
         ];
-        let table = text(&of.iter().collect::<Vec<_>>());
+        let table = responses(&of.iter().collect::<Vec<_>>());
         let lines = table.lines().filter(|line| line.contains("temperature.a"));
         let cells = lines.map(|line| line.split_once("temperature.a").map(|of| of.1.trim()));
         let cells: Vec<Vec<&str>> = cells
@@ -301,7 +302,7 @@ mod tests {
     fn settling_is_told_in_the_unit_in_which_the_longest_is_read_best() {
         for (settled_s, unit, number) in [(90.0, "s", "90.00"), (43_200.0, "h", "12.00")] {
             let of = instance("X", "nm/min", vec![answer("a", Some(2.0), settled_s)]);
-            let table = text(&[&of]);
+            let table = responses(&[&of]);
             assert!(
                 table.contains(&format!("a tenth of that, in {unit}\n")),
                 "{table}"

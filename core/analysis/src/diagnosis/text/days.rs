@@ -1,11 +1,11 @@
 //! Fits on some days, scored on others, as tables for a terminal.
 
-use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
-
-use athermal_analysis::figures::{counted, matrix, number, rounded};
+use crate::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
+use crate::figures::{counted, matrix, number, rounded};
 
 /// On how many days a fit comes near those on all others, of all predictions shown; none where on all of them only.
-pub(super) fn enough(days: &Days, shown: &[&str]) -> Option<usize> {
+#[must_use]
+pub fn enough(days: &Days, shown: &[&str]) -> Option<usize> {
     let near = |point: &CurvePoint| {
         let scores = point.scores.iter();
         let mut of_shown = scores.filter(|score| shown.contains(&score.prediction.as_str()));
@@ -24,27 +24,31 @@ fn left_by_others(score: &DayScore) -> Option<String> {
 }
 
 /// The tables of predictions of one unit.
-pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
-    let enough = enough(days, shown);
+#[must_use]
+pub fn days(of: &Days, unit: &str, shown: &[&str]) -> String {
+    let enough = enough(of, shown);
     let shown: Vec<String> = shown.iter().map(|&name| name.to_owned()).collect();
     let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<String>| -> Vec<String> {
-        let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
-        let texts = shown.iter().map(|name| of(name).and_then(cell));
+        let score_of = |name: &String| scores.iter().find(|score| score.prediction == *name);
+        let texts = shown.iter().map(|name| score_of(name).and_then(cell));
         texts
             .map(|text| text.unwrap_or_else(|| "-".to_owned()))
             .collect()
     };
-    let left_out = days.left_out.iter().flat_map(|of| {
-        let no_model = cells(&of.scores, |score| score.zero.map(number));
+    let left_out = of.left_out.iter().flat_map(|left_out| {
+        let no_model = cells(&left_out.scores, |score| score.zero.map(number));
         [
-            (format!("day {}", of.day), cells(&of.scores, left_by_others)),
+            (
+                format!("day {}", left_out.day),
+                cells(&left_out.scores, left_by_others),
+            ),
             ("  no model".to_owned(), no_model),
         ]
     });
-    let scores = days.curve.iter().flat_map(|point| &point.scores);
+    let scores = of.curve.iter().flat_map(|point| &point.scores);
     let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
     let compares = of_shown.any(|score| score.ratio().is_some());
-    let curve = days.curve.iter().map(|point| {
+    let curve = of.curve.iter().map(|point| {
         let (days, fits) = (point.days as u64, point.fits as u64);
         let label = format!("{} ({})", counted(days, "day"), counted(fits, "fit"));
         (
@@ -53,7 +57,7 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
         )
     });
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
-    let most = days.count - 1;
+    let most = of.count - 1;
     let verdict = match enough {
         _ if most == 1 => "two are too few",
         _ if !compares => "nothing to compare",
@@ -64,10 +68,10 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
         }
         None => "more days may still make it better",
     };
-    let of_day = if days.day_s == 86_400.0 {
+    let of_day = if of.day_s == 86_400.0 {
         String::new()
     } else {
-        format!(" of {}", rounded(days.day_s))
+        format!(" of {}", rounded(of.day_s))
     };
     let curve = match most {
         1 => String::new(),
@@ -87,7 +91,7 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use athermal::diagnosis::day::LeftOut;
+    use crate::diagnosis::day::LeftOut;
 
     use super::*;
 
@@ -112,7 +116,7 @@ mod tests {
             left_out: vec![day(1, 3.0), day(2, 5.0)],
             curve: Vec::new(),
         };
-        let table = text(&days, "nm/min", &["vote.Z"]);
+        let table = super::days(&days, "nm/min", &["vote.Z"]);
         let cells = table.lines().map(|line| line.split_whitespace().last());
         let cells: Vec<&str> = cells.flatten().collect();
         assert_eq!(

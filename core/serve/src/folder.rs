@@ -1,0 +1,158 @@
+//! The state folder of a service: its journal, checkpoints and models, held by one process.
+
+use std::fs::{self, File, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration as Wait, Instant as Clock};
+use std::{fmt, io};
+
+use athermal_run::live::store::write_whole;
+use athermal_run::model::{Model, ModelError};
+
+/// How long a process that is ending is waited for.
+const ENDS: Wait = Wait::from_secs(1);
+
+/// The state folder of a service. It is locked for as long as this lives; the lock goes with the process, however it ends.
+#[derive(Debug)]
+pub struct StateFolder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl StateFolder {
+    /// Makes the folder where it is not there, and locks it.
+    ///
+    /// # Errors
+    /// When another process holds it for more than a second, or it cannot be written.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        let not_written = |path: &Path| {
+            let path = path.to_owned();
+            move |error| FolderError::NotWritten { path, error }
+        };
+        let lock = path.join("lock");
+        fs::create_dir_all(path).map_err(not_written(path))?;
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        let mut file = options.open(&lock).map_err(not_written(&lock))?;
+        let began = Clock::now();
+        while let Err(error) = file.try_lock() {
+            match error {
+                TryLockError::Error(error) => return Err(not_written(&lock)(error)),
+                TryLockError::WouldBlock if began.elapsed() < ENDS => {
+                    std::thread::sleep(Wait::from_millis(20));
+                }
+                TryLockError::WouldBlock => {
+                    let mut by = String::new();
+                    let _ = file.read_to_string(&mut by);
+                    return Err(FolderError::Held {
+                        path: path.to_owned(),
+                        by: by.trim().parse().ok(),
+                    });
+                }
+            }
+        }
+        let id = std::process::id();
+        let noted = file
+            .set_len(0)
+            .and_then(|()| file.rewind())
+            .and_then(|()| writeln!(file, "{id}"));
+        noted.map_err(not_written(&lock))?;
+        let folder = Self {
+            path: path.to_owned(),
+            _lock: file,
+        };
+        for part in [folder.journal(), folder.checkpoints(), folder.models()] {
+            fs::create_dir_all(&part).map_err(not_written(&part))?;
+        }
+        Ok(folder)
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the journal is.
+    #[must_use]
+    pub fn journal(&self) -> PathBuf {
+        self.path.join("journal")
+    }
+
+    /// Where checkpoints are.
+    #[must_use]
+    pub fn checkpoints(&self) -> PathBuf {
+        self.path.join("checkpoints")
+    }
+
+    /// Where models are.
+    #[must_use]
+    pub fn models(&self) -> PathBuf {
+        self.path.join("models")
+    }
+
+    /// Keeps a model by its revision, so that a checkpoint of it is of use.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn keep_model(&self, model: &Model, revision: &str) -> Result<(), FolderError> {
+        let path = self.model_path(revision);
+        if path.exists() {
+            return Ok(());
+        }
+        let text = model.to_text().map_err(io::Error::other);
+        text.and_then(|text| write_whole(&path, text.as_bytes()))
+            .map_err(|error| FolderError::NotWritten { path, error })
+    }
+
+    /// The model of a revision.
+    ///
+    /// # Errors
+    /// When it is not there, or cannot be read.
+    pub fn model(&self, revision: &str) -> Result<Model, ModelError> {
+        Model::load(self.model_path(revision))
+    }
+
+    fn model_path(&self, revision: &str) -> PathBuf {
+        self.models().join(format!("{revision}.json"))
+    }
+}
+
+/// Why a state folder cannot be used.
+#[derive(Debug)]
+pub enum FolderError {
+    /// Another process holds it.
+    Held {
+        /// The folder.
+        path: PathBuf,
+        /// The number of the process, where it is known.
+        by: Option<u32>,
+    },
+    /// It cannot be written.
+    NotWritten {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+}
+
+impl fmt::Display for FolderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Held { path, by } => {
+                write!(
+                    f,
+                    "{}: another service keeps its state there",
+                    path.display()
+                )?;
+                by.map_or(Ok(()), |by| write!(f, " (process {by})"))
+            }
+            Self::NotWritten { path, error } => {
+                write!(f, "cannot write {}: {error}", path.display())
+            }
+        }
+    }
+}
+
+impl std::error::Error for FolderError {}

@@ -1,0 +1,325 @@
+//! From what a state folder holds to where the service was: newest valid checkpoint, then the journal.
+
+use std::sync::Arc;
+use std::{fmt, io};
+
+use athermal_run::model::Model;
+
+use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
+use crate::engine::{Engine, EngineError, NodeCarry, StateTransfer};
+use crate::folder::StateFolder;
+use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
+use crate::replay::{Difference, Replay};
+use crate::sequencer::Timeline;
+use crate::time::Instant;
+
+/// Where a service was when it ended.
+#[derive(Debug)]
+pub struct Recovered {
+    /// The engine, as if it had not ended.
+    pub engine: Engine,
+    /// The model that it runs: the last one that took over, which need not be the one given.
+    pub model: Model,
+    /// What waits, and what has been stepped.
+    pub timeline: Timeline,
+    /// How it was found.
+    pub report: RecoveryReport,
+    feed: FeedNames,
+    event: u64,
+    happenings: u64,
+}
+
+/// How a service was found.
+#[derive(Debug, Default)]
+pub struct RecoveryReport {
+    /// Where it began.
+    pub start: Start,
+    /// Checkpoints that could not be used, newest first, and why.
+    pub refused: Vec<CheckpointError>,
+    /// How many ticks and beats were stepped again.
+    pub stepped: u64,
+    /// The damaged end of the journal, which has been cut off.
+    pub torn: Option<Torn>,
+    /// What was never written.
+    pub gaps: Vec<Gap>,
+    /// How many ticks, beats, breaks and freezes the journal lacks that the checkpoint has.
+    pub ahead: u64,
+    /// The first tick whose outputs differ from those in the journal.
+    pub difference: Option<Difference>,
+    /// What was carried over at each swap that lies behind the checkpoint.
+    pub swaps: Vec<(String, Vec<NodeCarry>)>,
+}
+
+/// Where a recovery began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Start {
+    /// There was nothing.
+    #[default]
+    Nothing,
+    /// At the first tick of the journal.
+    Beginning,
+    /// At a checkpoint after so many ticks, beats, breaks and freezes.
+    Checkpoint(u64),
+    /// Cold, at the oldest tick that is still in the journal: no checkpoint could be used.
+    Cold,
+}
+
+/// Why a service cannot go on from its state folder.
+#[derive(Debug)]
+pub enum RecoveryError {
+    /// The journal cannot be read.
+    Journal(JournalError),
+    /// The checkpoints cannot be read.
+    Checkpoints(CheckpointError),
+    /// The engine refuses a tick of the journal.
+    Engine {
+        /// The number of its record.
+        event: u64,
+        /// Why.
+        error: EngineError,
+    },
+    /// A graph that took over is not there any more.
+    Model {
+        /// Its revision.
+        revision: String,
+        /// Why.
+        error: io::Error,
+    },
+    /// What was fitted does not belong to its graph.
+    Unfit(EngineError),
+}
+
+impl fmt::Display for RecoveryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Journal(error) => error.fmt(f),
+            Self::Checkpoints(error) => error.fmt(f),
+            Self::Engine { event, error } => {
+                write!(
+                    f,
+                    "record {event} of the journal cannot be stepped: {error}"
+                )
+            }
+            Self::Model { revision, error } => {
+                write!(
+                    f,
+                    "the graph of revision {revision} cannot be read: {error}"
+                )
+            }
+            Self::Unfit(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RecoveryError {}
+
+impl From<JournalError> for RecoveryError {
+    fn from(error: JournalError) -> Self {
+        Self::Journal(error)
+    }
+}
+
+impl From<CheckpointError> for RecoveryError {
+    fn from(error: CheckpointError) -> Self {
+        Self::Checkpoints(error)
+    }
+}
+
+impl Recovered {
+    /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on.
+    ///
+    /// A checkpoint that cannot be used is passed over for an older one. The journal's damaged end is cut off. `look` sees each
+    /// step that is made again, with how many ticks, beats, breaks and freezes there are then. `least` is up to where all sinks have
+    /// put out: what lies behind is stepped again where the folder still allows it.
+    ///
+    /// # Errors
+    /// When the journal is damaged elsewhere, or lacks something; what is there is as it was.
+    pub fn find(
+        folder: &StateFolder,
+        checkpoints: &Checkpoints,
+        model: &Model,
+        feed: &FeedNames,
+        least: u64,
+        mut look: impl FnMut(u64, &Engine),
+    ) -> Result<Self, RecoveryError> {
+        let mut report = RecoveryReport::default();
+        let first = match Log::open(&folder.journal())?.read()? {
+            Some(Entry::Begin(begin)) => Some(begin),
+            _ => None,
+        };
+        let goes_back_to = first.as_ref().map_or(0, |begin| begin.happenings);
+        let is_whole = first.as_ref().is_some_and(|of| of.happenings == 0);
+        let mut found = None;
+        for checkpoint in checkpoints.read()? {
+            let usable = checkpoint.and_then(|of| usable(folder, model, of, goes_back_to));
+            match usable {
+                Ok(of) if of.2 <= least => {
+                    found = Some(of);
+                    break;
+                }
+                Ok(of) if found.is_none() && !is_whole => found = Some(of),
+                Ok(_) => {}
+                Err(error) => report.refused.push(error),
+            }
+        }
+        if let Some((engine, model, happenings)) = found {
+            report.start = Start::Checkpoint(happenings);
+            return Self::follow(folder, (engine, model), happenings, report, feed, &mut look);
+        }
+        let revision = first.as_ref().map(|begin| begin.revision.as_str());
+        let model = match revision {
+            Some(revision) if model.revision().as_deref() != Some(revision) => {
+                let of = folder.model(revision);
+                of.map_err(|error| no_model(revision, error))?
+            }
+            _ => model.clone(),
+        };
+        report.start = match &first {
+            None => Start::Nothing,
+            Some(_) if is_whole => Start::Beginning,
+            Some(_) => Start::Cold,
+        };
+        let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
+        let engine = engine.map_err(RecoveryError::Unfit)?;
+        Self::follow(
+            folder,
+            (engine, model),
+            goes_back_to,
+            report,
+            feed,
+            &mut look,
+        )
+    }
+
+    /// What the next file of the journal begins with.
+    #[must_use]
+    pub fn begin(&self) -> Begin {
+        let (revision, frozen) = (self.engine.revision().to_owned(), self.engine.frozen());
+        let at = (self.event, self.happenings);
+        let mut begin = Begin::new(self.feed.clone(), revision, at, frozen, &self.timeline);
+        begin.after_failure = self.report.ahead > 0;
+        begin
+    }
+
+    /// How many ticks, beats, breaks and freezes there were.
+    #[must_use]
+    pub fn happenings(&self) -> u64 {
+        self.happenings
+    }
+
+    /// Steps what the journal has behind so many ticks, beats, breaks and freezes.
+    fn follow(
+        folder: &StateFolder,
+        (engine, mut model): (Engine, Model),
+        from: u64,
+        mut report: RecoveryReport,
+        feed: &FeedNames,
+        look: &mut impl FnMut(u64, &Engine),
+    ) -> Result<Self, RecoveryError> {
+        let mut log = Log::open_at(&folder.journal(), from)?;
+        let mut seen = 0;
+        let mut replay = Replay::new(engine, &Begin::nothing());
+        while let Some(entry) = log.read()? {
+            let (event, record) = match entry {
+                Entry::Begin(begin) => {
+                    replay.begin(&begin, log.gaps().len() > report.gaps.len());
+                    report.gaps = log.gaps().to_vec();
+                    seen = begin.happenings;
+                    continue;
+                }
+                Entry::Record(event, record) => (event, record),
+            };
+            seen += u64::from(record.is_happening());
+            match record {
+                Record::Swap { revision } if seen >= from => {
+                    let revision = format!("{revision:016x}");
+                    let next = folder.model(&revision);
+                    model = next.map_err(|error| no_model(&revision, error))?;
+                    let carry = swap(&mut replay, &model)?;
+                    report.swaps.push((revision, carry));
+                }
+                _ if seen > from || seen == from && !record.is_happening() => {
+                    let stepped = replay.apply(event, &record);
+                    if stepped.map_err(|error| RecoveryError::Engine { event, error })? {
+                        look(seen, replay.engine());
+                    }
+                }
+                _ => replay.pass_by(&record),
+            }
+        }
+        log.seal()?;
+        report.ahead = from.saturating_sub(seen);
+        report.torn = log.torn().cloned();
+        report.stepped = replay.stepped();
+        report.difference = replay.difference();
+        let mut timeline = replay.feed().map(replay.timeline(), feed);
+        let engine = replay.into_engine();
+        if report.ahead > 0 {
+            timeline.not_before(engine.last().unwrap_or(Instant::MIN));
+        }
+        Ok(Self {
+            engine,
+            model,
+            timeline,
+            feed: feed.clone(),
+            event: log.event() + report.ahead,
+            happenings: seen.max(from),
+            report,
+        })
+    }
+}
+
+/// An engine that goes on from a checkpoint, the model of it, and how far it is.
+fn usable(
+    folder: &StateFolder,
+    given: &Model,
+    checkpoint: Checkpoint,
+    goes_back_to: u64,
+) -> Result<(Engine, Model, u64), CheckpointError> {
+    let Checkpoint {
+        happenings,
+        revision,
+        snapshot,
+    } = checkpoint;
+    let refused = |reason: String| CheckpointError::Refused {
+        path: folder.path().to_owned(),
+        reason: format!("the checkpoint at {happenings}: {reason}"),
+    };
+    if happenings < goes_back_to {
+        return Err(refused("the journal no longer goes back to it".to_owned()));
+    }
+    let model = if given.revision().as_deref() == Some(&revision) {
+        given.clone()
+    } else {
+        let model = folder.model(&revision);
+        model.map_err(|error| refused(error.to_string()))?
+    };
+    let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
+    let mut engine = engine.map_err(|error| refused(error.to_string()))?;
+    let restored = engine.restore(&snapshot);
+    restored.map_err(|error| refused(error.to_string()))?;
+    Ok((engine, model, happenings))
+}
+
+fn no_model(revision: &str, error: impl fmt::Display) -> RecoveryError {
+    RecoveryError::Model {
+        revision: revision.to_owned(),
+        error: io::Error::other(error.to_string()),
+    }
+}
+
+/// Lets another graph take over from the state of the one before, without a past to warm it by.
+fn swap(replay: &mut Replay, model: &Model) -> Result<Vec<NodeCarry>, RecoveryError> {
+    let next = Engine::new(Arc::clone(&model.plan), &model.fitted);
+    let mut next = next.map_err(RecoveryError::Unfit)?;
+    let before = replay.engine();
+    let transfer = StateTransfer::between(before, &next, false);
+    let carry = next.adopt(&before.state(), &transfer, false);
+    let outputs = &before.plan().outputs;
+    let place = |name: &String| outputs.iter().position(|output| output.name == *name);
+    let plan = Arc::clone(next.plan());
+    let places: Vec<_> = plan.outputs.iter().map(|of| place(&of.name)).collect();
+    next.pass_over(before, &places);
+    replay.replace(next);
+    Ok(carry)
+}

@@ -1,0 +1,191 @@
+//! What the engine thread does: samples in, ticks through the engine, decisions into the journal. It never waits.
+
+use athermal_run::live::{Stepped, Stepper};
+
+use crate::engine::EngineError;
+use crate::journal::{Record, Recorder, output_hash};
+use crate::moment::Moment;
+use crate::sequencer::{Admission, Decision, Sample, Sequencer};
+use crate::time::{Duration, Instant};
+
+/// The engine thread's work. The thread sleeps until something arrives or [`due`](Self::due).
+#[derive(Debug)]
+pub struct Worker {
+    sequencer: Sequencer,
+    stepper: Stepper,
+    recorder: Recorder,
+    generation: u64,
+}
+
+/// What came of a tick.
+#[derive(Debug)]
+pub struct Output<'a> {
+    /// The instant.
+    pub at: Instant,
+    /// Whether it was made by time alone.
+    pub is_beat: bool,
+    /// How far the tick lies behind the newest stamp and the time since.
+    pub behind: Duration,
+    /// It may leave once so many records are written; see [`Progress::wait_written`](crate::journal::Progress::wait_written).
+    pub records: u64,
+    /// The outputs, and the graph that made them.
+    pub stepped: Stepped<'a>,
+}
+
+impl Worker {
+    /// What there is to work with.
+    #[must_use]
+    pub fn new(sequencer: Sequencer, stepper: Stepper, recorder: Recorder) -> Self {
+        Self {
+            sequencer,
+            stepper,
+            recorder,
+            generation: 0,
+        }
+    }
+
+    /// Takes a sample.
+    pub fn arrive(&mut self, sample: Sample, now: Moment) -> Admission {
+        let admission = self.sequencer.arrive(sample, now);
+        if let Some(record) = Record::of(admission) {
+            self.recorder.record(record);
+        }
+        admission
+    }
+
+    /// When something is to be done, if nothing arrives before.
+    #[must_use]
+    pub fn due(&self) -> Option<Moment> {
+        self.sequencer.due()
+    }
+
+    /// Does all that is due. `put` is given what comes of it, tick by tick.
+    ///
+    /// # Errors
+    /// When the rules have other channels than the graph.
+    pub fn pass(
+        &mut self,
+        now: Moment,
+        mut put: impl FnMut(&Output<'_>),
+    ) -> Result<(), EngineError> {
+        while self.decide(now, false, &mut put)?.is_some() {}
+        self.recorder.wake();
+        self.recorder.mend(self.sequencer.timeline());
+        Ok(())
+    }
+
+    /// Steps all that waits, without waiting any longer. For the end of all sources.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn finish(
+        &mut self,
+        now: Moment,
+        mut put: impl FnMut(&Output<'_>),
+    ) -> Result<(), EngineError> {
+        while self.decide(now, true, &mut put)?.is_some() {}
+        self.recorder.wake();
+        Ok(())
+    }
+
+    /// Freezes learning, or lets it go on.
+    pub fn freeze(&mut self, frozen: bool) {
+        self.stepper.freeze(frozen);
+        self.recorder.record(Record::Freeze(frozen));
+    }
+
+    /// The times of what follows may start again.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn segment(
+        &mut self,
+        now: Moment,
+        put: impl FnMut(&Output<'_>),
+    ) -> Result<(), EngineError> {
+        self.finish(now, put)?;
+        self.sequencer.segment();
+        self.stepper.segment();
+        self.recorder.record(Record::Break { afresh: true });
+        Ok(())
+    }
+
+    /// Writes a remark into the journal.
+    pub fn note(&mut self, text: Box<str>) {
+        self.recorder.record(Record::Note(text));
+    }
+
+    /// The sequencer, for what is known of sources.
+    pub fn sequencer(&mut self) -> &mut Sequencer {
+        &mut self.sequencer
+    }
+
+    /// The journal.
+    #[must_use]
+    pub fn recorder(&self) -> &Recorder {
+        &self.recorder
+    }
+
+    /// What is left when the work ends.
+    #[must_use]
+    pub fn into_parts(self) -> (Sequencer, Stepper, Recorder) {
+        (self.sequencer, self.stepper, self.recorder)
+    }
+
+    /// Does the next thing that is due; none where there is none.
+    fn decide(
+        &mut self,
+        now: Moment,
+        at_the_end: bool,
+        put: &mut impl FnMut(&Output<'_>),
+    ) -> Result<Option<()>, EngineError> {
+        let newest = self.sequencer.newest(now);
+        let decision = if at_the_end {
+            self.sequencer.finish(now)
+        } else {
+            self.sequencer.pass(now)
+        };
+        let (at, row, is_beat) = match decision {
+            None => return Ok(None),
+            Some(Decision::Tick { at, row }) => (at, row, false),
+            Some(Decision::Beat { at, row }) => (at, row, true),
+            Some(Decision::Sample(admission)) => {
+                if let Some(record) = Record::of(admission) {
+                    self.recorder.record(record);
+                }
+                return Ok(Some(()));
+            }
+            Some(Decision::Break) => {
+                self.stepper.segment();
+                self.recorder.record(Record::Break { afresh: false });
+                return Ok(Some(()));
+            }
+            Some(Decision::Shift { source, offset }) => {
+                let source = source as u32;
+                self.recorder.record(Record::Shift { source, offset });
+                return Ok(Some(()));
+            }
+        };
+        let stepped = self.stepper.step(at, row)?;
+        if stepped.generation != self.generation {
+            self.generation = stepped.generation;
+            if let Ok(revision) = u64::from_str_radix(stepped.revision, 16) {
+                self.recorder.record(Record::Swap { revision });
+            }
+        }
+        let hash = output_hash(stepped.outputs);
+        let records = self.recorder.record(if is_beat {
+            Record::Beat { at, hash }
+        } else {
+            Record::Tick { at, hash }
+        });
+        put(&Output {
+            at,
+            is_beat,
+            behind: newest.map_or(Duration::ZERO, |newest| newest - at),
+            records,
+            stepped,
+        });
+        Ok(Some(()))
+    }
+}
