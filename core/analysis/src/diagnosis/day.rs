@@ -466,6 +466,7 @@ mod tests {
         let mut trace = Trace::default();
         trace.truths.push(TruthTrace {
             slot: 0,
+            no_model: athermal_run::score::NoModel::Zero,
             times: truths.iter().map(|&(of, hour)| (of, at(hour))).collect(),
             values: vec![0.0; truths.len()],
             errors: vec![f64::NAN; truths.len()],
