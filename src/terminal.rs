@@ -66,10 +66,9 @@ impl Terminal {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let colour = std::io::stderr().is_terminal() && !plain;
         Self {
-            format: if options.format == "json" {
-                Format::Json
-            } else {
-                Format::Table
+            format: match &*options.format {
+                "json" => Format::Json,
+                _ => Format::Table,
             },
             quiet: options.quiet,
             events: false,
@@ -104,13 +103,12 @@ impl Terminal {
     pub fn setback(&self, failure: &Failure) {
         match failure {
             Failure::Graph {
-                diagnostics,
+                diagnostics: all,
                 sources,
-            } if self.events => self.doubts(diagnostics, sources),
-            Failure::Graph {
-                diagnostics,
-                sources,
-            } => self.diagnostics(diagnostics, sources),
+            } => match self.events {
+                true => self.doubts(all, sources),
+                false => self.diagnostics(all, sources),
+            },
             Failure::Exit(_) => {}
             Failure::Request(text) | Failure::Outside(text) => {
                 let message = Message::new("error", Value::Null, text);
@@ -129,11 +127,9 @@ impl Terminal {
         } else {
             self.doubts(diagnostics, sources);
             let (errors, warnings) = (diagnostics.error_count(), diagnostics.warning_count());
-            let kinds = [(errors, "error"), (warnings, "warning")];
-            let kinds = kinds.iter().filter(|(count, _)| *count > 0);
-            let words: Vec<_> = kinds
-                .map(|(count, what)| counted(*count as u64, what))
-                .collect();
+            let kinds = [(errors, "error"), (warnings, "warning")].into_iter();
+            let kinds = kinds.filter(|(count, _)| *count > 0);
+            let words: Vec<_> = kinds.map(|(n, what)| counted(n as u64, what)).collect();
             self.note(words.join(", "));
         }
     }

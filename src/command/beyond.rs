@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::number;
+use athermal_analysis::figures::apart;
 
 /// So many widths beyond, another unit is more likely than another day.
 const ANOTHER_UNIT: f64 = 10.0;
@@ -47,14 +47,11 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 /// Warns of them.
 pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
     for of in all {
+        let all = [of.lowest, of.highest, of.lowest_in_fit, of.highest_in_fit];
+        let [lowest, highest, lowest_in_fit, highest_in_fit] = apart(all);
         let words = format!(
-            "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
-            of.channel,
-            number(of.lowest),
-            number(of.highest),
-            number(of.lowest_in_fit),
-            number(of.highest_in_fit),
-            of.doubt
+            "{} is between {lowest} and {highest}, and was between {lowest_in_fit} and {highest_in_fit} in the data of the fit: {}",
+            of.channel, of.doubt
         );
         terminal.warning(Message::new(OUTSIDE, json!(of), words));
     }
@@ -63,12 +60,10 @@ pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
 /// Warns of the first such sample of a channel.
 pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
     if let Some(doubt) = doubt(usual, sample, sample) {
+        let [found, lowest, highest] = apart([sample, usual.lowest, usual.highest]);
         let words = format!(
-            "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",
-            usual.channel,
-            number(sample),
-            number(usual.lowest),
-            number(usual.highest),
+            "{} at {time}: {found}, and was between {lowest} and {highest} in the data of the fit: {doubt}",
+            usual.channel
         );
         let facts = json!({
             "channel": usual.channel,

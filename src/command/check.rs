@@ -123,11 +123,8 @@ impl Check {
         }
         if terminal.format == Format::Json {
             let mut facts = diagnostics.to_json(&sources);
-            facts["graphs"] = fine
-                .iter()
-                .map(|(path, plan)| Counts::of(path, plan))
-                .map(|of| json!(of))
-                .collect();
+            let graphs = fine.iter().map(|(path, plan)| Counts::of(path, plan));
+            facts["graphs"] = json!(graphs.collect::<Vec<_>>());
             println!("{facts:#}");
         } else {
             terminal.diagnostics(&diagnostics, &sources);

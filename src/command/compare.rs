@@ -136,10 +136,9 @@ impl Compare {
             }
         }
         warn(terminal, &comparisons, &fits);
-        Ok(if failed(terminal, &fits) {
-            Answer::No
-        } else {
-            Answer::Fine
+        Ok(match failed(terminal, &fits) {
+            true => Answer::No,
+            false => Answer::Fine,
         })
     }
 
@@ -154,9 +153,8 @@ impl Compare {
         let graphs = models.iter();
         let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
         let named = models.into_iter().zip(names);
-        Ok(named
-            .map(|((path, model), name)| (name, path, model))
-            .collect())
+        let named = named.map(|((path, model), name)| (name, path, model));
+        Ok(named.collect())
     }
 
     /// What went wrong with the data, with the graph that was to read them where there are several.
@@ -205,7 +203,11 @@ impl Compare {
                     progress.set(ticks);
                 }
             };
-            let trace = trace_as(&model.plan, &model.fitted, &watch, scored, &mut look)
+            let scored = ScoreOptions {
+                levels: report.levels.clone(),
+                ..scored.clone()
+            };
+            let trace = trace_as(&model.plan, &model.fitted, &watch, &scored, &mut look)
                 .map_err(|error| self.of_graph(&path, error.into()))?;
             drop(progress);
             let reports = dataset.reports();
@@ -278,12 +280,9 @@ impl Compare {
             ));
             return;
         }
-        let times = || {
-            trace
-                .truths
-                .iter()
-                .flat_map(|truth| truth.times.iter().map(|of| of.1))
-        };
+        let truths = trace.truths.iter();
+        let all = truths.flat_map(|truth| truth.times.iter().map(|of| of.1));
+        let times = || all.clone();
         let scored = times().min().zip(times().max());
         if let Some(((from, to), (first, last))) = report.period.zip(scored) {
             let fit = (seconds(from), seconds(to));
@@ -297,13 +296,8 @@ impl Compare {
 fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for (own, path) in graphs.clone() {
-        let own = own.filter(|own| {
-            graphs
-                .clone()
-                .filter(|(name, _)| *name == Some(own))
-                .count()
-                == 1
-        });
+        let namesakes = |own| graphs.clone().filter(move |of| of.0 == Some(own)).count();
+        let own = own.filter(|own| namesakes(*own) == 1);
         let again = (2..).map(|nth| format!("{path} ({nth})"));
         let first = own.unwrap_or(path).to_owned();
         let mut free = std::iter::once(first).chain(again);

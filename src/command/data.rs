@@ -228,17 +228,14 @@ impl Data {
     /// When a file cannot be read.
     pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
         let reports = dataset.reports();
-        let mut cards = Vec::with_capacity(self.files.len());
-        for path in &self.files {
+        let card = |path: &PathBuf| {
             let name = path.display().to_string();
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
-            let card = DataCard::of(path, rows).map_err(|error| {
-                Failure::Outside(format!("cannot read {}: {error}", path.display()))
-            })?;
-            cards.push(card);
-        }
-        Ok(cards)
+            DataCard::of(path, rows)
+                .map_err(|error| Failure::Outside(format!("cannot read {name}: {error}")))
+        };
+        self.files.iter().map(card).collect()
     }
 }
 
@@ -405,9 +402,9 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
-            let some = match *rows {
-                rows if rows == report.rows => "all".to_owned(),
-                rows => count(rows),
+            let some = match *rows == report.rows {
+                true => "all".to_owned(),
+                false => count(*rows),
             };
             let lie = if *rows == 1 { "lies" } else { "lie" };
             let words = format!(
@@ -432,15 +429,11 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
         ];
         for headers in [&report.headers_moved, &report.headers] {
             if let Some(first) = &headers.first {
-                let in_all = match headers.count {
-                    more @ 2.. => format!("; {} in all", count(more)),
-                    _ => String::new(),
+                let words = match headers.count {
+                    more @ 2.. => format!("{first}; {} in all", count(more)),
+                    _ => first.to_string(),
                 };
-                messages.push(refused::message(
-                    first,
-                    Some(headers.count),
-                    format_args!("{first}{in_all}"),
-                ));
+                messages.push(refused::message(first, Some(headers.count), words));
             }
         }
         for (found, what, then) in counted {

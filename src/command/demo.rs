@@ -12,10 +12,9 @@ use athermal::trial::machine::{Setup, Simulated, machine};
 use clap::Args;
 use serde_json::json;
 
-use self::folder::Folder;
 use super::aside::write_aside;
 use super::data::Data;
-use super::fit::fit_on;
+use super::fit::{fit_on, text_of};
 use super::simulate::write_recording;
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -48,7 +47,7 @@ impl Demo {
     /// When the folder is somebody's, or cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let files = ["die-tester.toml", "train.csv", "test.csv", "model.json"];
-        let mut folder = Folder::open(&self.folder, &files)?;
+        folder::open(&self.folder, &files)?;
         let [graph, train, test, model] = files.map(|file| self.folder.join(file));
         let people = terminal.format == Format::Table;
         if people {
@@ -59,20 +58,19 @@ impl Demo {
                 terminal.note(format_args!("  {:<30}  {text}", path.display().to_string()));
             }
         };
-        folder.write(files[0], |graph| write_aside(graph, GRAPH))?;
+        write_aside(&graph, GRAPH)?;
         note(&graph, "the graph: what is computed from what");
-        for (file, path, (days, seed), what) in [
-            (files[1], &train, TRAIN, "to fit on"),
-            (files[2], &test, TEST, "to test on"),
-        ] {
-            let rows = folder.write(file, |path| simulate(days, seed, path, terminal))?;
-            let rows = count(rows);
+        for (path, (days, seed), what) in
+            [(&train, TRAIN, "to fit on"), (&test, TEST, "to test on")]
+        {
+            let rows = count(simulate(days, seed, path, terminal)?);
             note(
                 path,
                 &format!("{days} days {what}, seed {seed}, {rows} rows"),
             );
         }
-        let fitted = folder.write(files[3], |model| fit_model(&graph, &train, model, terminal))?;
+        let fitted = fit_model(&graph, &train, &model, terminal)?;
+        folder::mark(&self.folder, &files)?;
         let estimators = fitted.card.as_ref().map_or(0, |card| card.estimators.len());
         note(
             &model,
@@ -113,10 +111,7 @@ fn fit_model(
     let mut model = Model::load(graph)?;
     let data = Data::of(vec![train.to_owned()]);
     fit_on(&mut model, &data, &FitOptions::default(), terminal)?;
-    let text = model.to_text().map_err(|error| {
-        Failure::Outside(format!("the model cannot be written as JSON: {error}"))
-    })?;
-    write_aside(output, text)?;
+    write_aside(output, text_of(&model)?)?;
     Ok(model)
 }
 
@@ -132,13 +127,8 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
         ..ScoreOptions::default()
     };
     let mut progress = terminal.progress("evaluating");
-    let scores = score(
-        &model.plan,
-        &model.fitted,
-        &dataset,
-        &options,
-        &mut |ticks| progress.set(ticks),
-    )?;
+    let mut show = |ticks| progress.set(ticks);
+    let scores = score(&model.plan, &model.fitted, &dataset, &options, &mut show)?;
     Ok(scores)
 }
 
@@ -156,15 +146,15 @@ impl Axis<'_> {
 }
 
 fn describe(scores: &Scores) -> String {
-    let axes: Vec<Axis> = scores
+    let votes = scores
         .scores
         .iter()
-        .filter(|score| score.node.starts_with("vote"))
-        .map(|vote| Axis {
-            name: vote.output.rsplit('.').next().unwrap_or(&vote.output),
-            vote,
-        })
-        .collect();
+        .filter(|of| of.node.starts_with("vote"));
+    let axes = votes.map(|vote| Axis {
+        name: vote.output.rsplit('.').next().unwrap_or(&vote.output),
+        vote,
+    });
+    let axes: Vec<Axis> = axes.collect();
     let baseline = |name: &str, of: fn(&Score) -> Option<f64>| {
         let cells = axes.iter().map(|axis| or_dash(of(axis.vote)));
         std::iter::once(name.to_owned()).chain(cells).collect()
@@ -237,7 +227,8 @@ fn next(folder: &Path) -> String {
         "graph.svg",
     ]
     .map(|file| quoted(&folder.join(file).display().to_string()));
-    let limit = format!("\"{LIMIT}\"");
+    let limit = format!("--abs-truth-below \"{LIMIT}\"");
+    let fault = "--fault temperature.plate1=missing,from=6h";
     let lines = [
         command(&[&program, "show", &graph, "--format svg", ">", &picture]),
         command(&[&program, "nodes slope"]),
@@ -246,20 +237,11 @@ fn next(folder: &Path) -> String {
             &program,
             "simulate",
             MACHINE,
-            "--days 2 --seed 2",
-            "-o",
+            "--days 2 --seed 2 -o",
             &faulty,
-            "--fault temperature.plate1=missing,from=6h",
+            fault,
         ]),
-        command(&[
-            &program,
-            "evaluate",
-            &model,
-            "--data",
-            &faulty,
-            "--abs-truth-below",
-            &limit,
-        ]),
+        command(&[&program, "evaluate", &model, "--data", &faulty, &limit]),
         "and with a log of a machine of yours:".to_owned(),
         command(&[&program, "init LOG.csv -o graph.toml"]),
     ];
@@ -289,6 +271,8 @@ mod tests {
             bias: None,
             max_abs: None,
             valid: None,
+            no_model: Some(0.0),
+            no_model_is: athermal::run::score::NoModel::Zero,
             baseline_zero: Some(zero),
             baseline_persistence: None,
             persistence_n: 0,

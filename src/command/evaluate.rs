@@ -21,7 +21,7 @@ use athermal_analysis::figures::seconds;
 
 /// Score a model's predictions on recorded data
 ///
-/// Each prediction is compared with the truth measured later. Beside it stand no model (predicting zero), persistence (the
+/// Each prediction is compared with the truth measured later. Beside it stand no model, persistence (the
 /// last truth that shares nothing with the predicted one), and the standard error of the truth itself. Persistence is K
 /// steps back for predictions K steps ahead; a free run has none. All predictions of a truth are scored on the instants at
 /// which all of them are valid.
@@ -30,8 +30,8 @@ use athermal_analysis::figures::seconds;
 /// the instants). Scatter of the samples and curvature of the drift within the window both count there. So it may be more
 /// than the noise of the measurement, and a prediction may come below it.
 ///
-/// R² is against no model, 1 − SSE / Σ y²; it means little for a truth that is never near zero. R²mean is against the truth's
-/// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is 1 − √(SSE / Σ (y − ȳ)²), as in system identification.
+/// No model predicts zero of a rate. Of a level whose zero is arbitrary, such as a position or a temperature in °C, it predicts the
+/// mean over the fit. R² is against no model, 1 − SSE / Σ (y − no model)². R²mean is against the truth's mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is 1 − √(SSE / Σ (y − ȳ)²), as in system identification.
 ///
 /// Ahead is how far ahead of the newest truth that it may use a prediction was made. With `--mode k-step` that is K − 1
 /// steps more, where past truths change it; in a free run it has no bound. Bias is the mean error, prediction less truth.
@@ -76,6 +76,7 @@ impl Evaluate {
         let dataset = self.data.dataset();
         let options = ScoreOptions {
             each_on_its_own: self.each_on_its_own,
+            levels: model.levels(),
             ..self.scored.options()?
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);

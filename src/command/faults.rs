@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::{count, counted, instant, number};
+use athermal_analysis::figures::{apart, count, counted, exact, instant};
 
 /// Warns of them.
 /// Warns of them.
@@ -32,7 +32,7 @@ pub fn messages(all: &[ChannelFaults]) -> Vec<Message> {
         if let Some(stuck) = &faulty.stuck {
             let words = format!(
                 "{channel} is {} in {} samples one after the other, from {} to {}: {}",
-                number(stuck.value),
+                exact(stuck.value),
                 count(stuck.samples),
                 instant(stuck.from_s),
                 instant(stuck.to_s),
@@ -97,6 +97,7 @@ fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
         Purpose::Scores | Purpose::Run => "Predictions from that mean nothing",
     };
     let (low, high) = leaps.usual;
+    let [_, _, lowest, highest] = apart([leaps.first.from, leaps.first.to, low, high]);
     let usual = low..=high;
     if usual.contains(&leaps.first.from) && usual.contains(&leaps.first.to) {
         return format!(
@@ -104,10 +105,8 @@ fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
         );
     }
     format!(
-        "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {} and {}",
-        faulty.channel.split('.').next().unwrap_or_default(),
-        number(low),
-        number(high)
+        "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {lowest} and {highest}",
+        faulty.channel.split('.').next().unwrap_or_default()
     )
 }
 

@@ -1,5 +1,6 @@
 //! `athermal fit`: fits what a graph has to learn on recorded data, estimators and encoders, and writes a model.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -8,7 +9,9 @@ use athermal::core::compile::PlannedChannel;
 use athermal::core::diagnostic::Sources;
 use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
-use athermal::run::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
+use athermal::run::fit::{
+    BareOutput, EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit,
+};
 use athermal::run::model::{Card, EstimatorCard};
 use clap::Args;
 use serde_json::json;
@@ -33,7 +36,8 @@ use athermal_analysis::figures::{count, counted, number, paragraph, table};
 /// on the rows of the fit. Then it writes the model: one JSON file that holds all that is needed to run.
 /// `athermal show MODEL --format coefficients` prints what is in it.
 ///
-/// A node that cannot be fitted gives nothing, and the exit status is 1. Where none can be fitted, no model is written,
+/// A node that cannot be fitted gives nothing, and the exit status is 1. So it is where no voter of an output has a regressor left:
+/// the model is written, and the first line names the output. Where none can be fitted, no model is written,
 /// and an old one stays.
 ///
 /// Where orders are compared, AIC, AICc and BIC count the variance of what is left as one parameter beside the
@@ -81,32 +85,27 @@ impl Fit {
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         // A model may take the place of one whose graph is fitted anew.
-        let is_model = self
-            .graph
-            .extension()
-            .is_some_and(|ending| ending == "json");
+        let is_model = self.graph.extension().is_some_and(|of| of == "json");
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
         self.data.check_offsets(&[])?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
-        self.doubt_tests(&model, sources, terminal);
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.count(),
             ..FitOptions::default()
         };
         let outcome = fit_on(&mut model, &self.data, &options, terminal)?;
+        self.doubt_tests(&model, sources, terminal);
         let failed = outcome.report.failed().count();
         if failed > 0 && failed == outcome.report.estimators.len() {
             self.report(terminal, &outcome);
             self.warn_of_no_model(terminal);
             return Ok(Answer::No);
         }
-        let text = model.to_text().map_err(|error| {
-            Failure::Outside(format!("the model cannot be written as JSON: {error}"))
-        })?;
+        let text = text_of(&model)?;
         let to_stdout = self.output.as_os_str() == "-";
         // First, or a reader that has seen enough, as `head` has, would end the program without a model.
         if !to_stdout {
@@ -119,7 +118,12 @@ impl Fit {
             terminal.note(format_args!("wrote {}", self.output.display()));
             terminal.note(self.next(&model));
         }
-        Ok(if failed > 0 { Answer::No } else { Answer::Fine })
+        let constant = outcome.bare.iter().any(|output| !output.has_others);
+        Ok(if failed > 0 || constant {
+            Answer::No
+        } else {
+            Answer::Fine
+        })
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
@@ -205,12 +209,24 @@ impl Fit {
     }
 }
 
+/// A model as it is written to a file.
+///
+/// # Errors
+/// When it cannot be written as JSON.
+pub fn text_of(model: &Model) -> Result<String, Failure> {
+    model
+        .to_text()
+        .map_err(|error| Failure::Outside(format!("the model cannot be written as JSON: {error}")))
+}
+
 /// What came of a fit.
 pub struct FitOutcome {
     /// What was read.
     pub dataset: Dataset,
     /// How it went.
     pub report: FitReport,
+    /// Outputs of which voters have no regressor left.
+    pub bare: Vec<BareOutput>,
     /// What is wrong with channels.
     pub faults: Vec<ChannelFaults>,
     /// What was left out of the data, and what may be wrong in them.
@@ -228,12 +244,39 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<FitOutcome, Failure> {
     let mut outcome = fit_without_card(model, data, options, terminal)?;
+    warn_bare(&outcome, terminal);
     let doubts = std::mem::take(&mut outcome.doubts);
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());
     faults::warn(terminal, &outcome.faults);
     model.card = Some(Card::of(report, data.cards(dataset)?, created()));
     Ok(outcome)
+}
+
+/// Warns of outputs that predict a constant, and of voters that do beside others.
+fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
+    let (some, none): (Vec<_>, Vec<_>) = outcome.bare.iter().partition(|of| of.has_others);
+    for (outputs, is_constant) in [(none, true), (some, false)] {
+        if outputs.is_empty() {
+            continue;
+        }
+        let names: Vec<&str> = outputs.iter().map(|of| of.output.as_str()).collect();
+        let bare: BTreeSet<&String> = outputs.iter().flat_map(|of| &of.bare).collect();
+        let fits = outcome.report.estimators.iter();
+        let mut of_bare = fits.filter(|fit| bare.contains(&fit.node));
+        let why = match of_bare.any(|fit| !fit.dropped_candidates.is_empty()) {
+            true => {
+                "; features have values in too few rows: are windows longer than the stretches between gaps?"
+            }
+            false => "",
+        };
+        let bare: Vec<&str> = bare.into_iter().map(String::as_str).collect();
+        let (names, bare) = (names.join(", "), bare.join(", "));
+        terminal.warning(match is_constant {
+            true => format!("{names}: predicts a constant, since no voter has a regressor left ({bare}){why}"),
+            false => format!("{names}: {bare} predicts a constant, since it has no regressor left; other voters have{why}"),
+        });
+    }
 }
 
 /// The same without a card, which has the checksums of all data, and without warnings.
@@ -275,8 +318,10 @@ pub fn fit_without_card(
         report.refused,
         &report.rejected,
     );
+    let bare = report.bare_outputs(&model.plan);
     Ok(FitOutcome {
         dataset,
+        bare,
         report,
         faults,
         doubts,
@@ -312,11 +357,8 @@ const BEST_ORDERS: usize = 8;
 fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
     let ranks = orders.ranked();
-    let shown = if all {
-        ranks.len()
-    } else {
-        BEST_ORDERS.min(ranks.len())
-    };
+    let most = if all { ranks.len() } else { BEST_ORDERS };
+    let shown = most.min(ranks.len());
     let cells = ranks[..shown].iter().map(|&nth| {
         let tried = &orders.tried[nth];
         let chosen = nth == orders.chosen;
@@ -350,9 +392,8 @@ fn write_orders(text: &mut String, orders: &OrderTable, all: bool) {
 /// How wide the longest name in a selection is.
 fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     let tried = steps.iter().flat_map(|step| &step.candidates);
-    let tried = tried
-        .filter(|_| candidates)
-        .map(|tried| tried.name.chars().count());
+    let tried = tried.filter(|_| candidates);
+    let tried = tried.map(|tried| tried.name.chars().count());
     let taken = steps.iter().map(|step| step.label().chars().count());
     // A width of `format!` ends there, and a name may be longer.
     let most = usize::from(u16::MAX);
@@ -379,11 +420,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];
-    let dropped: Vec<_> = dropped
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, why)| format!("{} {why}", count(*n)))
-        .collect();
+    let dropped = dropped.iter().filter(|(n, _)| *n > 0);
+    let dropped = dropped.map(|(n, why)| format!("{} {why}", count(*n)));
+    let dropped: Vec<_> = dropped.collect();
     text.push('\n');
     if !dropped.is_empty() {
         let _ = writeln!(text, "  left out: {}", dropped.join(", "));
@@ -399,11 +438,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let steps: Vec<_> = report.selection.iter().chain(refused).collect();
     let width = width(&steps, candidates);
     for (nth, step) in steps.into_iter().enumerate() {
-        let taken = nth < report.selection.len();
-        let nth = if taken {
-            (nth + 1).to_string()
-        } else {
-            "not".to_owned()
+        let nth = match nth < report.selection.len() {
+            true => (nth + 1).to_string(),
+            false => "not".to_owned(),
         };
         write_step(&mut text, &nth, step, (width, candidates));
     }
@@ -419,10 +456,8 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         facts.push(format!("in-sample RMSE {} {}", number(rmse), fit.unit));
     }
     if let Some(condition) = report.condition {
-        facts.push(format!(
-            "condition number of the regressors {}",
-            number(condition)
-        ));
+        let condition = number(condition);
+        facts.push(format!("condition number of the regressors {condition}"));
     }
     if fit.streamed {
         facts.push("rows streamed".to_owned());
@@ -438,16 +473,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
 fn created() -> Option<String> {
-    let stated = std::env::var("SOURCE_DATE_EPOCH")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    let seconds = stated.or_else(|| {
-        let now = std::time::SystemTime::now()
-            .duration_since(std::time::UNIX_EPOCH)
-            .ok()?;
-        i64::try_from(now.as_secs()).ok()
-    })?;
-    jiff::Timestamp::from_second(seconds)
-        .ok()
-        .map(|time| time.to_string())
+    let stated = std::env::var("SOURCE_DATE_EPOCH").ok();
+    let stated = stated.and_then(|text| text.parse().ok());
+    let now = || jiff::Timestamp::now().as_second();
+    let time = jiff::Timestamp::from_second(stated.unwrap_or_else(now));
+    Some(time.ok()?.to_string())
 }

@@ -7,7 +7,7 @@ use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
 use athermal::diagnosis::feedback;
-use athermal::report::{SensorFacts, gather, page, plots, text};
+use athermal::report::{gather, page, plots, text};
 use athermal::run::fit::FitError;
 use athermal::run::score::Lack;
 use clap::Args;
@@ -94,18 +94,21 @@ impl Report {
         if terminal.format == Format::Json {
             let mut json = serde_json::to_value(&facts)
                 .map_err(|error| Failure::Outside(error.to_string()))?;
-            let ranges = facts.course.sensors.iter().filter_map(sample_range);
+            let ranges = facts.course.sensors.iter().filter_map(|of| {
+                let (channel, (lowest, highest)) = (of.name.clone(), of.range?);
+                Some(SampleRange {
+                    channel,
+                    lowest,
+                    highest,
+                })
+            });
             let ranges: Vec<SampleRange> = ranges.collect();
             let outside_fit = beyond(model.sample_ranges(), &ranges);
             for (key, found) in doubts::facts(&watch.found(), &outside_fit, &dataset) {
                 json[key] = found;
             }
             println!("{json:#}");
-        } else if self
-            .output
-            .as_deref()
-            .is_none_or(|path| path.as_os_str() != "-")
-        {
+        } else if self.output.as_deref() != Some(Path::new("-")) {
             print!("{}", text(&facts));
         }
         if let Some(path) = &self.output {
@@ -114,11 +117,8 @@ impl Report {
                 print!("{page}");
             } else {
                 write_aside(path, &page)?;
-                terminal.note(format_args!(
-                    "wrote {} ({} kB)",
-                    path.display(),
-                    page.len() / 1000
-                ));
+                let (path, kb) = (path.display(), page.len() / 1000);
+                terminal.note(format_args!("wrote {path} ({kb} kB)"));
             }
         }
         if let Some(folder) = &self.plots {
@@ -126,16 +126,6 @@ impl Report {
         }
         Ok(Answer::Fine)
     }
-}
-
-/// Between which values the samples of a channel lay; none of one without a sample.
-fn sample_range(of: &SensorFacts) -> Option<SampleRange> {
-    let (lowest, highest) = of.range?;
-    Some(SampleRange {
-        channel: of.name.clone(),
-        lowest,
-        highest,
-    })
 }
 
 /// Writes pictures into a folder.
@@ -149,11 +139,8 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
     for (plot, name) in plots.iter().zip(names) {
         write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
     }
-    terminal.note(format_args!(
-        "wrote {} pictures to {}",
-        plots.len(),
-        folder.display()
-    ));
+    let (count, folder) = (plots.len(), folder.display());
+    terminal.note(format_args!("wrote {count} pictures to {folder}"));
     Ok(())
 }
 
@@ -163,16 +150,10 @@ const LONGEST: usize = 180;
 /// Names that are one file each in any folder, whatever axes are called: those that are too long lose their ends, and those that
 /// would be the same have a number, also where only letters are upper or lower.
 fn file_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "-_@".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
+    let is_plain = |c: char| c.is_alphanumeric() || "-_@".contains(c);
     let mut taken = BTreeSet::new();
     let one = |name: &str| {
-        let mut name: String = name.chars().map(plain).collect();
+        let mut name = name.replace(|c| !is_plain(c), "_");
         while name.len() > LONGEST {
             name.pop();
         }

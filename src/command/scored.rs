@@ -60,6 +60,7 @@ impl Scored {
             each_on_its_own: false,
             frozen: self.frozen,
             mode: self.mode()?,
+            ..ScoreOptions::default()
         })
     }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
+use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal::trial::fault::FaultSpec;
 use athermal::trial::machine::{
@@ -89,8 +90,7 @@ impl Simulate {
         let known = machine(name).map_err(|error| {
             Failure::Request(format!("{error} (`athermal simulate` lists them all)"))
         })?;
-        let to_terminal = self.output.is_none() && io::stdout().is_terminal();
-        if to_terminal {
+        if self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::Request(format!(
                 "a recording is long; name a file for it: athermal simulate {name} -o {name}.csv"
             )));
@@ -180,14 +180,13 @@ impl Simulate {
         let text = std::fs::read_to_string(path).map_err(|error| {
             Failure::Outside(format!("cannot read {}: {error}", path.display()))
         })?;
-        let schedule = Schedule::parse(&text, machine.set_points()).map_err(|errors| {
-            let lines: Vec<String> = errors
+        let schedule = Schedule::parse(&text, machine.set_points());
+        schedule.map(Some).map_err(|errors| {
+            let lines = errors
                 .iter()
-                .map(|error| format!("{}: {error}", path.display()))
-                .collect();
-            Failure::Request(lines.join("\n  "))
-        })?;
-        Ok(Some(schedule))
+                .map(|error| format!("{}: {error}", path.display()));
+            Failure::Request(lines.collect::<Vec<_>>().join("\n  "))
+        })
     }
 }
 
@@ -301,24 +300,15 @@ fn list(terminal: &Terminal) {
             known.version,
             machine.summary()
         );
-        let mut signals: Vec<(&str, Vec<&str>)> = Vec::new();
-        for channel in machine.channels() {
-            match signals.last_mut() {
-                Some((signal, names)) if *signal == channel.signal => names.push(channel.name),
-                _ => signals.push((channel.signal, vec![channel.name])),
-            }
+        for signal in grouped(machine.channels().iter(), |channel| channel.signal) {
+            let names: Vec<&str> = signal.iter().map(|channel| channel.name).collect();
+            println!("  {}: {}", signal[0].signal, names.join(", "));
         }
-        for (signal, names) in signals {
-            println!("  {signal}: {}", names.join(", "));
-        }
-        let set_points: Vec<String> = machine
-            .set_points()
-            .iter()
-            .map(|what| {
-                let [low, high] = what.range;
-                format!("{} {low} to {high} °C", what.name)
-            })
-            .collect();
+        let set_points = machine.set_points().iter().map(|what| {
+            let [low, high] = what.range;
+            format!("{} {low} to {high} °C", what.name)
+        });
+        let set_points: Vec<String> = set_points.collect();
         println!("  a schedule can set: {}\n", set_points.join(", "));
     }
     terminal.note("Next: athermal simulate die-tester -o train.csv");
@@ -326,20 +316,13 @@ fn list(terminal: &Terminal) {
 
 fn describe(known: &KnownMachine) -> Value {
     let machine = known.machine;
-    let channels: Vec<Value> = machine
-        .channels()
-        .iter()
-        .map(|channel| {
-            json!({ "channel": channel.reference(), "column": channel.column(), "unit": channel.unit })
-        })
-        .collect();
-    let set_points: Vec<Value> = machine
-        .set_points()
-        .iter()
-        .map(|what| {
-            json!({ "name": what.name, "default_degC": what.default, "range_degC": what.range })
-        })
-        .collect();
+    let channels = machine.channels().iter().map(|channel| {
+        json!({ "channel": channel.reference(), "column": channel.column(), "unit": channel.unit })
+    });
+    let set_points = machine.set_points().iter().map(
+        |what| json!({ "name": what.name, "default_degC": what.default, "range_degC": what.range }),
+    );
+    let (channels, set_points): (Value, Value) = (channels.collect(), set_points.collect());
     json!({
         "name": machine.name(),
         "summary": machine.summary(),

@@ -33,32 +33,42 @@ struct Item {
     after: Vec<usize>,
 }
 
-/// Places boxes of the given widths and heights.
-#[must_use]
-pub fn layout(diagram: &Diagram, sizes: &[[f64; 2]]) -> Layout {
-    let layers = layers(diagram);
-    let mut items: Vec<Item> = layers
-        .iter()
-        .zip(sizes)
-        .map(|(&layer, &size)| Item {
+impl Item {
+    fn new(layer: usize, size: [f64; 2]) -> Self {
+        Self {
             layer,
             size,
             y: 0.0,
             before: Vec::new(),
             after: Vec::new(),
-        })
+        }
+    }
+
+    fn middle(&self) -> f64 {
+        self.y + self.size[1] / 2.0
+    }
+
+    /// The mean of a value of the items on one side; none where there are none.
+    fn mean(&self, is_before: bool, value: impl Fn(usize) -> f64) -> Option<f64> {
+        let beside = if is_before { &self.before } else { &self.after };
+        let sum: f64 = beside.iter().map(|&other| value(other)).sum();
+        (!beside.is_empty()).then(|| sum / beside.len() as f64)
+    }
+}
+
+/// Places boxes of the given widths and heights.
+#[must_use]
+pub fn layout(diagram: &Diagram, sizes: &[[f64; 2]]) -> Layout {
+    let layers = layers(diagram);
+    let boxes = layers.iter().zip(sizes);
+    let mut items: Vec<Item> = boxes
+        .map(|(&layer, &size)| Item::new(layer, size))
         .collect();
     let mut ways: Vec<Vec<usize>> = Vec::new();
     for arrow in &diagram.arrows {
         let mut way = vec![arrow.from];
         for layer in layers[arrow.from] + 1..layers[arrow.to].max(layers[arrow.from] + 1) {
-            items.push(Item {
-                layer,
-                size: [0.0, WAY_POINT],
-                y: 0.0,
-                before: Vec::new(),
-                after: Vec::new(),
-            });
+            items.push(Item::new(layer, [0.0, WAY_POINT]));
             way.push(items.len() - 1);
         }
         way.push(arrow.to);
@@ -95,11 +105,7 @@ fn layers(diagram: &Diagram) -> Vec<usize> {
 
 /// The items of each layer, in an order with few crossings.
 fn ordered(items: &[Item]) -> Vec<Vec<usize>> {
-    let depth = items
-        .iter()
-        .map(|item| item.layer)
-        .max()
-        .map_or(0, |deepest| deepest + 1);
+    let depth = items.iter().map(|item| item.layer + 1).max().unwrap_or(0);
     let mut columns: Vec<Vec<usize>> = vec![Vec::new(); depth];
     for (index, item) in items.iter().enumerate() {
         columns[item.layer].push(index);
@@ -115,19 +121,11 @@ fn ordered(items: &[Item]) -> Vec<Vec<usize>> {
     remember(&columns, &mut rank);
     for sweep in 0..SWEEPS {
         let forth = sweep % 2 == 0;
-        let order: Vec<usize> = if forth {
-            (0..depth).collect()
-        } else {
-            (0..depth).rev().collect()
-        };
-        for layer in order {
+        for nth in 0..depth {
+            let layer = if forth { nth } else { depth - 1 - nth };
             let key = |&item: &usize| {
-                let beside = if forth {
-                    &items[item].before
-                } else {
-                    &items[item].after
-                };
-                mean(beside.iter().map(|&other| rank[other])).unwrap_or(rank[item])
+                let mean = items[item].mean(forth, |other| rank[other]);
+                mean.unwrap_or(rank[item])
             };
             columns[layer].sort_by(|a, b| key(a).total_cmp(&key(b)));
             remember(&columns[layer..=layer], &mut rank);
@@ -156,19 +154,12 @@ fn place(items: &mut [Item], columns: &[Vec<usize>]) -> f64 {
     // The last sweep looks back: a box belongs below what it is made from, rather than above what it goes into.
     for looks_back in (0..SWEEPS).map(|sweep| sweep % 2 == 1) {
         for column in columns.iter() {
-            let wanted: Vec<f64> = column
-                .iter()
-                .map(|&item| {
-                    let beside = if looks_back {
-                        &items[item].before
-                    } else {
-                        &items[item].after
-                    };
-                    let middle = |&other: &usize| items[other].y + items[other].size[1] / 2.0;
-                    mean(beside.iter().map(middle))
-                        .map_or(items[item].y, |middle| middle - items[item].size[1] / 2.0)
-                })
-                .collect();
+            let wanted = |&item: &usize| {
+                let item = &items[item];
+                let mean = item.mean(looks_back, |other| items[other].middle());
+                mean.map_or(item.y, |middle| middle - item.size[1] / 2.0)
+            };
+            let wanted: Vec<f64> = column.iter().map(wanted).collect();
             settle(items, column, &wanted, height);
         }
     }
@@ -192,11 +183,6 @@ fn settle(items: &mut [Item], column: &[usize], wanted: &[f64], height: f64) {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    (count > 0.0).then_some(sum / count)
-}
-
 fn finish(
     diagram: &Diagram,
     items: &[Item],
@@ -204,15 +190,11 @@ fn finish(
     ways: &[Vec<usize>],
     height: f64,
 ) -> Layout {
-    let widths: Vec<f64> = columns
-        .iter()
-        .map(|column| {
-            column
-                .iter()
-                .map(|&item| items[item].size[0])
-                .fold(0.0, f64::max)
-        })
-        .collect();
+    let width = |column: &Vec<usize>| {
+        let widths = column.iter().map(|&item| items[item].size[0]);
+        widths.fold(0.0, f64::max)
+    };
+    let widths: Vec<f64> = columns.iter().map(width).collect();
     let mut lefts = Vec::with_capacity(columns.len());
     let mut left = 0.0;
     for width in &widths {
@@ -223,19 +205,17 @@ fn finish(
         .iter()
         .map(|item| [lefts[item.layer], item.y, widths[item.layer], item.size[1]])
         .collect();
-    let middle = |item: usize| items[item].y + items[item].size[1] / 2.0;
     let arrows = ways
         .iter()
         .map(|way| {
             let mut points = Vec::new();
             for (position, &item) in way.iter().enumerate() {
-                let layer = items[item].layer;
-                let right = lefts[layer] + widths[layer];
+                let (layer, middle) = (items[item].layer, items[item].middle());
                 if position > 0 {
-                    points.push([lefts[layer], middle(item)]);
+                    points.push([lefts[layer], middle]);
                 }
                 if position + 1 < way.len() {
-                    points.push([right, middle(item)]);
+                    points.push([lefts[layer] + widths[layer], middle]);
                 }
             }
             points

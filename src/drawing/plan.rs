@@ -6,6 +6,7 @@ use std::ops::Range;
 use athermal::core::compile::{Plan, PlannedNode, PlannedRole, Step};
 use athermal::core::node::Read;
 use athermal::core::time::Duration;
+use athermal::diagnosis::text::grouped;
 
 use athermal_analysis::figures::{count, length, table};
 
@@ -34,15 +35,12 @@ fn slots(plan: &Plan, expand: bool) -> String {
         } else {
             format!("{} ({} channels)", producer(&first.name), range.len())
         };
-        let spans = (
-            channels().map(|planned| planned.channel.span).min(),
-            channels().map(|planned| planned.channel.span).max(),
-        );
+        let spans = || channels().map(|planned| planned.channel.span);
         rows.push(vec![
             name,
             numbers(&range),
             first.channel.unit.to_string(),
-            lengths(spans.0, spans.1),
+            lengths(spans().min(), spans().max()),
             lengths(Some(first.channel.ahead), None),
             lengths(channels().filter_map(|planned| planned.history).max(), None),
         ]);
@@ -92,65 +90,44 @@ fn lengths(least: Option<Duration>, most: Option<Duration>) -> String {
 
 fn steps(plan: &Plan, expand: bool) -> String {
     let mut text = String::from("at each tick\n");
-    let mut steps: Vec<(usize, usize, String)> = Vec::new();
-    for (number, step) in plan.steps.iter().enumerate() {
-        let line = match step {
-            Step::Gather(gather) => {
-                let gather = &plan.gathers[*gather];
-                let how = match gather.read {
-                    Read::Fresh => "new values",
-                    Read::Held => "held values",
-                    Read::Truth => "truth",
-                };
-                let lagged = gather
-                    .entries
-                    .iter()
-                    .any(|entry| entry.lag > Duration::ZERO);
-                let lagged = if lagged { ", some of the past" } else { "" };
-                let mut from: Vec<&str> = Vec::new();
-                for entry in &gather.entries {
-                    let producer = producer(&plan.channels[entry.slot].name);
-                    if !from.contains(&producer) {
-                        from.push(producer);
-                    }
-                }
-                let (number, from) = (gather.entries.len(), from.join(", "));
-                format!("read {number} {how} of {from}{lagged}")
-            }
-            Step::Run(node) => run(plan, &plan.nodes[*node], expand),
-            Step::Capture(node) => format!(
-                "keep the inputs of {} for later ticks",
-                name(&plan.nodes[*node], expand)
-            ),
-        };
-        steps.push((number + 1, number + 1, line));
-    }
+    let line = |step: &Step| match step {
+        Step::Gather(gather) => {
+            let gather = &plan.gathers[*gather];
+            let how = match gather.read {
+                Read::Fresh => "new values",
+                Read::Held => "held values",
+                Read::Truth => "truth",
+            };
+            let mut lags = gather.entries.iter().map(|entry| entry.lag);
+            let lagged = lags.any(|lag| lag > Duration::ZERO);
+            let lagged = if lagged { ", some of the past" } else { "" };
+            let from = gather.entries.iter();
+            let from = from.map(|entry| producer(&plan.channels[entry.slot].name));
+            let from: Vec<&str> = grouped(from, |of| *of).iter().map(|of| of[0]).collect();
+            let (number, from) = (gather.entries.len(), from.join(", "));
+            format!("read {number} {how} of {from}{lagged}")
+        }
+        Step::Run(node) => run(plan, &plan.nodes[*node], expand),
+        Step::Capture(node) => format!(
+            "keep the inputs of {} for later ticks",
+            name(&plan.nodes[*node], expand)
+        ),
+    };
+    let steps: Vec<String> = plan.steps.iter().map(line).collect();
     // Instances of a node, and what they read, follow each other in the same pattern.
     let mut at = 0;
     while at < steps.len() {
-        let period = if expand {
-            None
-        } else {
-            (1..=2).find(|&period| repeats(&steps, at, period) > 1)
-        };
-        let (period, times) = period.map_or((1, 1), |period| (period, repeats(&steps, at, period)));
+        let patterns = (1..=2).map(|period| (period, repeats(&steps, at, period)));
+        let pattern = patterns.filter(|_| !expand).find(|(_, times)| *times > 1);
+        let (period, times) = pattern.unwrap_or((1, 1));
         let last = at + period * times;
-        let lines: Vec<&str> = steps[at..at + period]
-            .iter()
-            .map(|(_, _, line)| line.as_str())
-            .collect();
-        let times_text = if times > 1 {
-            format!("  × {times}")
-        } else {
-            String::new()
+        let times = match times {
+            1 => String::new(),
+            _ => format!("  × {times}"),
         };
-        let range = if last - at == 1 {
-            format!("{}", at + 1)
-        } else {
-            format!("{}-{last}", at + 1)
-        };
-        let _ = writeln!(text, "  {range:>9}  {}{times_text}", lines[0]);
-        for line in &lines[1..] {
+        let range = numbers(&(at + 1..last + 1));
+        let _ = writeln!(text, "  {range:>9}  {}{times}", steps[at]);
+        for line in &steps[at + 1..at + period] {
             let _ = writeln!(text, "  {:>9}    then {line}", "");
         }
         at = last;
@@ -158,13 +135,11 @@ fn steps(plan: &Plan, expand: bool) -> String {
     text
 }
 
-fn repeats(steps: &[(usize, usize, String)], at: usize, period: usize) -> usize {
-    let same = |a: usize, b: usize| (0..period).all(|i| steps[a + i].2 == steps[b + i].2);
-    let mut times = 1;
-    while at + period * (times + 1) <= steps.len() && same(at, at + period * times) {
-        times += 1;
-    }
-    times
+/// How often the steps from one on come in a row; none where fewer are left.
+fn repeats(steps: &[String], at: usize, period: usize) -> usize {
+    let mut groups = steps[at..].chunks_exact(period);
+    let first = groups.next();
+    groups.take_while(|group| Some(*group) == first).count() + 1
 }
 
 fn name(node: &PlannedNode, expand: bool) -> String {
@@ -192,15 +167,8 @@ fn run(plan: &Plan, node: &PlannedNode, expand: bool) -> String {
     };
     let ahead = match node.role.learns_from() {
         Some((truth, _)) => {
-            format!(
-                ", {} {} ahead",
-                plan.channels[truth.slot]
-                    .name
-                    .split('.')
-                    .next()
-                    .unwrap_or_default(),
-                truth.ahead
-            )
+            let truth_of = producer(&plan.channels[truth.slot].name);
+            format!(", {truth_of} {} ahead", truth.ahead)
         }
         None => String::new(),
     };

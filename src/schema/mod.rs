@@ -1,7 +1,5 @@
 //! Decides the JSON Schema of graph files, for exactly the kinds that are linked in; what a kind's parameters are is decided by the kind.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -33,11 +31,9 @@ pub fn graph_schema() -> Value {
     generator.subschema_for::<Quantity>();
     generator.subschema_for::<Unit>();
     let format = as_draft_7(&format, &str::to_owned);
-    let mut definitions = Definitions::default();
-    for (name, schema) in generator.take_definitions(true) {
-        let schema = as_draft_7(&schema, &str::to_owned);
-        definitions.taken.insert(name, schema);
-    }
+    let common = generator.take_definitions(true).into_iter();
+    let common = common.map(|(name, schema)| (name, as_draft_7(&schema, &str::to_owned)));
+    let mut definitions: Map<String, Value> = common.collect();
     let kinds = kinds().values().filter_map(|same| same.first().copied());
     let kinds: Vec<&Kind> = kinds.collect();
     let node = |kind: &&Kind| node(kind, &framework, &mut definitions);
@@ -58,49 +54,32 @@ pub fn graph_schema() -> Value {
     let inside = &mut inside["additionalProperties"]["then"]["properties"];
     inside["type"]["anyOf"][0]["enum"] = json!(names);
     if let Value::Object(shared) = schema["definitions"].take() {
-        definitions.taken.extend(shared);
+        definitions.extend(shared);
     }
-    schema["definitions"] = definitions.taken.into();
+    schema["definitions"] = definitions.into();
     schema
 }
 
-/// What several places of the schema share, by name.
-#[derive(Default)]
-struct Definitions {
-    taken: Map<String, Value>,
-}
-
-impl Definitions {
-    /// Takes the definitions of a kind over, and gives its schema with references to them. A name that another kind has for
-    /// something else gets the kind's name in front.
-    fn adopt(&mut self, kind: &Kind) -> Value {
-        let mut schema = (kind.schema)().clone();
-        let own = schema
-            .as_object_mut()
-            .and_then(|schema| schema.remove("$defs"));
-        let own = match own {
-            Some(Value::Object(own)) => own,
-            _ => Map::new(),
-        };
-        let names: BTreeMap<String, String> = own
-            .iter()
-            .map(|(name, schema)| {
-                let plain = as_draft_7(schema, &|name| name.to_owned());
-                let clashes = self.taken.get(name).is_some_and(|taken| *taken != plain);
-                let unique = if clashes {
-                    format!("{}.{name}", kind.name)
-                } else {
-                    name.clone()
-                };
-                (name.clone(), unique)
-            })
-            .collect();
-        let rename = |name: &str| names.get(name).cloned().unwrap_or_else(|| name.to_owned());
-        for (name, schema) in &own {
-            self.taken.insert(rename(name), as_draft_7(schema, &rename));
-        }
-        as_draft_7(&schema, &rename)
+/// Takes the definitions of a kind over to `taken`, and gives its schema with references to them. A name that another kind has for
+/// something else gets the kind's name in front.
+fn adopt(kind: &Kind, taken: &mut Map<String, Value>) -> Value {
+    let mut schema = (kind.schema)().clone();
+    let own = schema["$defs"].take();
+    let own: Vec<(&String, &Value)> = own.as_object().into_iter().flatten().collect();
+    let clashes = |name: &str, schema: &Value| {
+        let plain = as_draft_7(schema, &str::to_owned);
+        taken.get(name).is_some_and(|taken| *taken != plain)
+    };
+    let clashing = own.iter().filter(|(name, schema)| clashes(name, schema));
+    let clashing: Vec<&str> = clashing.map(|(name, _)| name.as_str()).collect();
+    let rename = |name: &str| match clashing.contains(&name) {
+        true => format!("{}.{name}", kind.name),
+        false => name.to_owned(),
+    };
+    for (name, schema) in &own {
+        taken.insert(rename(name), as_draft_7(schema, &rename));
     }
+    as_draft_7(&schema, &rename)
 }
 
 /// A schema of draft 2020-12 as one of draft 7: definitions stand elsewhere, and nothing counts beside a `$ref`.
@@ -111,7 +90,7 @@ fn as_draft_7(schema: &Value, rename: &dyn Fn(&str) -> String) -> Value {
             let mut made = Map::new();
             for (key, value) in keys
                 .iter()
-                .filter(|(key, _)| *key != "$schema" && *key != "title")
+                .filter(|(key, _)| !["$schema", "$defs", "title"].contains(&key.as_str()))
             {
                 made.insert(key.clone(), as_draft_7(value, rename));
             }
@@ -190,8 +169,8 @@ fn by_tag(choices: &[Value]) -> Option<Map<String, Value>> {
 }
 
 /// The keys of one kind, the framework's included.
-fn node(kind: &Kind, framework: &Value, definitions: &mut Definitions) -> Value {
-    let mut parameters = definitions.adopt(kind);
+fn node(kind: &Kind, framework: &Value, definitions: &mut Map<String, Value>) -> Value {
+    let mut parameters = adopt(kind, definitions);
     let mut properties = json!({
         "type": { "description": kind.documentation() },
         "each": {

@@ -27,6 +27,7 @@ mod json_messages;
 mod json_page;
 mod kept_runs;
 mod language_commands;
+mod levels;
 mod named_models;
 mod not_files;
 mod nothing_to_score;

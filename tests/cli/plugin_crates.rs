@@ -219,11 +219,8 @@ fn a_crate_that_is_not_made_for_this_athermal_is_refused_before_anything_is_buil
                     other.display().to_string()
                 ),
             ),
-            2,
-            [
-                "2 copies of athermal-core, which do not know each other's nodes",
-                "other-core",
-            ],
+            3,
+            ["cargo cannot put the crates of", "other-core"],
         ),
         (
             with_core(

@@ -28,6 +28,37 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// Numbers that are compared, each as `usual` writes it, or to as many significant digits as tell apart those that differ.
+#[must_use]
+pub fn apart_by<const N: usize>(values: [f64; N], usual: fn(f64) -> String) -> [String; N] {
+    // More than a number has.
+    const MOST: usize = 17;
+    let all_differ = |texts: &[String; N]| {
+        let differ = |a: usize, b: usize| values[a] == values[b] || texts[a] != texts[b];
+        (0..N).all(|b| (0..b).all(|a| differ(a, b)))
+    };
+    let exact = (4..=MOST).map(|count| values.map(|value| digits(value, count)));
+    let mut texts = std::iter::once(values.map(usual)).chain(exact);
+    let first = texts.find(all_differ);
+    first.unwrap_or_else(|| values.map(|value| value.to_string()))
+}
+
+/// Numbers that are compared, as [`number`] writes them, or to as many digits as tell apart those that differ.
+#[must_use]
+pub fn apart<const N: usize>(values: [f64; N]) -> [String; N] {
+    apart_by(values, number)
+}
+
+/// A number as [`number`] writes it where that is all of it, else with all its digits: of what stands still each counts.
+#[must_use]
+pub fn exact(value: f64) -> String {
+    let usual = number(value);
+    match usual.parse::<f64>() {
+        Ok(read) if read != value => value.to_string(),
+        _ => usual,
+    }
+}
+
 /// A number that may be missing.
 #[must_use]
 pub fn or_dash(value: Option<f64>) -> String {
@@ -257,6 +288,20 @@ pub fn page(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_are_compared_have_as_many_digits_as_tell_them_apart() {
+        let texts = apart([6.637_22, 6.637_24, 6.638_82, 6.638_84]);
+        assert_eq!(texts, ["6.63722", "6.63724", "6.63882", "6.63884"]);
+        assert_eq!(apart([4957.558, 4957.561]), ["4957.558", "4957.561"]);
+        assert_eq!(apart([12_083.7, 12_084.2]), ["12083.7", "12084.2"]);
+        assert_eq!(apart([21.5, 850.0]), ["21.50", "850.0"], "as usual");
+        assert_eq!(apart([2.0, 2.0]), ["2.00", "2.00"], "they are one");
+        let next = [1.0, f64::from_bits(1.0_f64.to_bits() + 1)];
+        assert_eq!(apart(next), ["1.0000000000000000", "1.0000000000000002"]);
+        assert_eq!(apart([f64::NAN, 0.0]), ["NaN", "0"]);
+        assert_eq!(apart([1e9, 1e9 + 1.0]), ["1.000000000e9", "1.000000001e9"]);
+    }
 
     #[test]
     fn pages_keep_lists_and_tables() {

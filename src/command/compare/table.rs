@@ -14,7 +14,7 @@ pub(super) fn describe(comparison: &Comparison, mode: Mode, several: bool, spans
     let all = |of: fn(&Column) -> String| comparison.truths.iter().map(of).collect();
     let mut rows: Vec<(String, Vec<String>)> = vec![
         (
-            "no model".to_owned(),
+            no_model(comparison),
             all(|truth| or_dash(truth.baseline_zero)),
         ),
         ("persistence".to_owned(), all(persistence)),
@@ -31,6 +31,18 @@ pub(super) fn describe(comparison: &Comparison, mode: Mode, several: bool, spans
         rows.push((label, cells.collect()));
     }
     heading(comparison, mode, spans) + &matrix("", &columns, &rows)
+}
+
+/// What no model is called: of levels it is their mean.
+fn no_model(comparison: &Comparison) -> String {
+    let mut remarks = comparison.truths.iter().map(|of| of.no_model_is.remark());
+    let first = remarks.next().unwrap_or_default();
+    let remark = if remarks.all(|remark| remark == first) {
+        first
+    } else {
+        ""
+    };
+    format!("no model{remark}")
 }
 
 /// The error of persistence, with the number of instants where these are few.
@@ -132,6 +144,8 @@ mod tests {
                 name: "Z".to_owned(),
                 n: count,
                 left_out: None,
+                no_model: Some(0.0),
+                no_model_is: athermal::run::score::NoModel::Zero,
                 baseline_zero: Some(2.39),
                 baseline_persistence: None,
                 persistence_n: 0,

@@ -142,7 +142,7 @@ impl Diagnose {
 
     fn report(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
         if let Some(days) = &diagnosis.days {
-            Self::warn_dropped(terminal, days);
+            warn_dropped(terminal, days);
         }
         if diagnosis.main.is_empty() {
             terminal.warning(
@@ -162,39 +162,12 @@ impl Diagnose {
         }
     }
 
-    /// Warns of what only some of the fits on parts of the data had, so that they differ by more than their days.
-    fn warn_dropped(terminal: &Terminal, days: &Days) {
-        let all = days.left_out.iter().flat_map(|day| &day.dropped);
-        let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
-        let names: BTreeSet<&String> = all.collect();
-        for name in names {
-            let without = days
-                .left_out
-                .iter()
-                .filter(|day| day.dropped.contains(name));
-            let without: Vec<String> = without.map(|day| day.day.to_string()).collect();
-            if without.len() < days.left_out.len() {
-                let which = if without.is_empty() {
-                    "fits on a few days".to_owned()
-                } else {
-                    format!("fits without day {}", without.join(", "))
-                };
-                terminal.warning(format_args!(
-                    "{name} has a value in too few rows for {which}, which do without it; their scores suffer from that too"
-                ));
-            }
-        }
-    }
-
     /// Whether every name of `--of` stands for something.
     fn check_names(&self, plan: &Plan) -> Result<(), Failure> {
         let predictions = plan.channels.iter().filter(|of| of.predicts.is_some());
         let known: Vec<&str> = predictions.map(|of| of.name.as_str()).collect();
-        let unknown = self
-            .of
-            .iter()
-            .find(|name| !known.iter().any(|known| is_called(known, name)));
-        let Some(unknown) = unknown else {
+        let is_known = |name: &&String| known.iter().any(|known| is_called(known, name));
+        let Some(unknown) = self.of.iter().find(|name| !is_known(name)) else {
             return Ok(());
         };
         let graph = plan.name.as_deref().unwrap_or("the graph");
@@ -205,12 +178,28 @@ impl Diagnose {
     }
 }
 
+/// Warns of what only some of the fits on parts of the data had, so that they differ by more than their days.
+fn warn_dropped(terminal: &Terminal, days: &Days) {
+    let left_out = || days.left_out.iter();
+    let all = left_out().flat_map(|day| &day.dropped);
+    let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
+    for name in all.collect::<BTreeSet<&String>>() {
+        let without = left_out().filter(|day| day.dropped.contains(name));
+        let without: Vec<String> = without.map(|day| day.day.to_string()).collect();
+        let which = match without.len() {
+            0 => "fits on a few days".to_owned(),
+            all if all == days.left_out.len() => continue,
+            _ => format!("fits without day {}", without.join(", ")),
+        };
+        terminal.warning(format_args!(
+            "{name} has a value in too few rows for {which}, which do without it; their scores suffer from that too"
+        ));
+    }
+}
+
 /// Names predictions that the graph puts out beside those that are shown.
 fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
-    let outputs = plan
-        .outputs
-        .iter()
-        .map(|output| &plan.channels[output.slot]);
+    let outputs = plan.outputs.iter().map(|of| &plan.channels[of.slot]);
     let predictions = outputs.filter(|of| of.predicts.is_some());
     let is_shown = |name: &str| diagnosis.main.iter().any(|main| main.prediction == name);
     let others = predictions.filter(|of| !is_shown(&of.name));

@@ -24,8 +24,8 @@ impl Diagnose {
         (!found.is_empty()).then(|| found.join("\n"))
     }
 
-    fn command(&self, name: &str, more: &[&str]) -> String {
-        let mut words = self.data.words_with(name, &self.model);
+    fn diagnose(&self, more: &[&str]) -> String {
+        let mut words = self.data.words_with("diagnose", &self.model);
         words.extend(more.iter().map(|&word| word.to_owned()));
         command(&words)
     }
@@ -35,11 +35,9 @@ impl Diagnose {
     fn fit(&self, model: &Model, more: &[&str]) -> String {
         let cards = model.card.iter().flat_map(|card| &card.data);
         let seen: Vec<PathBuf> = cards.map(|card| PathBuf::from(&card.path)).collect();
-        let mut words = if seen.is_empty() {
-            self.data.words_with("fit", &self.model)
-        } else {
-            self.data.others(seen).words_with("fit", &self.model)
-        };
+        let seen = (!seen.is_empty()).then(|| self.data.others(seen));
+        let data = seen.as_ref().unwrap_or(&self.data);
+        let mut words = data.words_with("fit", &self.model);
         words.extend(more.iter().map(|&word| word.to_owned()));
         command(&words)
     }
@@ -51,15 +49,12 @@ impl Diagnose {
         let users: Vec<&str> = tables.users_of(main, name).collect();
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
         let own = users.iter().find(|user| is_of(&main.prediction, user));
-        let (why, look) = if let Some(own) = own.filter(|own| !has_coefficients(model, own)) {
+        let (what, look) = if let Some(own) = own.filter(|own| !has_coefficients(model, own)) {
             if self.of.iter().any(|asked| is_called(own, asked)) {
                 return None;
             }
-            let look = self.command("diagnose", &["--of", &quoted(own), "--no-fit"]);
-            (
-                why + "which it uses; how it answers each of its sensors:",
-                look,
-            )
+            let look = self.diagnose(&["--of", &quoted(own), "--no-fit"]);
+            ("which it uses; how it answers each of its sensors:", look)
         } else if let Some(own) = own {
             let model = quoted(&self.model.display().to_string());
             // Without `each` a node is called by its own name, and its prediction by that of its axis too.
@@ -71,21 +66,21 @@ impl Diagnose {
                 "--format coefficients --node",
                 &node,
             ];
-            (why + "which it uses; its coefficients:", command(&words))
+            ("which it uses; its coefficients:", command(&words))
         } else if let Some(user) = users.first().filter(|_| !tables.is_estimator(main)) {
-            let look = self.command("diagnose", &["--of", &quoted(user), "--no-fit"]);
+            let look = self.diagnose(&["--of", &quoted(user), "--no-fit"]);
             (
-                format!("{why}which {user} uses; what that leaves by itself:"),
+                &*format!("which {user} uses; what that leaves by itself:"),
                 look,
             )
         } else {
             let look = self.fit(model, &["--candidates", "-o again.json"]);
             (
-                why + "which it does not use; what a fit tries before it stops:",
+                "which it does not use; what a fit tries before it stops:",
                 look,
             )
         };
-        Some(paragraph("", 0, &why) + &look)
+        Some(paragraph("", 0, &(why + what)) + &look)
     }
 
     fn more_days(&self, tables: &Tables, model: &Model) -> Option<String> {
@@ -100,7 +95,7 @@ impl Diagnose {
         let of = of.flat_map(|name| ["--of".to_owned(), name]);
         let more: Vec<String> = of.chain(["--window --no-fit".to_owned()]).collect();
         let more: Vec<&str> = more.iter().map(String::as_str).collect();
-        let look = self.command("diagnose", &more);
+        let look = self.diagnose(&more);
         let wanted = !self.window && tables.all_white();
         wanted
             .then(|| format!("What is left is white; signal to noise over other windows:\n{look}"))

@@ -30,30 +30,24 @@ impl Nodes {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match &self.name {
             None => list(terminal),
-            Some(name) => match kind(name) {
-                Some(kind) => explain(terminal, kind),
-                None => {
-                    let near = nearest(name, kinds().keys().copied());
-                    let near =
-                        near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
-                    let message = format!(
-                        "there is no node type `{name}`{near} (`athermal nodes` lists them all)"
-                    );
-                    return Err(Failure::Request(message));
-                }
-            },
+            Some(name) => explain(terminal, kind(name).ok_or_else(|| unknown(name))?),
         }
         Ok(Answer::Fine)
     }
 }
 
+fn unknown(name: &str) -> Failure {
+    let near = nearest(name, kinds().keys().copied());
+    let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
+    Failure::Request(format!(
+        "there is no node type `{name}`{near} (`athermal nodes` lists them all)"
+    ))
+}
+
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = kinds()
-            .values()
-            .flatten()
-            .map(|kind| describe(kind))
-            .collect();
+        let all = kinds().values().flatten();
+        let all: Vec<Value> = all.map(|kind| describe(kind)).collect();
         println!("{:#}", json!({ "nodes": all, "written": written_names() }));
         return;
     }
@@ -88,14 +82,12 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             Read::Held => "the last value, up to its maximum age",
             Read::Truth => "paired with predictions",
         };
-        let optional = if port.optional {
-            ", may be left out"
-        } else {
-            ""
+        let optional = match port.optional {
+            true => ", may be left out",
+            false => "",
         };
-        let unit = port
-            .unit
-            .map_or_else(String::new, |unit| format!(", in {unit}"));
+        let unit = port.unit.map(|unit| format!(", in {unit}"));
+        let unit = unit.unwrap_or_default();
         let name = format!("  inputs.{:<10} ", port.name);
         let what = format!("{} ({read}{unit}{optional})", port.summary);
         print!("{}", paragraph(&name, 6, &what));
@@ -159,9 +151,8 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
     match kind.role {
         RoleName::Feature => {
             let ports = (kind.ports)().iter();
-            ports
-                .map(|port| (port.name, port.summary.to_owned()))
-                .collect()
+            let ports = ports.map(|port| (port.name, port.summary.to_owned()));
+            ports.collect()
         }
         RoleName::Estimator => {
             let ports = [
@@ -206,28 +197,24 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
 }
 
 fn describe(kind: &Kind) -> Value {
-    let inputs: Vec<Value> = (kind.inputs)()
-        .iter()
-        .map(|port| {
-            let read = match port.read {
-                Read::Fresh => "fresh",
-                Read::Held => "held",
-                Read::Truth => "truth",
-            };
-            json!({ "name": port.name, "summary": port.summary, "read": read, "unit": port.unit, "optional": port.optional })
-        })
-        .collect();
+    let inputs = (kind.inputs)().iter().map(|port| {
+        let read = match port.read {
+            Read::Fresh => "fresh",
+            Read::Held => "held",
+            Read::Truth => "truth",
+        };
+        json!({ "name": port.name, "summary": port.summary, "read": read, "unit": port.unit, "optional": port.optional })
+    });
+    let outputs = outputs(kind).into_iter();
+    let outputs = outputs.map(|(name, summary)| json!({ "name": name, "summary": summary }));
     json!({
         "name": kind.name,
         "role": kind.role,
         "summary": kind.summary(),
         "package": kind.package,
         "version": kind.version,
-        "inputs": inputs,
-        "outputs": outputs(kind)
-            .iter()
-            .map(|(name, summary)| json!({ "name": name, "summary": summary }))
-            .collect::<Vec<_>>(),
+        "inputs": inputs.collect::<Vec<_>>(),
+        "outputs": outputs.collect::<Vec<_>>(),
         "parameters": (kind.schema)(),
     })
 }

@@ -142,10 +142,9 @@ impl Run {
         if stop::is_stopped() {
             terminal.note("stopped: what had been read until then has been put out");
         }
-        let input = if self.input_is_standard() {
-            STANDARD_INPUT.to_owned()
-        } else {
-            self.input.display().to_string()
+        let input = match self.input_is_standard() {
+            true => STANDARD_INPUT.to_owned(),
+            false => self.input.display().to_string(),
         };
         let files = [(input, reader.report().clone())];
         data::warn(&terminal, &plan, &files, refused, &rejected);
@@ -258,31 +257,24 @@ impl Run {
         };
         let terminal = *terminal;
         reader.report_first(move |first| {
-            let message = match first {
+            let words = match first {
                 FileError::MissingColumns { .. } => {
-                    let words = format_args!("{first} (missing until a line has it)");
-                    refused::message(first, None, words)
+                    format!("{first} (missing until a line has it)")
                 }
                 FileError::StillRefused { .. } | FileError::HeaderAgain { moved: true, .. } => {
-                    refused::message(first, None, first)
+                    first.to_string()
                 }
-                _ => {
-                    let words =
-                        format_args!("{}; others like it are counted", first.without_advice());
-                    refused::message(first, None, words)
-                }
+                _ => format!("{}; others like it are counted", first.without_advice()),
             };
-            terminal.warning(message);
+            terminal.warning(refused::message(first, None, words));
         });
         Ok(reader)
     }
 
     /// Takes all columns of an output that is appended to, where some are of outputs that earlier graphs had.
     fn widen(&self, columns: &mut Vec<String>) {
-        let stood = self
-            .state
-            .as_ref()
-            .and_then(|_| begun_columns(&self.output));
+        let state = self.state.as_ref();
+        let stood = state.and_then(|_| begun_columns(&self.output));
         if let Some((_time, stood)) = stood.as_deref().and_then(<[String]>::split_first)
             && stood.last() == columns.last()
             && columns.iter().all(|column| stood.contains(column))
@@ -300,7 +292,11 @@ impl Run {
         read: &Layout,
         columns: &[String],
     ) -> Result<Writer, Failure> {
-        let (time, flush) = (read.time.columns.title(), self.flush());
+        let time = read.time.columns.title();
+        let flush = match self.ends() {
+            true => Flush::Buffered,
+            false => Flush::EachRow,
+        };
         if reports.terminal.format == Format::Json && self.output.as_os_str() == "-" {
             let (name, stream) = ("standard output", std::io::stdout());
             let lines = athermal::files::Format::JsonLines;
@@ -323,13 +319,5 @@ impl Run {
 
     fn input_is_standard(&self) -> bool {
         self.input.as_os_str() == "-"
-    }
-
-    fn flush(&self) -> Flush {
-        if !self.ends() {
-            Flush::EachRow
-        } else {
-            Flush::Buffered
-        }
     }
 }

@@ -12,7 +12,7 @@ use crate::command::data::REJECTED;
 use crate::command::model::{few, warn_nodes_unfitted};
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::{count, counted, instant, length, number, seconds, time};
+use athermal_analysis::figures::{apart, count, counted, instant, length, seconds, time};
 
 /// What to do where a clock was ahead.
 const BEGIN_COLD: &str =
@@ -187,16 +187,10 @@ fn why_rejected(value: f64, (lowest, highest): (f64, f64)) -> String {
     if value.is_infinite() {
         "an infinite sample".to_owned()
     } else if value < lowest {
-        format!(
-            "{} is below the lowest of its range, {}",
-            number(value),
-            number(lowest)
-        )
+        let [value, lowest] = apart([value, lowest]);
+        format!("{value} is below the lowest of its range, {lowest}")
     } else {
-        format!(
-            "{} is above the highest of its range, {}",
-            number(value),
-            number(highest)
-        )
+        let [value, highest] = apart([value, highest]);
+        format!("{value} is above the highest of its range, {highest}")
     }
 }

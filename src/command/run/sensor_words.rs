@@ -7,7 +7,7 @@ use crate::command::faults::{self, Purpose, of_standstill};
 use crate::command::model::few;
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::{count, instant, number, time};
+use athermal_analysis::figures::{count, exact, instant, time};
 
 /// Reports what happened to sensors at a row. For people, those that fail or come back together stand in one sentence, as when a
 /// logger is unplugged.
@@ -21,7 +21,7 @@ pub fn changes(terminal: &Terminal, changes: &[SensorChange], at_s: f64) {
             (SensorFault::Stuck(stuck), false) => {
                 let words = format!(
                     "{name} is {} in all of its last {} samples, since {}: {}",
-                    number(stuck.value),
+                    exact(stuck.value),
                     count(stuck.samples),
                     instant(stuck.from_s),
                     of_standstill(change.of_truth, Purpose::Run)

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
-use athermal_analysis::figures::{count, counted, length, number, seconds};
+use athermal_analysis::figures::{apart, count, counted, length, seconds};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 const ANOTHER_RUN: &str =
@@ -25,27 +25,23 @@ pub fn ready(
     lacking: &[String],
     (past, silent): (Duration, &[&str]),
 ) {
-    let quoted = |name: &str| format!("`{name}`");
     if !lacking.is_empty() {
         let (what, are) = match lacking.len() {
             1 => ("output", "whose column is empty"),
             _ => ("outputs", "whose columns are empty"),
         };
-        let names: Vec<_> = lacking.iter().map(|name| quoted(name)).collect();
+        let names = lacking.join("`, `");
         terminal.warning(format_args!(
-            "{} has no {what} {}, {are} while it runs",
-            path.display(),
-            names.join(", ")
+            "{} has no {what} `{names}`, {are} while it runs",
+            path.display()
         ));
     }
     terminal.note(staged(path, of));
     if !silent.is_empty() {
-        let names: Vec<_> = silent.iter().map(|name| quoted(name)).collect();
+        let (names, past) = (silent.join("`, `"), length(past));
         terminal.warning(format_args!(
-            "{} gives no {} over the past {} that it was warmed by: are its sensors those of this machine?",
-            path.display(),
-            names.join(", "),
-            length(past)
+            "{} gives no `{names}` over the past {past} that it was warmed by: are its sensors those of this machine?",
+            path.display()
         ));
     }
 }
@@ -99,12 +95,11 @@ fn staged(path: &Path, staged: &Staged) -> Message {
 pub fn shadow(verdict: &Verdict) -> Message {
     let mut text = "in the shadow:".to_owned();
     for output in &verdict.outputs {
+        let [running, new] = apart([output.running_rmse, output.candidate_rmse]);
         let _ = write!(
             text,
-            "\n  {}: RMSE {} running, {} new, in {}, over {}",
+            "\n  {}: RMSE {running} running, {new} new, in {}, over {}",
             output.output,
-            number(output.running_rmse),
-            number(output.candidate_rmse),
             output.unit,
             counted(output.n as u64, "instant")
         );
@@ -117,53 +112,44 @@ pub fn shadow(verdict: &Verdict) -> Message {
 }
 
 /// A graph that does not take over, and why.
-pub fn not_taken_over(terminal: &Terminal, path: &Path, reason: Refusal<'_>) {
-    let with = |reason, words: fmt::Arguments<'_>| {
-        terminal.warning(message(path, reason, words));
-    };
-    match reason {
+pub fn not_taken_over(terminal: &Terminal, path: &Path, refusal: Refusal<'_>) {
+    let (reason, words) = match refusal {
         Refusal::Unusable(error) => {
             terminal.setback(&error.into());
-            unusable(terminal, path, "what runs goes on");
+            return unusable(terminal, path, "what runs goes on");
         }
         Refusal::Stage(error) => {
             terminal.setback(&Failure::Request(format!("{}: {error}", path.display())));
-            match error {
+            let goes_on: &str = match error {
                 StageError::MissingChannels { .. }
                 | StageError::OtherTime { .. }
-                | StageError::OtherUnit { .. } => {
-                    unusable(terminal, path, &format!("what runs goes on; {ANOTHER_RUN}"));
-                }
-                _ => unusable(terminal, path, "what runs goes on"),
-            }
+                | StageError::OtherUnit { .. } => &format!("what runs goes on; {ANOTHER_RUN}"),
+                _ => "what runs goes on",
+            };
+            return unusable(terminal, path, goes_on);
         }
-        Refusal::NoColumn(name) => with(
+        Refusal::NoColumn(name) => (
             "no_column",
-            format_args!(
+            &*format!(
                 "has the output `{name}`, for which there is no column; what runs goes on; {ANOTHER_RUN}"
             ),
         ),
-        Refusal::Changed => with(
+        Refusal::Changed => (
             "changed",
-            format_args!("has changed: as it was in the shadow until now, it does not take over"),
+            "has changed: as it was in the shadow until now, it does not take over",
         ),
-        Refusal::Gone => with(
+        Refusal::Gone => (
             "changed",
-            format_args!("is gone: as it was in the shadow until now, it does not take over"),
+            "is gone: as it was in the shadow until now, it does not take over",
         ),
-        Refusal::LargerError => with(
-            "larger_error",
-            format_args!("does not take over: its error is larger"),
-        ),
-        Refusal::NothingToCompare => with(
+        Refusal::LargerError => ("larger_error", "does not take over: its error is larger"),
+        Refusal::NothingToCompare => (
             "nothing_to_compare",
-            format_args!("does not take over: there was nothing to compare"),
+            "does not take over: there was nothing to compare",
         ),
-        Refusal::DataEnded => with(
-            "data_ended",
-            format_args!("did not take over: the data ended before"),
-        ),
-    }
+        Refusal::DataEnded => ("data_ended", "did not take over: the data ended before"),
+    };
+    terminal.warning(message(path, reason, format_args!("{words}")));
 }
 
 /// What stands in a file is no graph that can be run, and what goes on.

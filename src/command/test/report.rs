@@ -59,37 +59,33 @@ impl<'a> Summary<'a> {
         }
     }
 
-    fn count(&self, which: impl Fn(&Status) -> bool) -> usize {
-        let statuses = self.results.iter().map(|ran| &ran.status);
-        statuses.filter(|status| which(status)).count()
-    }
-
-    fn failed(&self) -> usize {
-        self.count(|status| matches!(status, Status::Failed))
-    }
-
-    fn broken(&self) -> usize {
-        self.count(|status| matches!(status, Status::Broken(_)))
+    /// How many passed, failed and could not be run.
+    fn counts(&self) -> [usize; 3] {
+        let mut counts = [0; 3];
+        for ran in self.results {
+            counts[match ran.status {
+                Status::Passed => 0,
+                Status::Failed => 1,
+                Status::Broken(_) => 2,
+            }] += 1;
+        }
+        counts
     }
 
     /// One line for people.
     pub(super) fn line(&self) -> String {
-        let all = self.results.len();
-        let parts = [
-            (all - self.failed() - self.broken(), "passed"),
-            (self.failed(), "failed"),
-            (self.broken(), "could not be run"),
-        ];
-        let parts = parts.iter().filter(|(n, _)| *n > 0);
-        let parts: Vec<String> = parts
-            .map(|(n, what)| format!("{} {what}", count(*n as u64)))
-            .collect();
-        let tests = if all == 1 { "test" } else { "tests" };
-        let parts = if parts.is_empty() {
-            "nothing to do".to_owned()
-        } else {
-            parts.join(", ")
+        let parts = self
+            .counts()
+            .into_iter()
+            .zip(["passed", "failed", "could not be run"]);
+        let parts = parts.filter(|(n, _)| *n > 0);
+        let parts = parts.map(|(n, what)| format!("{} {what}", count(n as u64)));
+        let parts = match &parts.collect::<Vec<_>>()[..] {
+            [] => "nothing to do".to_owned(),
+            parts => parts.join(", "),
         };
+        let all = self.results.len();
+        let tests = if all == 1 { "test" } else { "tests" };
         format!("{all} {tests}: {parts}, in {}", seconds(self.took))
     }
 
@@ -101,7 +97,7 @@ impl<'a> Summary<'a> {
         });
         match broken.max() {
             Some(status) => Err(Failure::Exit(status)),
-            None if self.failed() > 0 => Ok(Answer::No),
+            None if self.counts()[1] > 0 => Ok(Answer::No),
             None => Ok(Answer::Fine),
         }
     }
@@ -109,11 +105,12 @@ impl<'a> Summary<'a> {
     /// The facts for programs.
     pub(super) fn json(&self) -> Value {
         let tests: Vec<Value> = self.results.iter().map(|ran| self.test(ran)).collect();
+        let [passed, failed, errors] = self.counts();
         json!({
             "tests": tests,
-            "passed": self.results.len() - self.failed() - self.broken(),
-            "failed": self.failed(),
-            "errors": self.broken(),
+            "passed": passed,
+            "failed": failed,
+            "errors": errors,
             "seconds": self.took.as_secs_f64(),
         })
     }

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use athermal_core::compile::Plan;
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
-use athermal_run::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much, if_few};
+use athermal_run::score::{
+    NoModel, PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much, if_few,
+};
 use serde::Serialize;
 
 use crate::report::rms;
@@ -57,7 +59,12 @@ pub struct Column {
     /// Instants at which the prediction that is there most often is not scored, since another is not there, and the row that is there
     /// least often of those that count; none where these are few, at most one in twenty.
     pub left_out: Option<(usize, usize)>,
-    /// Root mean square of the truth: the error of no model.
+    /// What no model predicts; none without an instant.
+    pub no_model: Option<f64>,
+    /// Whether that is zero or a mean.
+    #[serde(skip)]
+    pub no_model_is: NoModel,
+    /// Root mean square of the truth less that: the error of no model.
     pub baseline_zero: Option<f64>,
     /// The error of the truth at the smallest lag that sees nothing of the answer.
     pub baseline_persistence: Option<f64>,
@@ -293,6 +300,8 @@ fn column(
         })
         .collect();
     let truth = |places: &[usize]| first.truth.values[places[0]];
+    let no_model_is = first.truth.no_model;
+    let no_model = no_model_is.value(common.iter().map(|at| truth(at)));
     let mut errors: Vec<(usize, Vec<f64>)> = Vec::new();
     for (entry, of) in entries.iter().enumerate() {
         let Some(row) = rows.iter().position(|row| row.is_of(of)) else {
@@ -304,7 +313,7 @@ fn column(
             rows[row].rmse[nth] = rms(there().map(|at| value(entry, at) - truth(at)));
             rows[row].own[nth] = Some(Own {
                 n: there().count(),
-                baseline_zero: rms(there().map(|at| truth(at))),
+                baseline_zero: rms(there().map(|at| truth(at) - no_model)),
             });
             continue;
         }
@@ -354,7 +363,9 @@ fn column(
         name: channel.name.clone(),
         n: common.len(),
         left_out,
-        baseline_zero: rms(common.iter().map(|at| truth(at))),
+        no_model: (!common.is_empty()).then_some(no_model),
+        no_model_is,
+        baseline_zero: rms(common.iter().map(|at| truth(at) - no_model)),
         persistence_n: lasting.len(),
         baseline_persistence: rms(lasting.into_iter()),
         best: best.filter(|&best| rows[best].rmse[nth].is_some()),

@@ -76,7 +76,7 @@ pub struct DayScore {
     pub rmse: Option<f64>,
     /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
     pub all_others: Option<f64>,
-    /// Root mean square of the truth on the same instants: the error of no model.
+    /// The error of no model on the same instants.
     #[serde(rename = "baseline_zero")]
     pub zero: Option<f64>,
 }
@@ -237,9 +237,10 @@ pub fn days(
         let predictions = sums.iter_mut().zip(own.iter().zip(&others));
         let truths = each(of, &of.truths).zip(each(of, &days_of));
         for ((sums, (own, others)), (truth, days)) in predictions.zip(truths) {
+            let no_model = truth.no_model.value(truth.values.iter().copied());
             let errors = own.iter().zip(others).zip(&truth.values).zip(days);
             for (((own, others), y), _) in errors.filter(|(_, day)| counts(**day)) {
-                sums.add(*own, *others, *y);
+                sums.add(*own, *others, *y - no_model);
             }
         }
     };
@@ -465,6 +466,7 @@ mod tests {
         let mut trace = Trace::default();
         trace.truths.push(TruthTrace {
             slot: 0,
+            no_model: athermal_run::score::NoModel::Zero,
             times: truths.iter().map(|&(of, hour)| (of, at(hour))).collect(),
             values: vec![0.0; truths.len()],
             errors: vec![f64::NAN; truths.len()],

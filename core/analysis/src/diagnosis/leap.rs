@@ -11,7 +11,7 @@ use athermal_core::unit::Unit;
 use serde::Serialize;
 
 use super::of_truths;
-use crate::figures::number;
+use crate::figures::apart;
 
 /// So many times as large as nineteen in twenty changes is a leap. In the largest measured and simulated sets of data without one,
 /// what stands alone is at most 2.1 times as large.
@@ -67,7 +67,7 @@ impl fmt::Display for Leaps {
             KEPT => format!("{KEPT} times or more, first"),
             many => format!("{many} times, first"),
         };
-        let (from, to) = (number(self.first.from), number(self.first.to));
+        let [from, to] = apart([self.first.from, self.first.to]);
         write!(f, "leaps {times} from {from} to {to} within one sample")
     }
 }

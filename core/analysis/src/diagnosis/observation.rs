@@ -6,7 +6,7 @@ use athermal_core::time::{Duration, Instant};
 use athermal_run::fit::FitError;
 use athermal_run::model::Model;
 use athermal_run::recording::{Event, Recording};
-use athermal_run::score::{Trace, TruthTrace, trace};
+use athermal_run::score::{ScoreOptions, Trace, TruthTrace, trace_as};
 
 use super::gap::Gaps;
 
@@ -105,7 +105,11 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
             }
         }
     };
-    let trace = trace(&model.plan, &model.fitted, recording, &mut look)?;
+    let options = ScoreOptions {
+        levels: model.levels(),
+        ..ScoreOptions::default()
+    };
+    let trace = trace_as(&model.plan, &model.fitted, recording, &options, &mut look)?;
     Ok(Observation {
         trace,
         sources,

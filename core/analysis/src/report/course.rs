@@ -12,7 +12,7 @@ use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use athermal_run::model::{Model, Period};
 use athermal_run::recording::{Event, Recording, pass};
-use athermal_run::score::{PredictionTrace, Trace, TruthTrace};
+use athermal_run::score::{NoModel, PredictionTrace, Trace, TruthTrace};
 use serde::{Serialize, Serializer};
 
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
@@ -52,6 +52,9 @@ pub struct Axis {
     pub unit: String,
     /// The unit of a difference of two of its values, such as an error.
     pub error_unit: String,
+    /// What no model predicts of it.
+    #[serde(skip)]
+    pub(super) no_model: NoModel,
     /// The measured truth.
     pub truth: Series,
     /// Every prediction of it, paired as in scoring: one value per truth.
@@ -245,6 +248,7 @@ fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
             slot: truth.slot,
             unit: of.unit.to_string(),
             error_unit: of.unit.difference().to_string(),
+            no_model: truth.no_model,
             truth: Series::default(),
             voters: all().map(voter).collect(),
             main,

@@ -138,7 +138,10 @@ pub fn gather(
         &model.plan,
         &model.fitted,
         recording,
-        &ScoreOptions::default(),
+        &ScoreOptions {
+            levels: model.levels(),
+            ..ScoreOptions::default()
+        },
         &mut |_| {},
     )?;
     let observation = observe(model, recording)?;

@@ -36,7 +36,8 @@ pub fn scores(scores: &Scores, asked: &[String]) -> String {
         );
         let _ = writeln!(
             text,
-            "  no model {}, persistence {}, standard error of the truth {}",
+            "  no model{} {}, persistence {}, standard error of the truth {}",
+            first.no_model_is.remark(),
             or_dash(first.baseline_zero),
             persistence(&rows),
             or_dash(first.truth_noise)

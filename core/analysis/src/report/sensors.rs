@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
-use crate::figures::{counted, time};
+use crate::figures::{apart_by, counted, time};
 use athermal_core::compile::origins::{health_reasons, of_truths};
 use athermal_run::live::monitor::standstill;
 
@@ -202,12 +202,10 @@ impl SensorFacts {
         }
         remarks.extend(self.leaps.iter().map(Leaps::to_string));
         if let (Some((low, high)), Some((fit_low, fit_high))) = (self.range, self.exceeds) {
+            let all = [low, high, fit_low, fit_high];
+            let [low, high, fit_low, fit_high] = apart_by(all, |value| figure(Some(value)));
             remarks.push(format!(
-                "from {} to {}, far outside of what the fit saw, {} to {}",
-                figure(Some(low)),
-                figure(Some(high)),
-                figure(Some(fit_low)),
-                figure(Some(fit_high))
+                "from {low} to {high}, far outside of what the fit saw, {fit_low} to {fit_high}"
             ));
         }
         let faults = self

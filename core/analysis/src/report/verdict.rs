@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use athermal_run::score::Score;
+use athermal_run::score::{NoModel, Score};
 use serde::Serialize;
 
 use super::{Axis, Worth, figure, rms};
+use crate::figures::apart_by;
 
 /// The share of predictions from which on those that lack are not spoken of; the first windows of a recording are among them.
 const NEARLY_ALWAYS: f64 = 0.95;
@@ -24,13 +25,18 @@ pub struct Verdict {
     pub(super) called: String,
     /// The unit.
     pub unit: String,
-    /// Whether the truth is a point on a scale, such as a temperature in °C, where no model means nothing.
+    /// Whether the truth is a level whose zero is arbitrary, such as a position or a temperature in °C: no model is its mean.
     pub on_scale: bool,
     /// Error of the prediction on the instants on which it is scored, or, where these leave many out, wherever there is one; none
     /// where it gave nothing.
     #[serde(rename = "rmse")]
     pub error: Option<f64>,
-    /// The drift itself on the same instants: the error of no model.
+    /// What no model predicts: zero, or of a level its mean over the fit.
+    pub no_model: Option<f64>,
+    /// Which of these it is.
+    #[serde(skip)]
+    pub(super) no_model_is: NoModel,
+    /// The truth less that on the same instants: the error of no model.
     pub baseline_zero: Option<f64>,
     /// Whether the drift was measured at any instant.
     pub measured: bool,
@@ -62,7 +68,13 @@ impl Verdict {
         // As the table of scores has it, unless it hides much of what happened where other predictions have no value.
         let scored = score.filter(|score| !score.leaves_many_out());
         let scored = scored.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
-        let own = || rms(both().map(|(_, e)| *e)).zip(rms(both().map(|(y, _)| *y)));
+        let of_scores = score.and_then(|score| score.no_model);
+        let no_model_is = axis.no_model;
+        let no_model = no_model_is.value(both().map(|(y, _)| *y));
+        let own = || {
+            let departures = both().map(|(y, _)| *y - no_model);
+            rms(both().map(|(_, e)| *e)).zip(rms(departures))
+        };
         let figures = scored.or_else(own);
         let measured = axis.truth.value.iter().filter(|y| !y.is_nan()).count();
         let corrected = worth.and_then(|worth| {
@@ -80,7 +92,9 @@ impl Verdict {
             prediction: put_out.prediction.clone(),
             called: put_out.called.clone(),
             unit: axis.error_unit.clone(),
-            on_scale: axis.error_unit != axis.unit,
+            on_scale: no_model_is != NoModel::Zero,
+            no_model: figures.and(scored.and(of_scores).or(Some(no_model))),
+            no_model_is,
             error: figures.map(|of| of.0),
             baseline_zero: figures.map(|of| of.1),
             measured: measured > 0,
@@ -115,24 +129,20 @@ impl Verdict {
         };
         let less = |with: f64, without: f64| 100.0 * (1.0 - with / without);
         let (node, unit) = (&self.called, &self.unit);
-        let left = figure(Some(error));
-        let mut text = if self.on_scale {
-            format!("{node} predicts it to {left} {unit} RMS")
+        let [left, all] = apart_by([error, no_model], |value| figure(Some(value)));
+        let worth = if error < no_model {
+            format!("{:.0} % less than no model", less(error, no_model))
         } else {
-            let all = figure(Some(no_model));
-            let worth = if error < no_model {
-                format!("{:.0} % less than no model", less(error, no_model))
-            } else {
-                "worse than no model".to_owned()
-            };
-            // A rate is a drift; what else there is has no name of its own.
-            let drift = if unit.contains('/') {
-                "the drift of "
-            } else {
-                ""
-            };
-            format!("{node} predicts {drift}{all} {unit} RMS to {left}, {worth}")
+            "worse than no model".to_owned()
         };
+        // A rate is a drift; what else there is has no name of its own.
+        let drift = match self.no_model_is {
+            NoModel::MeanOfFit(_) => "the departure from the mean of the fit of ",
+            NoModel::Mean => "the departure from the mean of ",
+            NoModel::Zero if unit.contains('/') => "the drift of ",
+            NoModel::Zero => "",
+        };
+        let mut text = format!("{node} predicts {drift}{all} {unit} RMS to {left}, {worth}");
         if self.valid < NEARLY_ALWAYS {
             let none = 100.0 * (1.0 - self.valid);
             let _ = write!(text, ", and gives no prediction {none:.0} % of the time");
@@ -145,12 +155,8 @@ impl Verdict {
             );
         }
         if let (Some(without), Some(with)) = (self.without_correction, self.with_correction) {
-            let _ = write!(
-                text,
-                "; corrected, {} of {} remain",
-                figure(Some(with)),
-                figure(Some(without))
-            );
+            let [remain, of] = apart_by([with, without], |value| figure(Some(value)));
+            let _ = write!(text, "; corrected, {remain} of {of} remain");
             let _ = if with < without {
                 write!(text, ", {:.0} % less", less(with, without))
             } else {
@@ -175,6 +181,8 @@ mod tests {
             called: "vote".into(),
             unit: "nm/min".into(),
             on_scale: false,
+            no_model: Some(0.0),
+            no_model_is: NoModel::Zero,
             error: Some(20.0),
             baseline_zero: Some(50.0),
             measured: true,
@@ -203,11 +211,10 @@ mod tests {
                     .ends_with("61.0 of 60.0 remain: worse than without.")
         );
         (verdict.on_scale, verdict.unit) = (true, "K".into());
-        assert!(
-            verdict
-                .sentence()
-                .starts_with("vote predicts it to 20.0 K RMS, and gives")
-        );
+        verdict.no_model_is = NoModel::MeanOfFit(21.0);
+        let sentence = verdict.sentence();
+        let of_level = "vote predicts the departure from the mean of the fit of 50.0 K RMS to 20.0, 60 % less than no model, and gives";
+        assert!(sentence.starts_with(of_level), "{sentence}");
         verdict.error = None;
         assert_eq!(verdict.sentence(), "vote gave no prediction on these data.");
         verdict.measured = false;

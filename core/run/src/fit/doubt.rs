@@ -132,6 +132,10 @@ fn looks_back(predictor: &dyn Predictor) -> bool {
     })
 }
 
+/// The note of a model that has no regressor left, and yet predicts no constant.
+pub(super) const FROM_PAST_ALONE: &str =
+    "no regressor is left, so it predicts from the past of the truth alone";
+
 /// The truths of the complete rows.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Truths {
@@ -168,7 +172,7 @@ impl Truths {
         if asked_for > 0 && predictor.uses().is_empty() {
             report.figure("regressors_left", 0_usize);
             let note = if learns && looks_back(predictor) {
-                "no regressor is left, so it predicts from the past of the truth alone"
+                FROM_PAST_ALONE
             } else {
                 "no regressor is left to predict from"
             };

@@ -11,6 +11,7 @@ use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
 use crate::engine::{Engine, Fitted, When, naming_one};
 use crate::recording::{Event, Passed, Recording, pass};
+use crate::score::Means;
 
 /// A fit under way.
 pub(super) struct Fitting<'a> {
@@ -147,8 +148,13 @@ impl<'a> Fitting<'a> {
     pub(super) fn run(mut self) -> Result<(Fitted, FitReport), FitError> {
         if self.levels.is_empty() {
             let mut engine = Engine::new(Arc::clone(self.plan), &Fitted::new())?;
-            let passed = pass(&mut engine, self.recording, |_, _, _| {})?;
-            self.note(&engine, passed);
+            let mut means = Means::new(self.plan);
+            let passed = pass(&mut engine, self.recording, |engine, event, _| {
+                if matches!(event, Event::Row(_)) {
+                    means.look(|slot| engine.value(slot));
+                }
+            })?;
+            self.note(&engine, passed, &means);
             return Ok((Fitted::new(), self.report));
         }
         let top = self.levels.len() - 1;
@@ -304,6 +310,7 @@ impl<'a> Fitting<'a> {
             report(*stepped);
             let (truths, counted) = (&self.truths, &mut self.counted);
             *counted = Counted::default();
+            let mut means = Means::new(self.plan);
             let passed = pass(&mut engine, self.recording, |engine, event, _| {
                 collector.look(
                     engine,
@@ -312,6 +319,7 @@ impl<'a> Fitting<'a> {
                     live.as_deref_mut().map(Vec::as_mut_slice),
                 );
                 if matches!(event, Event::Row(_)) {
+                    means.look(|slot| engine.value(slot));
                     let came = |&slot: &usize| !engine.value(slot).is_nan();
                     counted.tick(truths.iter().any(came));
                     *stepped += 1;
@@ -320,18 +328,19 @@ impl<'a> Fitting<'a> {
                     }
                 }
             })?;
-            self.note(&engine, passed);
+            self.note(&engine, passed, &means);
         }
         Ok(())
     }
 
-    fn note(&mut self, engine: &Engine, passed: Passed) {
+    fn note(&mut self, engine: &Engine, passed: Passed, means: &Means) {
         self.report.ticks = passed.ticks;
         self.report.segments = passed.segments;
         self.report.period = passed.period;
         self.report.refused = engine.refused();
         self.report.rejected = engine.rejected_channels();
         self.report.ranges = engine.sample_ranges();
+        self.report.levels = means.levels(self.plan);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Decides how the estimators of a plan are trained on a recording: which rows they see, in which passes; not how an
 //! estimator learns.
 
+mod bare;
 mod between;
 mod candidates;
 mod collect;
@@ -12,6 +13,7 @@ mod train;
 
 use std::sync::Arc;
 
+pub use bare::BareOutput;
 pub use progress::FitProgress;
 pub use report::{Dropped, EstimatorFit, FitError, FitReport, Outcome};
 

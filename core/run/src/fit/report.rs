@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::engine::{EngineError, SampleRange};
 use crate::node::{TrainingError, TrainingReport};
 use crate::recording::SourceError;
+use crate::score::Levels;
 use crate::time::Instant;
 
 /// Why a fit could not be run.
@@ -62,6 +63,8 @@ pub struct FitReport {
     pub rejected: Vec<(String, u64)>,
     /// Between which values the samples of each measured channel lay.
     pub ranges: Vec<SampleRange>,
+    /// The means of truths that are levels.
+    pub levels: Levels,
     /// How the fit of each estimator, and of each feature that is fitted, went; in the order of the plan.
     pub estimators: Vec<EstimatorFit>,
 }

@@ -1,5 +1,6 @@
 //! A model's card: where it comes from, and how its fit went.
 
+use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
 use std::hash::Hasher as _;
 use std::io::{self, BufRead as _, BufReader};
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::engine::{Fnv1a, SampleRange};
 use crate::fit::{Dropped, EstimatorFit, FitReport, Outcome};
 use crate::node::TrainingReport;
+use crate::score::Levels;
 
 /// Where a model comes from and how its fit went.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -29,6 +31,9 @@ pub struct Card {
     /// Between which values the samples of each measured channel lay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ranges: Vec<SampleRange>,
+    /// The means of truths that are levels, such as positions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub levels: Levels,
     /// How the fit of each estimator went.
     pub estimators: Vec<EstimatorCard>,
 }
@@ -149,6 +154,7 @@ impl Card {
             }),
             ticks: report.ticks,
             ranges: report.ranges.clone(),
+            levels: report.levels.clone(),
             estimators,
         }
     }

@@ -14,6 +14,7 @@ use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, Fitted, SampleRange, When, naming_one};
 use crate::node::{Mistake, Predictor};
+use crate::score::Levels;
 
 /// The format that this version writes.
 pub(super) const FORMAT: u64 = 1;
@@ -270,6 +271,13 @@ impl Model {
     #[must_use]
     pub fn sample_ranges(&self) -> &[SampleRange] {
         self.card.as_ref().map_or(&[], |card| &card.ranges)
+    }
+
+    /// The means of levels over the fit, as far as the card knows.
+    #[must_use]
+    pub fn levels(&self) -> Levels {
+        let card = self.card.as_ref();
+        card.map_or_else(Levels::new, |card| card.levels.clone())
     }
 
     /// The nodes that need a fit and have none.

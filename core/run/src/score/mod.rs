@@ -2,6 +2,7 @@
 
 mod evidence;
 mod interval;
+mod no_model;
 mod table;
 mod trace;
 mod unscored;
@@ -12,6 +13,8 @@ use std::sync::Arc;
 pub use crate::engine::Mode;
 pub use evidence::Lack;
 pub use interval::IntervalScore;
+pub(crate) use no_model::Means;
+pub use no_model::{Levels, NoModel, is_level};
 pub use table::{RESTRICTS, Score, Scores, hide_much, if_few};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
 pub use unscored::Unscored;
@@ -34,6 +37,8 @@ pub struct ScoreOptions {
     pub frozen: bool,
     /// From which past truths predictions are made.
     pub mode: Mode,
+    /// The means of levels over the fit, which no model predicts of them.
+    pub levels: Levels,
 }
 
 /// Steps a plan over a recording, cold, and scores every prediction in it.

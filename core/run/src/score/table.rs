@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::watch::{Truth, Watch};
-use super::{IntervalScore, Lack, Mode, ScoreOptions, Unscored};
+use super::{IntervalScore, Lack, Mode, NoModel, ScoreOptions, Unscored};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedNode};
 use crate::engine::{Engine, SampleRange};
@@ -58,7 +58,7 @@ pub struct Score {
     pub n: usize,
     /// Root mean square error.
     pub rmse: Option<f64>,
-    /// 1 − SSE / Σ y².
+    /// 1 − SSE / Σ (y − b)², b being what no model predicts.
     pub r2_zero: Option<f64>,
     /// 1 − SSE / Σ (y − ȳ)².
     pub r2_mean: Option<f64>,
@@ -70,7 +70,12 @@ pub struct Score {
     pub max_abs: Option<f64>,
     /// Share of the instants with a truth within the limit at which there is a prediction.
     pub valid: Option<f64>,
-    /// Root mean square of the truth on the same instants: the error of predicting zero.
+    /// What no model predicts: zero, or of a level its mean over the fit, or over these instants where that is not known.
+    pub no_model: Option<f64>,
+    /// Which of these it is.
+    #[serde(skip)]
+    pub no_model_is: NoModel,
+    /// Root mean square of the truth less that on the same instants: the error of no model.
     pub baseline_zero: Option<f64>,
     /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
     /// many steps back, on those of the same instants at which there is such a truth; none in a free run, which would repeat the
@@ -116,7 +121,7 @@ impl Score {
         if_few(self.persistence_n, self.n)
     }
 
-    /// Whether the prediction is worse than predicting zero.
+    /// Whether the prediction is worse than no model.
     #[must_use]
     pub fn is_worse_than_nothing(&self) -> bool {
         matches!((self.rmse, self.baseline_zero), (Some(rmse), Some(zero)) if rmse > zero)
@@ -199,6 +204,7 @@ fn scores(
     earlier: &[Option<Duration>],
 ) -> Vec<Score> {
     let of = &plan.channels[truth.slot];
+    let no_model_is = NoModel::of(plan, truth.slot, &options.levels);
     let there: Vec<usize> = truth
         .predictions
         .iter()
@@ -254,7 +260,9 @@ fn scores(
             let about_mean =
                 about_mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
             let squared: f64 = errors().map(|e| e * e).sum();
-            let about_zero: f64 = truths().map(|y| y * y).sum();
+            let no_model = no_model_is.value(truths());
+            let departures = || truths().map(|y| y - no_model);
+            let about_no_model: f64 = departures().map(|y| y * y).sum();
             let share = |of: f64| (of > 0.0).then(|| 1.0 - squared / of);
             Score {
                 output: plan.channels[prediction.slot].name.clone(),
@@ -266,7 +274,7 @@ fn scores(
                 horizon_s: earlier[prediction.node].map(|more| (prediction.ahead + more).secs()),
                 n,
                 rmse: root_mean_square(errors()),
-                r2_zero: share(about_zero),
+                r2_zero: share(about_no_model),
                 r2_mean: about_mean.and_then(share),
                 fit: about_mean
                     .filter(|&of| of > 0.0)
@@ -274,7 +282,9 @@ fn scores(
                 bias: self::mean(errors()),
                 max_abs: errors().map(f64::abs).reduce(f64::max),
                 valid: (!counted.is_empty()).then(|| valid(nth)),
-                baseline_zero: root_mean_square(truths()),
+                no_model: (n > 0).then_some(no_model),
+                no_model_is,
+                baseline_zero: root_mean_square(departures()),
                 persistence_n: lasting.len(),
                 baseline_persistence: root_mean_square(lasting.into_iter()),
                 truth_noise: root_mean_square(
@@ -296,7 +306,7 @@ fn scores(
         .collect()
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut n) = (0.0, 0_usize);
     for value in values {
         sum += value;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Lack, Mode, ScoreOptions, Watch, evidence};
+use super::{Lack, Mode, NoModel, ScoreOptions, Watch, evidence};
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted, SampleRange};
 use crate::fit::FitError;
@@ -32,6 +32,8 @@ pub struct Trace {
 pub struct TruthTrace {
     /// Its slot.
     pub slot: usize,
+    /// What no model predicts of it.
+    pub no_model: NoModel,
     /// The segment of the recording, counted from 0, and the instant.
     pub times: Vec<(u32, Instant)>,
     /// The truth.
@@ -107,6 +109,7 @@ pub fn trace_as(
     let truths = watch.truths.into_iter().zip(times);
     let truths = truths.map(|(truth, times)| TruthTrace {
         slot: truth.slot,
+        no_model: NoModel::of(plan, truth.slot, &options.levels),
         times,
         values: truth.values,
         errors: truth.errors,

@@ -30,11 +30,12 @@ pub(super) fn scores(scores: &[Score]) -> String {
             .map_or("–".to_owned(), |valid| format!("{:.1} %", 100.0 * valid));
         let _ = write!(
             rows,
-            "<tr><td>{}</td><td>{}</td><td{worse}>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{valid}</td><td>{}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td{worse}>{}</td><td>{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{valid}</td><td>{}</td></tr>",
             escaped(&score.output),
             escaped(&score.unit),
             figure(score.rmse),
             figure(score.baseline_zero),
+            score.no_model_is.remark(),
             persistence(score),
             figure(score.truth_noise),
             figure(score.r2_zero),

@@ -7,10 +7,14 @@ use std::time::SystemTime;
 
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::document::{self, Disk, FileReader};
-use crate::model::named_model;
+use crate::model::{content_of, named_model};
 
-/// When a file was written, and how long it is; none where there is no file.
-type Written = Option<(SystemTime, u64)>;
+/// When a file was written, and its content: files that are placed by link, or made to be reproduced, may share time and length. None
+/// where there is no file.
+type Written = Option<(SystemTime, u64, Option<String>)>;
+
+/// Files of more bytes are known by their times and lengths alone.
+const READ: u64 = 64 << 20;
 
 /// Where a file went.
 pub(super) enum Went {
@@ -160,7 +164,9 @@ impl FileReader for Noting {
 
 fn written(path: &Path) -> Written {
     let facts = std::fs::metadata(path).ok()?;
-    Some((facts.modified().ok()?, facts.len()))
+    let content = (facts.len() <= READ).then(|| content_of(path).ok());
+    let content = content.flatten().map(|(_, hash)| hash);
+    Some((facts.modified().ok()?, facts.len(), content))
 }
 
 #[cfg(test)]
@@ -181,6 +187,24 @@ mod tests {
         assert!(watched.changed());
         std::fs::remove_file(&path).unwrap();
         assert!(!watched.changed());
+    }
+
+    #[test]
+    fn a_file_of_the_same_time_and_length_has_changed_if_its_content_has() {
+        let name = format!("athermal-watched-twin-{}.toml", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let write = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            let file = std::fs::File::options().write(true).open(&path).unwrap();
+            file.set_modified(SystemTime::UNIX_EPOCH).unwrap();
+        };
+        write("schema = 1\nname = \"a\"\n");
+        let mut watched = WatchedGraph::of(&path);
+        assert!(!watched.changed() && !watched.changed());
+        write("schema = 1\nname = \"b\"\n");
+        assert!(!watched.changed(), "it may be half of it");
+        assert!(watched.changed());
+        std::fs::remove_file(&path).unwrap();
     }
 
     #[test]
