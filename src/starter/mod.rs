@@ -22,7 +22,7 @@ use std::path::Path;
 
 use athermal::core::document::TableFormat;
 use athermal::core::time::TimeFormat;
-use athermal::files::{Description, FileError, TimeForm};
+use athermal::files::{Description, FileError, Format, TimeForm};
 
 use column::Column;
 use serde_json::Value;
@@ -73,9 +73,19 @@ impl From<FileError> for NoStarter {
 /// # Errors
 /// When the file cannot be read, or nothing in it drifts with something that could explain it.
 pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
-    let described = Description::of(path, 500)?;
-    if let Some(long) = described.long_format() {
-        return Err(NoStarter::Unfit(long.to_string()));
+    let mut described = Description::of(path, 500)?;
+    let long = described.long_format();
+    if long.is_some() && described.format != Format::Csv {
+        return Err(NoStarter::Unfit(
+            long.map_or_else(String::new, |long| long.to_string()),
+        ));
+    }
+    if described
+        .columns
+        .iter()
+        .any(|name| name == "Name[2]" || name == "SymbolName[2]")
+    {
+        return Err(NoStarter::Unfit(TIME_BESIDE_EACH.to_owned()));
     }
     if described.lacks_names() {
         return Err(NoStarter::Unfit(format!(
@@ -92,22 +102,43 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
         .map_err(NoStarter::Unfit)?;
     let clock = undecided::decided(path, clock)?;
     remarks.push(clock.remark());
+    let decimal = described.decimal(clock.columns.names());
+    let is_long = long.is_some();
+    if let Some(long) = long {
+        described = described.of_long(path, &long, clock.columns.names())?;
+        remarks.push(format!(
+            "a long layout: `{}` says of each row what its `{}` is; there are {} names",
+            long.names,
+            long.values,
+            described.columns.len() - clock.columns.names().len()
+        ));
+    }
     let mut columns = column::columns(&described, clock.columns.names());
     if let Some(why) = dropped::newest_first(&described, &clock) {
         return Err(NoStarter::Unfit(why));
     }
-    let own_times = own_times::refusal(&described, &clock).filter(|_| request.time.is_none());
+    let own_times =
+        own_times::refusal(&described, &clock).filter(|_| request.time.is_none() && !is_long);
     if let Some(why) = own_times {
         return Err(NoStarter::Unfit(why));
     }
     let mut table = TableFormat {
-        decimal: described.decimal(clock.columns.names()),
+        decimal,
         ..described.table.clone()
     };
     let mut survey = Survey::of(path, &clock, &table, &columns)?;
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
-    let dropped = survey.dropped.clone();
+    let mut dropped = survey.dropped.clone();
+    if !dropped.is_empty() && described.format == Format::Csv && !is_long {
+        let again = described.next_names(path, clock.columns.names())?;
+        dropped.extend(again.map(|(line, names)| {
+            format!(
+                "at line {line} another table begins, with the columns {}: give each table as a file of its own",
+                names.join(", ")
+            )
+        }));
+    }
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
@@ -130,6 +161,10 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
         columns: columns_taken,
     })
 }
+
+/// What to do with an export of TwinCAT Scope and the like.
+const TIME_BESIDE_EACH: &str = "each column has a time of its own beside it, under the name of an attribute, as TwinCAT Scope exports \
+     them; export it with one time for all columns";
 
 /// Why a log has too few rows.
 fn too_few(described: &Description) -> Option<String> {

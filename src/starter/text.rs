@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use athermal::core::document::{DecimalMark, TableFormat};
+use athermal::core::document::{Arrangement, DecimalMark, TableFormat};
 use athermal::core::unit::Unit;
 
 use super::clock::Clock;
@@ -491,6 +491,12 @@ fn lay_out(table: &TableFormat, text: &mut String) {
         DecimalMark::Point => toml_string("."),
     });
     key("decimal", decimal, "the decimal mark of values");
+    let arrangement = (table.layout == Arrangement::Long).then(|| toml_string("long"));
+    key("layout", arrangement, "a row for each value");
+    let name = table.name.as_deref().map(toml_string);
+    key("name", name, "the column that says what a row is of");
+    let value = table.value.as_deref().map(toml_string);
+    key("value", value, "the column of its value");
     let encoding = table.encoding.map(|of| toml_string(of.name()));
     key("encoding", encoding, "how bytes become text");
     let rows = |rows: Option<u32>| rows.map(|rows| rows.to_string());

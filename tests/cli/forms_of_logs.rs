@@ -352,3 +352,42 @@ fn what_is_packed_is_read_and_what_is_no_table_is_named() {
         finished.tells(&[words]);
     }
 }
+
+#[test]
+fn a_long_layout_is_read_one_entity_after_the_other() {
+    let folder = "long-format-one-entity-after-the-other";
+    for (file, name, value) in [
+        ("history", "entity_id", "state"),
+        ("annotated", "_field", "_value"),
+    ] {
+        let Some(long) = started(&format!("{folder}/{file}.csv")) else {
+            return;
+        };
+        for (key, column) in [("layout", "long"), ("name", name), ("value", value)] {
+            let line = format!("{key} = \"{column}\"");
+            assert!(long.graph.contains(&line), "{}", long.graph);
+        }
+        assert_eq!(long.window_s(), 300.0);
+        let r2 = long.score("thermal", "r2_zero");
+        assert!((0.91..0.94).contains(&r2), "{r2}");
+    }
+}
+
+#[test]
+fn a_second_table_with_other_columns_is_named() {
+    refused(
+        "long-format-one-entity-after-the-other/two-tables.csv",
+        &["at line 729 another table begins, with the columns", "z_um"],
+    );
+}
+
+#[test]
+fn a_time_beside_each_channel_is_refused_with_a_way_out() {
+    refused(
+        "a-time-beside-each-channel/scope.csv",
+        &[
+            "each column has a time of its own",
+            "export it with one time for all columns",
+        ],
+    );
+}

@@ -355,7 +355,7 @@ fn cells_that_stand_for_no_value_do_not_cost_the_column() {
 }
 
 #[test]
-fn a_log_in_long_format_that_is_sorted_by_names_is_seen_too() {
+fn a_log_in_long_format_that_is_sorted_by_names_is_read() {
     let folder = Folder::new("tells-long");
     let mut text = "VarName;TimeString;VarValue\n".to_owned();
     for name in ["plate_degC", "Z_um"] {
@@ -370,11 +370,9 @@ fn a_log_in_long_format_that_is_sorted_by_names_is_seen_too() {
             );
         }
     }
-    let (fine, told, _) = init(&folder, "long.csv", &text);
-    assert!(
-        !fine && told.contains("the log is in long format"),
-        "{told}"
-    );
+    let (fine, told, graph) = init(&folder, "long.csv", &text);
+    assert!(fine && told.contains("a long layout"), "{told}");
+    assert!(graph.contains("name = \"VarName\""), "{graph}");
 }
 
 #[test]

@@ -413,18 +413,24 @@ fn a_log_as_a_controller_exports_it_is_read_by_its_graph_as_it_is() {
 }
 
 #[test]
-fn a_log_in_long_format_is_told_to_be_that() {
+fn a_log_in_long_format_gives_a_graph_that_reads_it() {
     let folder = Folder::new("starter-long");
-    let rows = (0..50).map(|second| format!("{second},plate_degC,21.5\n{second},Z_nm,{second}\n"));
-    let log = "time,tag,value\n".to_owned() + &rows.collect::<String>();
-    let (fine, told) = folder.init("log.csv", &log);
-    assert!(!fine);
+    let row = |second: u32| {
+        let wave = (f64::from(second) / 40.0).sin();
+        format!(
+            "{second},plate_degC,{:.3}\n{second},Z_nm,{:.2}\n",
+            21.5 + wave,
+            80.0 * wave
+        )
+    };
+    let log = "time,tag,value\n".to_owned() + &(0..500).map(row).collect::<String>();
+    let told = folder.started("log.csv", &log);
     assert!(
-        told.starts_with(
-            "error: log.csv: the log is in long format: `tag` says of each row what its `value` is"
-        ),
+        told.contains("a long layout: `tag` says of each row what its `value` is"),
         "{told}"
     );
+    let graph = folder.graph("log.csv");
+    assert!(graph.contains("layout = \"long\""), "{graph}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! CSV as rows of cells: header, quoting, ragged and cut-off rows. Not what a cell means.
 
+use std::path::Path;
+
 use athermal_core::document::{Encoding, TableFormat};
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
@@ -10,7 +12,8 @@ use crate::detect::{self, Head, LongFormat, are_units, is_of_processing};
 use crate::error::excerpt;
 use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
-use crate::{FileError, Layout, Place};
+use crate::runs::{Merge, Stamp};
+use crate::{FileError, Layout, Place, TimeColumn};
 
 /// The rows of a CSV file.
 pub(crate) struct CsvRows {
@@ -84,6 +87,26 @@ impl CsvRows {
             Some(long) => Err(FileError::LongFormat { place, long }),
             None => Err(missing),
         }
+    }
+
+    /// Gives the rows of a file in order of time, where they are several stretches that each are so.
+    pub fn merge(&mut self, path: &Path, time: &TimeColumn, commas: bool) {
+        let places: Option<Vec<usize>> = self.columns.time.iter().copied().collect();
+        let is_text = matches!(
+            self.table.encoding,
+            None | Some(Encoding::Utf8 | Encoding::Windows1252)
+        );
+        let Some(places) = places.filter(|_| is_text && self.lines.holds_none()) else {
+            return;
+        };
+        let stamp = Stamp {
+            time: time.clone(),
+            places,
+            separator: self.head.separator,
+            commas,
+            header: self.lines.text().to_vec(),
+        };
+        self.lines.merge = Merge::of(path, self.row_line, stamp).map(Box::new);
     }
 
     fn missing(&self, lacking: Vec<&str>, names: &[String]) -> FileError {
@@ -198,6 +221,11 @@ impl CsvRows {
     /// Whether the names or the units are not in UTF-8, and were taken for Windows-1252.
     pub fn is_windows_1252(&self) -> bool {
         self.windows_1252
+    }
+
+    /// The text of a cell of the current row.
+    pub fn text(&self, column: usize) -> String {
+        columns::name(self.column(column))
     }
 
     /// The texts of the current row.

@@ -44,6 +44,7 @@ mod long;
 mod merge;
 mod reader;
 mod recording;
+mod runs;
 mod stream;
 mod unpacked;
 mod writer;

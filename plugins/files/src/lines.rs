@@ -11,6 +11,7 @@ use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::detect::begins_json_array;
+use crate::runs::Merge;
 use crate::unpacked::{NoText, Unpacked};
 use crate::{FileError, Format, Place};
 
@@ -40,6 +41,8 @@ pub(crate) struct Lines {
     pub comments_count: bool,
     /// Whether a line without an end is no row, whatever it holds.
     pub only_whole: bool,
+    /// What gives the lines from here on, in another order.
+    pub merge: Option<Box<Merge>>,
 }
 
 impl Lines {
@@ -69,6 +72,7 @@ impl Lines {
             is_cut_short: false,
             comments_count: false,
             only_whole: false,
+            merge: None,
         }
     }
 
@@ -105,6 +109,20 @@ impl Lines {
         if let Some((number, line)) = self.held.pop() {
             (self.number, self.line) = (number, line);
             return self.check_length();
+        }
+        if let Some(merge) = &mut self.merge {
+            self.line.clear();
+            let number = merge.advance(&mut self.line);
+            return match number {
+                Ok(number) => {
+                    self.number = number.unwrap_or(self.number);
+                    Ok(number.is_some())
+                }
+                Err(source) => Err(FileError::Read {
+                    place: self.place(),
+                    source: Arc::new(source),
+                }),
+            };
         }
         self.pass_over_rest()?;
         self.line.clear();
@@ -192,6 +210,11 @@ impl Lines {
                 return Ok(format);
             }
         }
+    }
+
+    /// Whether no line that was read is to come again.
+    pub fn holds_none(&self) -> bool {
+        self.held.is_empty()
     }
 
     /// Takes the current line out, with its number.

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use athermal_core::document::{DecimalMark, Encoding, Separator, TableFormat};
+use athermal_core::document::{Arrangement, DecimalMark, Encoding, Separator, TableFormat};
+use indexmap::IndexMap;
 use serde_json::{Map, Value};
 
 use crate::cell::{decimal_mark, is_number};
@@ -93,6 +94,88 @@ impl Description {
         LongFormat::of(&self.columns, &self.rows, &|_| false)
     }
 
+    /// Where the file names other columns than at its beginning, and which: it has several tables.
+    ///
+    /// # Errors
+    /// As for [`Description::of`].
+    pub fn next_names(
+        &self,
+        path: &Path,
+        time: &[String],
+    ) -> Result<Option<(u64, Vec<String>)>, FileError> {
+        let mut csv = CsvRows::headed(Lines::open(path, None)?, &self.table, None)?;
+        let mut ledger = Ledger::new(true, None);
+        while csv.advance(&mut ledger)? {
+            if time.iter().all(|name| csv.texts().contains(name)) {
+                let names: Vec<String> = csv
+                    .texts()
+                    .into_iter()
+                    .filter(|of| !of.is_empty())
+                    .collect();
+                let others = names.iter().any(|name| !self.columns.contains(name));
+                if others {
+                    return Ok(Some((csv.place().line, names)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The same file with a column for each name of its long layout, and its times alone in the rows.
+    ///
+    /// # Errors
+    /// As for [`Description::of`].
+    pub fn of_long(
+        &self,
+        path: &Path,
+        long: &LongFormat,
+        time: &[String],
+    ) -> Result<Self, FileError> {
+        let mut csv = CsvRows::headed(Lines::open(path, None)?, &self.table, None)?;
+        let place = |name: &str| csv.names().iter().position(|of| of == name);
+        let names = place(&long.names).unwrap_or_default();
+        let unit = ["unit_of_measurement", "unit", "units", "einheit"]
+            .into_iter()
+            .find_map(place);
+        let mut ledger = Ledger::new(true, None);
+        let mut entities: IndexMap<String, String> = IndexMap::new();
+        while csv.advance(&mut ledger)? && entities.len() <= MOST_NAMES {
+            let name = csv.text(names);
+            if !name.is_empty() && !entities.contains_key(&name) && name != long.names {
+                let unit = unit.map_or_else(String::new, |at| csv.text(at));
+                entities.insert(name, unit);
+            }
+        }
+        let places = time
+            .iter()
+            .map(|name| self.columns.iter().position(|of| of == name));
+        let places: Vec<usize> = places.flatten().collect();
+        let rows = self.rows.iter().map(|row| {
+            let times = places
+                .iter()
+                .map(|at| row.get(*at).cloned().unwrap_or_default());
+            times
+                .chain(entities.keys().map(|_| String::new()))
+                .collect()
+        });
+        Ok(Self {
+            format: self.format,
+            table: TableFormat {
+                layout: Arrangement::Long,
+                name: Some(long.names.clone()),
+                value: Some(long.values.clone()),
+                ..self.table.clone()
+            },
+            columns: time.iter().chain(entities.keys()).cloned().collect(),
+            units: time
+                .iter()
+                .map(|_| String::new())
+                .chain(entities.values().cloned())
+                .collect(),
+            rows: rows.collect(),
+        })
+    }
+
     /// The unit in the row below the names, without brackets; empty where there is none.
     #[must_use]
     pub fn unit(&self, column: &str) -> &str {
@@ -101,6 +184,9 @@ impl Description {
         text.map_or("", |text| units::bare(text))
     }
 }
+
+/// So many names of a long layout are looked for.
+const MOST_NAMES: usize = 1000;
 
 /// Whether the comma of a number cannot stand between thousands.
 fn is_no_thousand(number: &str) -> bool {

@@ -19,11 +19,12 @@ pub struct LongFormat {
 }
 
 /// How such columns are usually called.
-const NAMES: &str = "tag tagname name variable varname signal channel sensor parameter point item metric variable_name tag_name kanal messstelle";
-const VALUES: &str = "value val values data reading varvalue wert messwert measurement";
+const NAMES: &str = "entity_id entity _field series datapoint key sensor_id tag tagname name variable varname signal channel sensor parameter point item metric variable_name tag_name kanal messstelle";
+const VALUES: &str =
+    "state _value value val values data reading varvalue wert messwert measurement";
 
 /// A wider table is none.
-const WIDEST: usize = 8;
+const WIDEST: usize = 12;
 
 impl LongFormat {
     /// That of these columns and rows, which have wanted names in cells, or else columns that are called as in long format.
