@@ -35,7 +35,7 @@ unit = "nm/min"
 [nodes.gradients]
 type = "slope"
 inputs.signal = "temperature"
-windows = ["4min", "12min"]
+windows = ["4min", "8min", "12min"]
 
 [nodes.thermal]
 type = "linear"
@@ -109,16 +109,31 @@ fn an_offset_moves_the_times_of_one_log_and_needs_to_name_one() {
     let scratch = Scratch::new("offset");
     let graph = scratch.file("g.toml", GRAPH);
     let time = |at: i64| format!("2026-03-02T{:02}:{:02}:00Z", at / 60, at % 60);
-    let temperatures = |at: i64| {
-        let heat = |period: i64| 25.0 + 3.0 * (at as f64 / period as f64).sin();
-        format!("{},{},{},21\n", time(at), heat(40), heat(70))
+    // Temperatures that go up and down without a period.
+    let mut state = 7_u64;
+    let mut walk = || {
+        let (mut level, mut speed) = (0.0, 0.0);
+        let mut step = |_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            speed = 0.7 * speed + 0.02 * ((state >> 40) as f64 / f64::from(1 << 24) - 0.5);
+            level += speed;
+            level
+        };
+        (0..300).map(&mut step).collect::<Vec<f64>>()
     };
-    let rows: String = (0..300).map(temperatures).collect();
+    let (spindle, bed) = (walk(), walk());
+    let row = |at: usize| {
+        let (spindle, bed) = (25.0 + spindle[at], 25.0 + bed[at]);
+        format!("{},{spindle},{bed},21\n", time(at as i64))
+    };
+    let rows: String = (0..300).map(row).collect();
     let heads = "time,spindle_degC,bed_degC,room_degC\n";
     let one = scratch.file("one.csv", format!("{heads}{rows}"));
     // The position follows the first temperature, and its clock is 7 minutes ahead.
-    let position = |at: i64| format!("{},{}\n", time(at + 7), 3.0 * (at as f64 / 40.0).sin());
-    let rows: String = (0..290).map(position).collect();
+    let row = |at: usize| format!("{},{}\n", time(at as i64 + 7), 3.0 * spindle[at]);
+    let rows: String = (0..290).map(row).collect();
     let other = scratch.file("other.csv", format!("time,Z_um\n{rows}"));
     let fit = |offset: &str| {
         let output = scratch.path("m.json");
@@ -144,6 +159,36 @@ fn an_offset_moves_the_times_of_one_log_and_needs_to_name_one() {
     };
     let (moved, as_is) = (error("other.csv=-7min"), error("other.csv=0s"));
     assert!(10.0 * moved < as_is, "{moved} {as_is}");
+    let model = scratch.path("m.json");
+    let diagnosed = |offset: &str| {
+        fit(offset).ended(0);
+        let words: [&dyn AsRef<std::ffi::OsStr>; 8] = [
+            &"diagnose",
+            &model,
+            &"--format",
+            &"json",
+            &"--offset",
+            &offset,
+            &"--data",
+            &one,
+        ];
+        let mut words = words.to_vec();
+        words.push(&other);
+        athermal(&words).ended(0).json()["offsets"][0].clone()
+    };
+    let offset = diagnosed("other.csv=0s");
+    assert!(offset["is_significant"].as_bool().unwrap(), "{offset}");
+    let (found, error) = (
+        offset["offset_s"].as_f64().unwrap(),
+        offset["error_s"].as_f64().unwrap(),
+    );
+    assert!(
+        (found + 420.0).abs() <= 2.0 * error && error < 60.0,
+        "{offset}"
+    );
+    let offset = diagnosed("other.csv=-7min");
+    let left = offset["offset_s"].as_f64().unwrap() + 420.0;
+    assert!(left.abs() <= 60.0, "{offset}");
     fit("third.csv=1s")
         .ended(2)
         .tells(&["--offset third.csv", "one.csv"]);

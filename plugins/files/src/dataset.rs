@@ -1,16 +1,17 @@
 //! Files as a recording of a graph: its columns looked up, and read from the beginning as often as fitting asks for it.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
 use athermal_core::time::Duration;
 use athermal_run::recording::{self, Samples, Source, SourceError};
 
-use crate::merge::Joint;
+use crate::merge::{self, Joint};
+use crate::recording::offset_of;
 use crate::stream::next_of;
-use crate::{ChannelColumn, Layout, Options, Report, TimeColumn, TimeForm};
+use crate::{ChannelColumn, FileError, Layout, Options, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -86,6 +87,35 @@ impl Dataset {
     #[must_use]
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
+    }
+
+    /// The files of each log, where these are several that are merged; else none.
+    ///
+    /// # Errors
+    /// As for reading them.
+    pub fn loggers(&self, plan: &Plan) -> Result<Vec<Vec<PathBuf>>, FileError> {
+        let mut logs = merge::logs_of(&self.paths, &layout(plan), &self.options)?;
+        let place = |files: &Vec<PathBuf>| self.paths.iter().position(|path| files.contains(path));
+        logs.sort_by_key(place);
+        Ok(logs)
+    }
+
+    /// The same files, with a time added to those of some of them.
+    #[must_use]
+    pub fn shifted(&self, files: &[PathBuf], by: Duration) -> Self {
+        let mut options = self.options.clone();
+        let paths = self.paths.iter().map(|path| {
+            let more = if files.contains(path) { by.as_ns() } else { 0 };
+            (path.clone(), self.added_to(path).saturating_add(more))
+        });
+        options.offsets = paths.collect();
+        Self::new(self.paths.clone(), options)
+    }
+
+    /// What is added to the times of a file, in ns.
+    #[must_use]
+    pub fn added_to(&self, path: &Path) -> i64 {
+        offset_of(path, &self.options)
     }
 
     /// What was met in each file, as of the last time that all were read to their end.

@@ -284,6 +284,21 @@ fn logs(paths: &[PathBuf], layout: &Layout, options: &Options) -> Result<Vec<Log
     Ok(if apart { Vec::new() } else { logs })
 }
 
+/// The files of each log, where there are several; else none.
+pub(crate) fn logs_of(
+    paths: &[PathBuf],
+    layout: &Layout,
+    options: &Options,
+) -> Result<Vec<Vec<PathBuf>>, FileError> {
+    let logs = match paths {
+        [] | [_] => Vec::new(),
+        _ => logs(paths, layout, options)?,
+    };
+    let several = (logs.len() > 1).then_some(logs);
+    let files = several.into_iter().flatten().map(|log| log.paths);
+    Ok(files.collect())
+}
+
 /// The rows of several logs in the order of time, each file open once, with one row of each log in memory.
 ///
 /// Rows of one time are one. Where times are dates, a segment of one log is one of all. Where they are not, segments are set beside

@@ -157,7 +157,7 @@ impl Recording {
 }
 
 /// What is added to the times of a file, in ns.
-fn offset_of(path: &Path, options: &Options) -> i64 {
+pub(crate) fn offset_of(path: &Path, options: &Options) -> i64 {
     let mut offsets = options.offsets.iter();
     let of = offsets.find(|(file, _)| file == path);
     of.map_or(0, |(_, offset_ns)| *offset_ns)

@@ -1,6 +1,7 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
 mod next;
+mod offsets;
 mod tables;
 
 use std::collections::BTreeSet;
@@ -24,6 +25,7 @@ use super::model::load_fitted;
 use super::report::write_plots;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::counted;
+use offsets::{OfFile, offsets};
 use tables::Tables;
 
 /// Show why a model predicts as well as it does, and what would make it better
@@ -31,7 +33,7 @@ use tables::Tables;
 /// Shows whether what predictions leave is white (p of Ljung and Box not below 0.01), and which features explain the truth or
 /// the rest, at which lag. Shows how each estimator answers a change of each sensor, how well the data determine it, and what
 /// each sensor contributes. Fits of its own on the data show how well each day is predicted from the others, and how many
-/// days are needed. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all
+/// days are needed, and of several loggers how much their clocks differ. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all
 /// of them are.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -61,7 +63,7 @@ pub struct Diagnose {
         conflicts_with = "no_fit"
     )]
     day: Duration,
-    /// Leave out what needs fits of its own: days left out, and how many are needed
+    /// Leave out what needs fits of its own: days left out, how many are needed, and how much clocks differ
     #[arg(long)]
     no_fit: bool,
     /// A folder for the pictures, each as an SVG file
@@ -99,6 +101,10 @@ impl Diagnose {
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
         drop(bar);
+        let clocks = match self.no_fit {
+            true => Vec::new(),
+            false => offsets(&model, &dataset, terminal)?,
+        };
         let tables = Tables::new(&diagnosis, &self.of);
         let trace = &observation.trace;
         let doubts = Doubts {
@@ -111,10 +117,14 @@ impl Diagnose {
         };
         if terminal.format == Format::Json {
             let mut facts = json!({ "data": self.data.names(), "diagnosis": tables.shown() });
+            if !clocks.is_empty() {
+                facts["offsets"] = clocks.iter().map(OfFile::facts).collect();
+            }
             doubts.add_to(&mut facts);
             println!("{facts:#}");
         } else {
             print!("{}", tables.text());
+            clocks.iter().for_each(|of| print!("{}", of.sentence()));
         }
         doubts.warn(terminal);
         for message in Lack::warnings(&diagnosis.lacks) {

@@ -235,6 +235,24 @@ level = "level"
     model
 }
 
+/// The words that diagnose the log of many kinds, cut into one of its temperatures and one of its truth.
+fn two_loggers(scratch: &Scratch, model: &Path) -> [std::ffi::OsString; 6] {
+    let rows = std::fs::read_to_string(scratch.path("kinds.csv")).unwrap();
+    let columns = |of: [usize; 2]| {
+        let row = |row: &str| {
+            let cells: Vec<&str> = row.split(',').collect();
+            format!("{},{}\n", cells[0], cells[of[0]..=of[1]].join(","))
+        };
+        rows.lines().map(row).collect::<String>()
+    };
+    let (one, other) = (
+        scratch.file("kinds-x.csv", columns([1, 2])),
+        scratch.file("kinds-y.csv", columns([3, 3])),
+    );
+    let words: [&dyn AsRef<OsStr>; 6] = [&"diagnose", &model, &"--merge", &"--data", &one, &other];
+    words.map(|word| word.as_ref().to_owned())
+}
+
 /// Tests of every kind of expectation, some of which do not hold.
 fn tests(scratch: &Scratch) -> PathBuf {
     let text = r#"schema = 1
@@ -320,6 +338,10 @@ wait = "wait"
         ),
         ("evaluate", json(&[&"evaluate", &of_few, &"--data", &few])),
         ("diagnose", with("diagnose", &["--window", "--day", "4h"])),
+        (
+            "diagnose",
+            json(&two_loggers(scratch, &kinds).each_ref().map(|of| of as _)),
+        ),
         ("report", with("report", &[])),
         (
             "compare",

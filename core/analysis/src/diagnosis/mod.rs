@@ -10,6 +10,7 @@ mod gap;
 pub mod lag;
 pub mod leap;
 mod observation;
+pub mod offset;
 mod plot;
 mod reach;
 pub mod regressor;

@@ -1,0 +1,78 @@
+//! How much the clocks of several loggers differ, in words and as JSON.
+
+use athermal::diagnosis::offset::{Offset, offset};
+use athermal::files::Dataset;
+use athermal::{Duration, Model};
+use serde_json::{Value, json};
+
+use crate::terminal::{Failure, Terminal};
+use athermal_analysis::figures::length;
+
+/// What is to be added to the times of a file, beside what is added already.
+pub struct OfFile {
+    file: String,
+    added: Duration,
+    found: Offset,
+}
+
+/// The offset of each logger but the first named.
+///
+/// # Errors
+/// When the data cannot be read.
+pub fn offsets(
+    model: &Model,
+    dataset: &Dataset,
+    terminal: &Terminal,
+) -> Result<Vec<OfFile>, Failure> {
+    let mut all = Vec::new();
+    for files in dataset.loggers(&model.plan)?.into_iter().skip(1) {
+        let mut bar = None;
+        let mut progress = |done: u64, total: u64| {
+            bar.get_or_insert_with(|| terminal.progress_to("comparing clocks", total))
+                .set(done);
+        };
+        let shifted = |by| dataset.shifted(&files, by);
+        let found = offset(model, &shifted, &mut progress)?;
+        drop(bar);
+        let added = |file| Duration::from_ns(dataset.added_to(file));
+        all.extend(files.iter().zip(found).map(|(file, found)| OfFile {
+            file: file.display().to_string(),
+            added: added(file),
+            found,
+        }));
+    }
+    Ok(all)
+}
+
+impl OfFile {
+    /// For programs.
+    pub fn facts(&self) -> Value {
+        json!({
+            "file": self.file,
+            "offset_s": self.added.secs() + self.found.offset_s,
+            "error_s": self.found.error_s,
+            "is_significant": self.found.is_significant,
+        })
+    }
+
+    /// For people.
+    pub fn sentence(&self) -> String {
+        let (file, found) = (&self.file, self.found);
+        let in_words = |seconds: f64| {
+            let of = Duration::from_secs_f64(seconds.abs()).unwrap_or(Duration::ZERO);
+            let sign = if seconds < 0.0 { "-" } else { "" };
+            format!("{sign}{}", length(of))
+        };
+        let Some(error) = found.error_s else {
+            return format!("clock of {file}: fits hardly change with it\n");
+        };
+        let total = in_words(self.added.secs() + found.offset_s);
+        let (found_s, error) = (in_words(found.offset_s), in_words(error));
+        match found.is_significant {
+            true => format!(
+                "clock of {file}: fits are best with {found_s} ± {error} added to its times: --offset {file}={total}\n"
+            ),
+            false => format!("clock of {file}: as that of the others ({found_s} ± {error})\n"),
+        }
+    }
+}
