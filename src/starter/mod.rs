@@ -127,8 +127,15 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
         ..described.table.clone()
     };
     let mut survey = Survey::of(path, &clock, &table, &columns)?;
+    let may_have_more = !survey.dropped.is_empty() && described.format == Format::Csv && !is_long;
+    let again = match may_have_more {
+        true => described.next_names(path, clock.columns.names())?,
+        false => None,
+    };
     let names = (&*described.columns, &*columns);
-    if let Some((in_segments, column)) = survey.by_segments(path, &clock, &table, names) {
+    if again.is_none()
+        && let Some((in_segments, column)) = survey.by_segments(path, &clock, &table, names)
+    {
         remarks.push(format!(
             "segments: the times start again where `{column}` changes, {} in all",
             in_segments.segments()
@@ -138,15 +145,12 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
     let mut dropped = survey.dropped.clone();
-    if !dropped.is_empty() && described.format == Format::Csv && !is_long {
-        let again = described.next_names(path, clock.columns.names())?;
-        dropped.extend(again.map(|(line, names)| {
-            format!(
-                "at line {line} another table begins, with the columns {}: give each table as a file of its own",
-                names.join(", ")
-            )
-        }));
-    }
+    dropped.extend(again.map(|(line, names)| {
+        format!(
+            "at line {line} another table begins, with the columns {}: give each table as a file of its own",
+            names.join(", ")
+        )
+    }));
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
