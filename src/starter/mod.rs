@@ -127,6 +127,14 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
         ..described.table.clone()
     };
     let mut survey = Survey::of(path, &clock, &table, &columns)?;
+    let names = (&*described.columns, &*columns);
+    if let Some((in_segments, column)) = survey.by_segments(path, &clock, &table, names) {
+        remarks.push(format!(
+            "segments: the times start again where `{column}` changes, {} in all",
+            in_segments.segments()
+        ));
+        (survey, table.segment) = (in_segments, Some(column));
+    }
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
     let mut dropped = survey.dropped.clone();

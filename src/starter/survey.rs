@@ -28,6 +28,10 @@ pub struct Survey {
     pub dropped: Vec<String>,
     /// Whether there are rows that only a lenient reader passes over.
     has_broken_rows: bool,
+    /// How many rows are out of order.
+    out_of_order: u64,
+    /// How many segments there are.
+    segments: u64,
 }
 
 /// The values of one column.
@@ -95,6 +99,14 @@ impl Unreadable {
     }
 }
 
+/// So many rows out of order are no slips: the times start again.
+const RESTARTED: u64 = 10;
+/// How many columns are tried for one of segments.
+const CANDIDATES: usize = 40;
+
+/// How far apart segments are laid, in s: no window bridges that.
+const APART_S: f64 = 1e9;
+
 /// A series of fewer values says nothing.
 const FEWEST_VALUES: usize = 10;
 /// A column with one unreadable cell among so many is text, one with fewer a sensor with mistakes in its log.
@@ -128,6 +140,7 @@ impl Series {
             .time_s
             .windows(2)
             .map(|pair| pair[1] - pair[0])
+            .filter(|gap| *gap < APART_S)
             .collect();
         gaps.sort_by(f64::total_cmp);
         let last = gaps.len().checked_sub(1)?;
@@ -242,11 +255,19 @@ impl Survey {
         let mut reader = Reader::open(path, layout, options)?;
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
+        let (mut segments, mut before_s, mut begins_s) = (1, 0.0, 0.0);
         while reader.next_into(&mut row)? {
+            if row.begins_segment
+                && let Some(first) = first.replace(row.time_ns)
+            {
+                let length_s = (last - first) as f64 / 1e9;
+                (segments, before_s) = (segments + 1, before_s + length_s);
+                begins_s += length_s + 2.0 * APART_S;
+            }
             let first = *first.get_or_insert(row.time_ns);
             last = row.time_ns;
             rows += 1;
-            let time_s = (row.time_ns - first) as f64 / 1e9;
+            let time_s = begins_s + (row.time_ns - first) as f64 / 1e9;
             for (series, &value) in series.iter_mut().zip(&row.values) {
                 if value.is_finite() {
                     series.time_s.push(time_s);
@@ -258,7 +279,7 @@ impl Survey {
             series.unreadable = bad.count;
             series.first_unreadable = bad.first.as_ref().and_then(Unreadable::of);
         }
-        let duration_s = first.map_or(0.0, |first| (last - first) as f64 / 1e9);
+        let duration_s = before_s + first.map_or(0.0, |first| (last - first) as f64 / 1e9);
         if rows < 2 || duration_s <= 0.0 {
             let report = reader.report();
             let first = report.refused_rows.first.as_ref();
@@ -275,7 +296,42 @@ impl Survey {
             rows,
             dropped: dropped::remarks(reader.report(), clock),
             has_broken_rows: reader.report().refused_rows.count > 0,
+            out_of_order: reader.report().refused_time.count,
+            segments,
         })
+    }
+
+    /// How many segments there are.
+    #[must_use]
+    pub fn segments(&self) -> u64 {
+        self.segments
+    }
+
+    /// The same log in segments by a column that changes just where the times start again, with that column; none where nothing does, or
+    /// the times start again nowhere.
+    pub fn by_segments(
+        &self,
+        path: &Path,
+        clock: &Clock,
+        table: &TableFormat,
+        (names, columns): (&[String], &[Column]),
+    ) -> Option<(Self, String)> {
+        if self.out_of_order < RESTARTED {
+            return None;
+        }
+        let times = clock.columns.names();
+        let names = names
+            .iter()
+            .filter(|name| !name.is_empty() && !times.contains(name));
+        let mut tried = names.take(CANDIDATES).filter_map(|name| {
+            let segment = Some(name.clone());
+            let table = TableFormat {
+                segment,
+                ..table.clone()
+            };
+            Some((Self::of(path, clock, &table, columns).ok()?, name.clone()))
+        });
+        tried.find(|(of, _)| of.out_of_order == 0 && of.segments > 1 && of.segments * 10 <= of.rows)
     }
 
     /// Whether none of these has a gap that a window of this width does not bridge.

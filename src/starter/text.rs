@@ -497,6 +497,8 @@ fn lay_out(table: &TableFormat, text: &mut String) {
     key("name", name, "the column that says what a row is of");
     let value = table.value.as_deref().map(toml_string);
     key("value", value, "the column of its value");
+    let segment = table.segment.as_deref().map(toml_string);
+    key("segment", segment, "where it changes, times start again");
     let encoding = table.encoding.map(|of| toml_string(of.name()));
     key("encoding", encoding, "how bytes become text");
     let rows = |rows: Option<u32>| rows.map(|rows| rows.to_string());

@@ -413,6 +413,31 @@ fn a_log_as_a_controller_exports_it_is_read_by_its_graph_as_it_is() {
 }
 
 #[test]
+fn times_that_start_again_where_a_column_changes_are_segments_by_it() {
+    let folder = Folder::new("starter-segments");
+    let mut log = "run,time_s,plate_degC,Z_um\n".to_owned();
+    for (nth, run) in ["A", "B", "C"].into_iter().enumerate() {
+        for row in 0..1200_u32 {
+            let wave = (f64::from(row) / 150.0 + nth as f64).sin();
+            let _ = writeln!(
+                log,
+                "{run},{},{:.3},{:.4}",
+                60 * row,
+                21.0 + wave,
+                10.0 * wave
+            );
+        }
+    }
+    let told = folder.started("days.csv", &log);
+    assert!(
+        told.contains("the times start again where `run` changes, 3 in all"),
+        "{told}"
+    );
+    assert!(!told.contains("out of order"), "{told}");
+    assert!(folder.graph("days.csv").contains("segment = \"run\""));
+}
+
+#[test]
 fn a_log_in_long_format_gives_a_graph_that_reads_it() {
     let folder = Folder::new("starter-long");
     let row = |second: u32| {

@@ -150,10 +150,9 @@ impl Reader {
         let options = Options { format, ..options };
         let table = layout.table_of(path).clone();
         let lines = Lines::open_through(path, table.encoding, through)?;
-        let goes_on = options.goes_on;
-        let mut reader = Self::from_lines(lines, layout, &table, options)?;
         // What is read once, or goes on, is read as it comes.
-        let is_whole = !goes_on && path.is_file();
+        let is_whole = !options.goes_on && path.is_file();
+        let mut reader = Self::from_lines(lines, layout, &table, options)?;
         if let (Rows::Csv(rows), true, Some(_)) = (&mut reader.rows, is_whole, &reader.reading.long)
         {
             rows.merge(
