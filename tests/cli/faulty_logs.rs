@@ -252,7 +252,7 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
         (
             "frozen.csv",
             frozen as fn(usize, &mut [f64; 3]),
-            "warning: temperature.room is 20.04 in 1,920 samples one after the other, from 57600 s to 172740 s: \
+            "warning: temperature.room is 20.036 in 1,920 samples one after the other, from 57600 s to 172740 s: \
              is the sensor stuck?",
             "That is learned too: leave these rows out",
             "Predictions from that mean little",
@@ -295,7 +295,7 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
     };
     let revived = file("revived.csv", log(revived));
     let fitted = athermal_on("fit", &graph, &revived, &[&"-o", &model]).ended(0);
-    fitted.tells(&["warning: temperature.room is 20.04 in 960 samples one after the other"]);
+    fitted.tells(&["warning: temperature.room is 20.036 in 960 samples one after the other"]);
     // That it goes on is no failure of its own.
     assert!(!fitted.told.contains("leaps"), "{}", fitted.told);
     let watched = GRAPH.replace(

@@ -79,7 +79,7 @@ pub fn is_level(plan: &Plan, slot: usize) -> bool {
     }
     let same = |text: &&str| Unit::parse(text).is_ok_and(|of| unit.measures_same(&of));
     let is_frequency = unit.text().ends_with("Hz");
-    if !(is_frequency || OF_LEVELS.iter().any(|text| same(&text))) {
+    if !(is_frequency || OF_LEVELS.iter().any(same)) {
         return false;
     }
     let Some(node) = channel.node else {
