@@ -32,6 +32,7 @@ mod named_models;
 mod not_files;
 mod nothing_to_score;
 mod orders;
+mod other_processors;
 mod plugin_crates;
 mod report;
 mod report_graphs;

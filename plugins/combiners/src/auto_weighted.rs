@@ -190,7 +190,7 @@ impl Weigher {
                 if power == 2.0 {
                     ratio
                 } else {
-                    ratio.powf(0.5 * power)
+                    libm::pow(ratio, 0.5 * power)
                 }
             }
             Weighting::AsPrinted | Weighting::AsPrintedRaw if roots > 0.0 => {

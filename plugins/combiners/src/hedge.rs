@@ -114,7 +114,7 @@ impl Hedging {
         let Losses { gap, widest, .. } = self.losses;
         match self.parameters.rate {
             Some(rate) => rate / widest,
-            None => (self.losses.sums.len() as f64).ln() / gap,
+            None => libm::log(self.losses.sums.len() as f64) / gap,
         }
     }
 
@@ -127,7 +127,7 @@ impl Hedging {
         for (voter, _) in votes.present() {
             weights[voter] = match sums[voter] - best {
                 0.0 => 1.0,
-                behind => (-rate * behind).exp(),
+                behind => libm::exp(-rate * behind),
             };
             total += weights[voter];
         }
@@ -181,9 +181,9 @@ fn mix(sums: impl Iterator<Item = f64> + Clone, rate: f64) -> f64 {
     let least = sums.clone().fold(f64::INFINITY, f64::min);
     let terms = sums.map(|sum| match sum - least {
         0.0 => 1.0,
-        behind => (-rate * behind).exp(),
+        behind => libm::exp(-rate * behind),
     });
-    least - terms.sum::<f64>().ln() / rate
+    least - libm::log(terms.sum::<f64>()) / rate
 }
 
 impl Losses {

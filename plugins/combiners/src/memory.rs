@@ -99,6 +99,6 @@ impl Fading {
 
     /// What is left of something after a time.
     pub(crate) fn left(&self, after: Duration) -> f64 {
-        (-after.secs() / self.half_life.secs()).exp2().min(1.0)
+        libm::exp2(-after.secs() / self.half_life.secs()).min(1.0)
     }
 }

@@ -208,7 +208,7 @@ impl Operator for Following {
                 Some((at, before)) => {
                     let elapsed = (tick.now - at).secs();
                     for (value, rate) in values.iter_mut().zip(&self.rates) {
-                        *value -= (-elapsed * rate).exp_m1() * (before - *value);
+                        *value -= libm::expm1(-elapsed * rate) * (before - *value);
                         if !value.is_finite() {
                             *value = input;
                         }

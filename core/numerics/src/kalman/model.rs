@@ -69,7 +69,7 @@ impl Structural {
             let returned = 2.0 * self.returning * time;
             return Gained {
                 level: if returned > 0.0 {
-                    level * -(-returned).exp_m1() / returned
+                    level * -libm::expm1(-returned) / returned
                 } else {
                     level
                 },
@@ -96,7 +96,7 @@ impl Structural {
     #[inline]
     pub(super) fn kept(&self, time: f64) -> f64 {
         if self.returning > 0.0 {
-            (-self.returning * time).exp()
+            libm::exp(-self.returning * time)
         } else {
             1.0
         }
