@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::io::Write;
 use std::process::{Command, Stdio};
-use std::time::Duration as Wait;
+use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::{LiveOptions, pair_from};
 
@@ -53,6 +53,7 @@ fn child() {
             put = happenings;
         }
     };
+    fs::write(path.join("starts"), "").unwrap();
     let names = feed(&model);
     let found = Recovered::find(&folder, &checkpoints, &model, &names, least, again);
     let recovered = found.unwrap();
@@ -136,7 +137,14 @@ fn a_service_that_is_killed_at_random_instants_puts_out_the_same_bits_once() {
             .stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         if killed < kills {
-            std::thread::sleep(Wait::from_micros(prng.between(5e3, 45e3) as u64));
+            // Three of four are killed at work, however long the start takes; the others anywhere.
+            let began = Clock::now();
+            let starts = folder.0.join("starts");
+            while killed % 4 != 0 && !starts.exists() && began.elapsed() < Wait::from_secs(10) {
+                std::thread::sleep(Wait::from_millis(1));
+            }
+            let _ = fs::remove_file(starts);
+            std::thread::sleep(Wait::from_micros(prng.between(1e3, 40e3) as u64));
             child.kill().unwrap();
             killed += 1;
             let out = fs::read_to_string(folder.0.join("out")).unwrap_or_default();
