@@ -90,6 +90,10 @@ const ANGLES: [&str; 13] = [
 ];
 const MASSES: [&str; 6] = ["mass", "weight", "wt", "masse", "gewicht", "load"];
 const ACCELERATIONS: [&str; 4] = ["acc", "accel", "acceleration", "vib"];
+/// What stands in brackets without being a unit: how a value was found among several.
+const STATISTICS: [&str; 9] = [
+    "min", "max", "avg", "mean", "std", "raw", "pv", "ist", "soll",
+];
 /// The same within a word: `Luftfeuchte`, `airhumidity`, `Luftdruck`.
 const WITHIN: [&str; 4] = ["humid", "feucht", "luftdruck", "airpressure"];
 
@@ -187,7 +191,9 @@ impl Column {
             1
         } else if self.unit == "%" {
             5
-        } else if ["A", "W", "s", "m3/s", "m/s"].into_iter().any(measures) {
+        } else if ["A", "W", "s", "m3/s", "m/s"].into_iter().any(measures)
+            || measures("Hz") && !self.unit.ends_with("Hz")
+        {
             4
         } else {
             2 + u8::from(!self.unit_known)
@@ -268,7 +274,8 @@ fn guess(name: &str, below: &str) -> Column {
     // A unit that is not known still says that it is no length.
     let is_code = |text: &str| {
         let letters = text.chars().any(char::is_alphabetic);
-        letters && text.len() <= 8 && !text.contains(char::is_whitespace)
+        let is_word = (2..=8).contains(&text.len()) && !text.contains(char::is_whitespace);
+        letters && is_word && !STATISTICS.contains(&&*text.to_lowercase())
     };
     let is_other = unit.is_none() && name.trim_end().ends_with(']') && is_code(stated);
     let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));

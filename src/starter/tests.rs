@@ -364,7 +364,7 @@ fn an_hour_of_24_is_that_of_the_next_day() {
 }
 
 #[test]
-fn the_long_layout_of_an_archive_is_named() {
+fn the_long_layout_of_an_archive_is_read() {
     let text = log("VarName;TimeString;VarValue\n", |time, plate, z| {
         let clock = format!(
             "01.03.2026 {:02}:{:02}:{:02}",
@@ -377,8 +377,12 @@ fn the_long_layout_of_an_archive_is_named() {
             .replace("01,03,", "01.03.")
     });
     let log = Log::of("archive.csv", text.as_bytes());
-    match starter(&log.0, &Request::default()) {
-        Err(NoStarter::Unfit(why)) => assert!(why.contains("`VarName`"), "{why}"),
-        other => panic!("{other:?}"),
+    let starter = starter(&log.0, &Request::default()).unwrap();
+    for declared in [
+        "layout = \"long\"",
+        "name = \"VarName\"",
+        "channels = [\"plate\"]",
+    ] {
+        assert!(starter.text.contains(declared), "{}", starter.text);
     }
 }

@@ -75,7 +75,7 @@ fn inches_and_units_behind_a_slash_are_read_where_nothing_else_can_be_meant() {
         ("Vorschub [mm/s]", "mm/s"),
         ("Kraft [N]", "N"),
         ("beat_MHz", "MHz"),
-        ("tilt_arcsec", "''"),
+        ("tilt_arcsec", "arcsec"),
         ("x [steps]", "1"),
         ("focus_steps", "1"),
         ("x [mm] (raw)", "mm"),
