@@ -68,7 +68,7 @@ fn rows() -> String {
 fn what_runs_gives_the_same_bits_on_a_processor_without_fused_multiplication() {
     let scratch = Scratch::new("other-processors");
     let graph = scratch.file("graph.toml", GRAPH);
-    let log = scratch.file("log.csv", &rows());
+    let log = scratch.file("log.csv", rows());
     let model = scratch.path("model.json");
     athermal(&[&"fit", &graph, &"--data", &log, &"-o", &model]).ended(0);
     let run = |tunables: &str| {
