@@ -91,9 +91,7 @@ const ANGLES: [&str; 13] = [
 const MASSES: [&str; 6] = ["mass", "weight", "wt", "masse", "gewicht", "load"];
 const ACCELERATIONS: [&str; 4] = ["acc", "accel", "acceleration", "vib"];
 /// What stands in brackets without being a unit: how a value was found among several.
-const STATISTICS: [&str; 9] = [
-    "min", "max", "avg", "mean", "std", "raw", "pv", "ist", "soll",
-];
+const STATISTICS: [&str; 6] = ["min", "max", "avg", "mean", "std", "raw"];
 /// The same within a word: `Luftfeuchte`, `airhumidity`, `Luftdruck`.
 const WITHIN: [&str; 4] = ["humid", "feucht", "luftdruck", "airpressure"];
 
