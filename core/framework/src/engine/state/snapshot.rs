@@ -66,7 +66,7 @@ impl Engine {
         let carried = self.adopt(state, &StateTransfer::all(&self.plan), false);
         carried.into_iter().find_map(|node| match node.outcome {
             Carry::Cold { reason } | Carry::Warmed { reason } => Some((node.node, reason)),
-            Carry::Carried | Carry::Adopted { .. } | Carry::Migrated { .. } => None,
+            Carry::Carried | Carry::Adopted { .. } => None,
         })
     }
 
@@ -158,7 +158,6 @@ impl Engine {
             let outcome = match &transfer.nodes[index] {
                 Begin::AsItWas => match restored() {
                     Restored::Accepted => Carry::Carried,
-                    Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason } => {
                         refusing[index] = true;
                         afresh(reason)
@@ -168,7 +167,6 @@ impl Engine {
                     Restored::Accepted => Carry::Adopted {
                         reason: reason.clone(),
                     },
-                    Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason: why } => afresh(format!("{reason}: {why}")),
                 },
                 Begin::Afresh { reason } => afresh(reason.clone()),

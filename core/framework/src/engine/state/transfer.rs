@@ -56,11 +56,6 @@ pub enum Carry {
         /// What changed.
         reason: String,
     },
-    /// From the old state, which was of an older form.
-    Migrated {
-        /// The name of that form.
-        from: String,
-    },
     /// Warmed by the retained past.
     Warmed {
         /// Why it could not be carried.
