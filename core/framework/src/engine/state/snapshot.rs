@@ -120,11 +120,11 @@ impl Engine {
             let states = nodes.map(|(index, (node, runner))| {
                 at_work.is(index);
                 let state = match runner {
-                    NodeRunner::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
-                    NodeRunner::Estimate { estimate, .. } => estimate
-                        .as_ref()
-                        .map(Estimate::snapshot)
-                        .unwrap_or_default(),
+                    NodeRunner::Operator(node) => NodeState::pack(node.operator.snapshot()),
+                    NodeRunner::Estimate(node) => {
+                        let estimate = node.estimate.as_ref();
+                        estimate.map(Estimate::snapshot).unwrap_or_default()
+                    }
                     NodeRunner::Vote(vote) => vote.snapshot(),
                 };
                 (node.instance(), state)
@@ -253,12 +253,12 @@ fn restored(running: &mut NodeRunner, state: Option<&NodeState>) -> Restored {
         return Restored::cold("nothing is known of it");
     };
     match running {
-        NodeRunner::Operator { operator, .. } => match state.unpack() {
-            Ok(Some(own)) => operator.restore(own),
+        NodeRunner::Operator(node) => match state.unpack() {
+            Ok(Some(own)) => node.operator.restore(own),
             Ok(None) => Restored::Accepted,
             Err(cold) => cold,
         },
-        NodeRunner::Estimate { estimate, .. } => match estimate {
+        NodeRunner::Estimate(node) => match &mut node.estimate {
             Some(estimate) => estimate.restore(state),
             None => Restored::Accepted,
         },

@@ -112,26 +112,20 @@ impl Estimate {
             Part::new(part[0].0, &places)
         });
         let parts = parts.collect();
-        let learning = match learning {
-            None => None,
-            Some(planned) => {
-                let learning = GatedLearner::new(&predictor, *planned, *truth, *training);
-                Some(
-                    learning
-                        .map(Box::new)
-                        .ok_or_else(|| EngineError::DoesNotLearn {
-                            node: node.instance(),
-                        })?,
-                )
-            }
-        };
+        let learning = learning.map(|planned| {
+            let learning = GatedLearner::new(&predictor, planned, *truth, *training);
+            learning.map(Box::new).ok_or_else(|| {
+                let node = node.instance();
+                EngineError::DoesNotLearn { node }
+            })
+        });
         Ok(Self {
             width: used.len(),
             plain: std_dev.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
-            learning,
+            learning: learning.transpose()?,
             feedback: None,
         })
     }
@@ -272,6 +266,16 @@ impl Estimate {
     /// What goes on learning.
     pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
         self.learning.as_deref_mut()
+    }
+
+    /// The segment has ended with this tick.
+    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
+        if let Some(learning) = &mut self.learning {
+            learning.segment(last, gathered, on);
+        }
+        if let Some(feedback) = &mut self.feedback {
+            feedback.segment();
+        }
     }
 
     /// What was learned since the fit.
