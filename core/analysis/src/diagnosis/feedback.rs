@@ -29,9 +29,7 @@ fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
     // A model that is only fitted on truths does not go by those of now.
     let truth = match &node.role {
         PlannedRole::Feature { .. } => None,
-        PlannedRole::Estimator {
-            truth, learning, ..
-        } => learning.as_ref().map(|_| truth),
+        PlannedRole::Estimator { fit, learning, .. } => learning.as_ref().map(|_| &fit.truth),
         PlannedRole::Combiner { truth, .. } => truth.as_ref(),
     };
     let mut read = slots(plan, node.role.gathers());

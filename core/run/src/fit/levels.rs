@@ -127,7 +127,7 @@ impl<'a> Fitting<'a> {
         let above = levels.iter().filter(|level| level.of_predictions);
         let rows = above.flat_map(|level| &level.nodes);
         let rows = rows.filter_map(|&node| plan.nodes[node].rows());
-        let truths = rows.map(|rows| rows.truth.slot).collect();
+        let truths = rows.map(|rows| rows.fit.truth.slot).collect();
         let top = levels.len().saturating_sub(1);
         let whole = &mut Planned::default();
         Self {

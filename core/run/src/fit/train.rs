@@ -110,7 +110,7 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 /// Starts the fit of one estimator, now that it is known which candidates have values, and which of them stay the same.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec<usize>) -> Making {
     let node = &plan.nodes[trainee.node];
-    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
     let learning = match &node.role {
         PlannedRole::Estimator { learning, .. } => learning.as_ref(),
         PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
@@ -178,7 +178,7 @@ pub(super) fn end(
 ) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
-    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
     let mut dropped = trainee.dropped;
     dropped.incomplete = making.incomplete;
     let has_values = trainee.validity.kept();

@@ -256,12 +256,12 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
 fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
-    if let Some((truth, training)) = node.role.learns_from() {
-        facts.plain("ahead", truth.ahead.to_string());
-        let unit = &plan.channels[truth.slot].channel.unit;
+    if let Some(fit) = node.role.fit() {
+        facts.plain("ahead", fit.truth.ahead.to_string());
+        let unit = &plan.channels[fit.truth.slot].channel.unit;
         for (path, limit, none) in [
-            ("train.abs_truth.below", training.below, f64::INFINITY),
-            ("train.abs_truth.above", training.above, 0.0),
+            ("train.abs_truth.below", fit.training.below, f64::INFINITY),
+            ("train.abs_truth.above", fit.training.above, 0.0),
         ] {
             if limit != none {
                 facts.measured(path, format!("{limit} {unit}"));
@@ -315,10 +315,10 @@ fn is_measured<'a>(schema: &'a Value, definitions: &'a Value, followed: &mut Vec
 
 fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
     let (gathers, link) = match &node.role {
-        PlannedRole::Estimator { gathers, truth, .. } => {
+        PlannedRole::Estimator { gathers, fit, .. } => {
             // The gathers after the first read the same channels at other lags, which are parameters.
             let first = gathers.first().filter(|_| reads_features(node));
-            (first.copied().into_iter().collect(), Some(*truth))
+            (first.copied().into_iter().collect(), Some(fit.truth))
         }
         role => (role.inputs().collect::<Vec<_>>(), role.truth().copied()),
     };

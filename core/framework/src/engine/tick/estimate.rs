@@ -87,10 +87,8 @@ impl Estimate {
         widths: &[usize],
     ) -> Result<Self, EngineError> {
         let PlannedRole::Estimator {
-            regressors,
+            fit,
             gathers,
-            truth,
-            training,
             learning,
             std_dev,
             ..
@@ -104,7 +102,7 @@ impl Estimate {
             .iter()
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
-        let used = places_of(node, regressors, &*predictor)?;
+        let used = places_of(node, &fit.regressors, &*predictor)?;
         let used_of_gathers: Vec<_> = used.iter().map(|&index| places[index]).collect();
         let same_gather = |one: &(usize, usize), other: &(usize, usize)| one.0 == other.0;
         let parts = used_of_gathers.chunk_by(same_gather).map(|part| {
@@ -113,7 +111,7 @@ impl Estimate {
         });
         let parts = parts.collect();
         let learning = learning.map(|planned| {
-            let learning = GatedLearner::new(&predictor, planned, *truth, *training);
+            let learning = GatedLearner::new(&predictor, planned, fit.truth, fit.training);
             learning.map(Box::new).ok_or_else(|| {
                 let node = node.instance();
                 EngineError::DoesNotLearn { node }

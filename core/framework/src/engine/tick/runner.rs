@@ -80,10 +80,7 @@ impl NodeRunner {
 /// # Errors
 /// When something fitted does not belong to the plan.
 pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
-    let learning = plan
-        .nodes
-        .iter()
-        .filter(|of| of.role.learns_from().is_some());
+    let learning = plan.nodes.iter().filter(|of| of.role.fit().is_some());
     let learning: HashSet<String> = learning.map(PlannedNode::instance).collect();
     if let Some(node) = fitted.keys().find(|name| !learning.contains(*name)) {
         return Err(EngineError::NotAnEstimator { node: node.clone() });
