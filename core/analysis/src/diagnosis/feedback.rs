@@ -12,7 +12,7 @@ use super::{slots, upstream};
 pub fn corrected_channels(plan: &Plan) -> Vec<&str> {
     let corrections = plan.nodes.iter().filter(|of| of.kind.name == "compensate");
     let rates = corrections.flat_map(|node| slots(plan, node.role.gathers()));
-    let seen = upstream(plan, rates.collect(), |node| goes_by(plan, node));
+    let seen = upstream(plan, rates, |node| goes_by(plan, node));
     let of_truths = super::of_truths(plan);
     let moved = plan.sources.iter().enumerate();
     moved

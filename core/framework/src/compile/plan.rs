@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::instance::instance_name;
+use super::origins::upstream;
 use super::persistence_lag;
 use super::provenance::smallest_lag;
-use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::{TableBase, TimeBase};
 use crate::node::{Inputs, Kind, LearningLimits, NodeSpec, Predictor, Read, Regressor, Role};
@@ -368,20 +368,9 @@ impl Plan {
         entries.map(|entry| entry.slot).chain(truth)
     }
 
-    /// These slots and every one that they depend on.
-    pub fn behind(&self, slots: impl Iterator<Item = usize>) -> SlotSet {
-        let mut behind = SlotSet::default();
-        let mut open: Vec<usize> = slots.collect();
-        let mut seen = vec![false; self.nodes.len()];
-        while let Some(slot) = open.pop() {
-            if behind.insert(slot)
-                && let Some(node) = self.channels[slot].node
-                && !std::mem::replace(&mut seen[node], true)
-            {
-                open.extend(self.reads(&self.nodes[node]));
-            }
-        }
-        behind
+    /// By slot, whether it is one of these or one that they depend on.
+    pub fn behind(&self, slots: impl IntoIterator<Item = usize>) -> Vec<bool> {
+        upstream(self, slots, |node| self.reads(node).collect())
     }
 }
 

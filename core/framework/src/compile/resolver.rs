@@ -16,7 +16,6 @@ use super::plan::{
 use super::problem;
 use super::provenance::Provenance;
 use super::scope::Scopes;
-use super::slot_set::SlotSet;
 use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place, Problem};
@@ -51,7 +50,7 @@ pub(crate) struct Resolver<'g> {
     /// Features whose leaks are looked for once all is known.
     pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
-    pub(super) read: SlotSet,
+    pub(super) read: Vec<usize>,
 }
 
 /// Features of an estimator that are still to be looked at.
@@ -84,7 +83,7 @@ impl<'g> Resolver<'g> {
             gathers: IndexSet::new(),
             nodes: Vec::new(),
             suspects: Vec::new(),
-            read: SlotSet::default(),
+            read: Vec::new(),
         }
     }
 

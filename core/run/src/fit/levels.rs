@@ -405,7 +405,7 @@ fn levels(plan: &Plan) -> Vec<Level> {
     let fitted = plan.nodes.iter().filter(|node| node.rows().is_some());
     let feeds = plan.behind(fitted.flat_map(|node| plan.reads(node)));
     for level in &mut levels {
-        let feeding = |node: &&usize| feeds.has_any(plan.nodes[**node].slots.clone());
+        let feeding = |node: &&usize| feeds[plan.nodes[**node].slots.clone()].contains(&true);
         level.feeding = level.nodes.iter().filter(feeding).copied().collect();
     }
     levels

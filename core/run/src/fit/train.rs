@@ -265,8 +265,8 @@ fn no_truth(plan: &Plan, collector: &Collector, trainee: &Trainee) -> TrainingEr
     let (slot, dropped) = (trainee.link.slot, trainee.dropped);
     let truth = plan.channels[slot].name.clone();
     let none_came = dropped.outside_limits == 0 && dropped.without_run == 0;
-    let behind = plan.behind([slot].into_iter());
-    let measured = (0..plan.channels.len()).filter(|&slot| behind.contains(slot));
+    let behind = plan.behind([slot]);
+    let measured = (0..plan.channels.len()).filter(|&slot| behind[slot]);
     let measured = measured.filter(|&slot| plan.channels[slot].node.is_none());
     let measured: Vec<usize> = measured.collect();
     let is_known = measured

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::engine_state::{NodeState, SlotState};
-use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
+use super::transfer::{Begin, Carry, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
+use crate::compile::origins::Dependents;
 use crate::engine::tick::Estimate;
 use crate::engine::tick::NodeRunner;
 use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
@@ -179,7 +180,7 @@ impl Engine {
         self.adopt_slots(state, transfer, &refusing);
         if refusing.contains(&true) {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.
-            let touched = Dependents::by(&plan, &[], |node| refusing[node]);
+            let touched = Dependents::of(&plan, &[], |node| refusing[node]);
             for (node, carry) in plan.nodes.iter().zip(&mut carried) {
                 let read = plan.reads(node).find(|&slot| touched.slots[slot]);
                 if let (Carry::Carried, Some(slot)) = (&carry.outcome, read) {
