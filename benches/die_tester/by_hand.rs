@@ -7,7 +7,6 @@ use std::collections::VecDeque;
 
 use athermal::Model;
 use athermal::core::channel::{ABSENT, COLD};
-use athermal::core::compile::PlannedRole;
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use serde_json::Value;
 
@@ -138,10 +137,10 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize, const L
         let read = |name: String| Linear::read(fit(&name), &names[..SLOPES]);
         let learner = |name: String| {
             let node = model.plan.nodes.iter().find(|node| node.instance() == name);
-            let Some(PlannedRole::Estimator { training, .. }) = node.map(|node| &node.role) else {
+            let Some(planned) = node.and_then(|node| node.role.fit()) else {
                 panic!("`{name}` is an estimator");
             };
-            Learner::read(fit(&name), training.below)
+            Learner::read(fit(&name), planned.training.below)
         };
         let of_axis = |axis: &str| NODES.map(|node| format!("{node}.{axis}"));
         let all = NAMES.iter().flat_map(|axis| of_axis(axis));

@@ -204,14 +204,10 @@ impl Drawn<'_> {
                     _ => {}
                 }
             }
-            PlannedRole::Estimator {
-                regressors, truth, ..
-            } => {
-                lines.push(format!(
-                    "from {}",
-                    counted(regressors.len() as u64, "regressor")
-                ));
-                lines.push(format!("{} ahead", length(truth.ahead)));
+            PlannedRole::Estimator { fit, .. } => {
+                let count = counted(fit.regressors.len() as u64, "regressor");
+                lines.push(format!("from {count}"));
+                lines.push(format!("{} ahead", length(fit.truth.ahead)));
             }
             PlannedRole::Combiner { voters, .. } => {
                 let voters = self.plan.gathers[*voters].entries.len();

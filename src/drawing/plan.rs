@@ -165,8 +165,9 @@ fn run(plan: &Plan, node: &PlannedNode, expand: bool) -> String {
         } => ", at every tick",
         _ => "",
     };
-    let ahead = match node.role.learns_from() {
-        Some((truth, _)) => {
+    let ahead = match node.role.fit() {
+        Some(fit) => {
+            let truth = &fit.truth;
             let truth_of = producer(&plan.channels[truth.slot].name);
             format!(", {truth_of} {} ahead", truth.ahead)
         }

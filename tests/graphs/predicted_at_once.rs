@@ -133,11 +133,12 @@ impl Benches {
 fn of_chance(instance: &str) -> Arc<dyn Predictor> {
     let plan = plan(&graph(&AXES, &KINDS, ""));
     let node = plan.nodes.iter().find(|node| node.instance() == instance);
-    let PlannedRole::Estimator { regressors, .. } = &node.unwrap().role else {
+    let PlannedRole::Estimator { fit, .. } = &node.unwrap().role else {
         panic!("all nodes are estimators");
     };
     let mut random = Prng::stream(7, instance);
-    let terms = regressors
+    let terms = fit
+        .regressors
         .iter()
         .map(|regressor| (&*regressor.name, random.normal()));
     let terms: Vec<_> = terms.collect();

@@ -191,8 +191,9 @@ fn no_sensor_feeds_two_voters_and_each_feeds_one() {
             .iter()
             .filter(|node| node.member.as_deref() == Some("Z1"))
         {
-            if let athermal::core::compile::PlannedRole::Estimator { regressors, .. } = &node.role
-                && regressors
+            if let athermal::core::compile::PlannedRole::Estimator { fit, .. } = &node.role
+                && fit
+                    .regressors
                     .iter()
                     .any(|regressor| regressor.name.contains(&name))
             {

@@ -21,7 +21,7 @@ pub enum Rule {
     LongRun,
     /// What goes on from a snapshot gives the same bits as what never stopped.
     Restores,
-    /// A snapshot of another version, kind or shape is migrated or refused with a reason.
+    /// A snapshot of another version, kind or shape is refused with a reason.
     Versions,
     /// What has never been measured is not answered, and gaps anywhere do no harm.
     Absence,
@@ -108,7 +108,7 @@ impl Rule {
             }
             Self::Versions => {
                 "name the state `kind/1`; in `restore`, answer `Restored::cold(reason)` to a state that is not `known`, or whose \
-                 lists have other lengths than this node's, and `Restored::Migrated` with its name to an older form of its own alone"
+                 lists have other lengths than this node's"
             }
             Self::Absence => {
                 "where an input is NaN, set no output or NaN, never 0. Ports that have something to say of nothing are named by \

@@ -1,20 +1,15 @@
 //! What can be wrong with a test before it is run.
 
-use crate::diagnostic::{Code, Place, Problem, code, names, nearest, problem};
+use crate::diagnostic::{Code, Place, Problem, names, nearest, problem};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
 use crate::unit::Unit;
 
-code!(
-    A070,
-    Error,
-    "nothing to run over",
-    "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
-);
-
 problem! {
     /// Nothing to run over.
     A070 NoData {}
+    error: "nothing to run over",
+    explanation: "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them.",
     message: "the test has nothing to run over",
     label: "neither `on` nor `inputs`",
     help: "name data with `on = \"FILE\"` or `on = { simulate = \"MACHINE\" }`, or make some up with `inputs`",
@@ -29,47 +24,32 @@ problem! {
     related: vec![(*inputs, "and here".to_owned())],
 }
 
-code!(
-    A071,
-    Error,
-    "nothing expected",
-    "A test without expectations, and an expectation without checks, could not fail."
-);
-
 problem! {
     /// A test or an expectation that checks nothing.
     A071 NothingExpected { what: &'static str }
+    error: "nothing expected",
+    explanation: "A test without expectations, and an expectation without checks, could not fail.",
     message: format!("{what} checks nothing"),
     label: "nothing is expected",
     help: "add what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals`, `between` or `absent`",
 }
 
-code!(
-    A072,
-    Error,
-    "two tests of one name",
-    "Each test has a name of its own, by which it is reported."
-);
-
 problem! {
     /// Two tests of the same name.
     A072 DuplicateName { name: String, first: Place }
+    error: "two tests of one name",
+    explanation: "Each test has a name of its own, by which it is reported.",
     message: format!("there are two tests named \"{name}\""),
     label: "the name is taken",
     help: "give each test a name of its own",
     related: vec![(*first, "the other is here".to_owned())],
 }
 
-code!(
-    A073,
-    Error,
-    "unknown machine",
-    "`simulate` names a machine that no linked crate brings."
-);
-
 problem! {
     /// A machine that cannot be simulated.
     A073 UnknownMachine { machine: String, known: Vec<&'static str> }
+    error: "unknown machine",
+    explanation: "`simulate` names a machine that no linked crate brings.",
     message: format!("there is no simulated machine `{machine}`"),
     label: "no such machine",
     help: match nearest(machine, known.iter().copied()) {
@@ -86,13 +66,6 @@ problem! {
     help: "leave one of these crates out of the program, or rename its machine",
 }
 
-code!(
-    A074,
-    Error,
-    "machine without the channel",
-    "The simulated machine does not measure what the graph measures."
-);
-
 problem! {
     /// A machine that lacks what the graph measures.
     A074 MachineLacks {
@@ -102,6 +75,8 @@ problem! {
         /// The file that inherits the test, where it stands in another.
         inherited_by: Option<String>,
     }
+    error: "machine without the channel",
+    explanation: "The simulated machine does not measure what the graph measures.",
     message: format!("the machine `{machine}` does not measure {}", names(channels)),
     label: "lacks a channel",
     help: {
@@ -120,31 +95,22 @@ fn without_inherited(file: &str) -> String {
     )
 }
 
-code!(
-    A075,
-    Error,
-    "unit in a test",
-    "A quantity in a test does not convert to the unit of the channel that it is about."
-);
-
 problem! {
     /// A quantity of another kind than the channel.
     A075 Units { key: &'static str, found: Unit, channel: String, expected: Unit }
+    error: "unit in a test",
+    explanation: "A quantity in a test does not convert to the unit of the channel that it is about.",
     message: format!("`{key}` is in {found} and `{channel}` needs {expected}, which do not convert"),
     label: "another unit",
     help: format!("write it in {expected}"),
 }
 
-code!(
-    A076,
-    Error,
-    "not a prediction",
-    "Errors, R² and comparisons are about predictions of a measured truth; those compared predict the same one, as far ahead."
-);
-
 problem! {
     /// A figure of predictions asked of something that is none.
     A076 NotAPrediction { key: &'static str, channel: String }
+    error: "not a prediction",
+    explanation: "Errors, R² and comparisons are about predictions of a measured truth; those compared predict the same one, as far \
+        ahead.",
     message: format!("`{key}` is about predictions, and `{channel}` is none"),
     label: "not a prediction",
     help: "`equals`, `between`, `absent`, `max_step_below`, `valid_above` and `given_above` work for every channel",
@@ -158,16 +124,11 @@ problem! {
     help: "compare with `zero`, `persistence`, or a prediction of the same truth with the same `ahead`",
 }
 
-code!(
-    A077,
-    Error,
-    "keys of a test",
-    "Keys of a test exclude one another, or one needs another."
-);
-
 problem! {
     /// Keys that exclude each other.
     A077 ExcludedKeys { key: &'static str, with: &'static str }
+    error: "keys of a test",
+    explanation: "Keys of a test exclude one another, or one needs another.",
     message: format!("`{key}` has no meaning together with `{with}`"),
     label: "too much",
     help: format!("leave out `{key}` or `{with}`"),
@@ -197,92 +158,62 @@ problem! {
     help: "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`",
 }
 
-code!(
-    A078,
-    Error,
-    "out of range in a test",
-    "A number or duration in a test is out of its range."
-);
-
 problem! {
     /// A number or duration out of its range.
     A078 Range { key: &'static str, found: String, allowed: &'static str }
+    error: "out of range in a test",
+    explanation: "A number or duration in a test is out of its range.",
     message: format!("`{key}` is {found} and must be {allowed}"),
     label: "out of range",
     help: None,
 }
 
-code!(
-    A079,
-    Error,
-    "fault that does not fit",
-    "The size of a fault does not fit its channel, or it needs one and there is no usual one."
-);
-
 problem! {
     /// A fault that does not fit its channel.
     A079 Fault { error: FaultError }
+    error: "fault that does not fit",
+    explanation: "The size of a fault does not fit its channel, or it needs one and there is no usual one.",
     message: error.to_string(),
     label: "does not fit",
     help: None,
 }
 
-code!(
-    A080,
-    Error,
-    "not measured",
-    "Only measured channels can be given measurements or faults."
-);
-
 problem! {
     /// Something measured is needed, and the reference names something computed.
     A080 NotMeasured { channel: String, known: Vec<String> }
+    error: "not measured",
+    explanation: "Only measured channels can be given measurements or faults.",
     message: format!("`{channel}` is computed, and only measured channels can be set or broken"),
     label: "not measured",
     help: format!("measured are {}", names(known)),
 }
 
-code!(
-    A081,
-    Error,
-    "channel given twice",
-    "Two inputs of a test give measurements of the same channel."
-);
-
 problem! {
     /// A channel that is given twice.
     A081 ChannelTwice { channel: String }
+    error: "channel given twice",
+    explanation: "Two inputs of a test give measurements of the same channel.",
     message: format!("the measurements of `{channel}` are given twice"),
     label: "given before",
     help: "let each channel stand once",
 }
 
-code!(
-    A082,
-    Error,
-    "sample without a unit",
-    "Samples are quantities; only `nan`, for no value, stands without a unit."
-);
-
 problem! {
     /// A bare number where a unit is needed.
     A082 BareSample { number: f64, unit: Unit }
+    error: "sample without a unit",
+    explanation: "Samples are quantities; only `nan`, for no value, stands without a unit.",
     message: format!("the number {number} needs a unit, such as \"{number} {unit}\""),
     label: "without a unit",
     help: "only `nan`, for no value, stands without a unit",
 }
 
-code!(
-    A170,
-    Error,
-    "schedule of a machine",
-    "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes. Every mistake in it is shown \
-     where it stands."
-);
-
 problem! {
     /// A schedule that cannot be read.
     A170 ScheduleUnreadable { path: String, reason: String }
+    error: "schedule of a machine",
+    explanation: "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes. Every mistake in it \
+        is shown where it stands.",
     message: format!("the schedule {path} cannot be read: {reason}"),
     label: "named here",
     help: "give the path of a schedule, which starts at the file in which it stands",

@@ -103,7 +103,7 @@ impl Combine for Weighing {
     }
 }
 
-/// The state. Give it another name, "my_node/2", when its form changes, and keep this one to migrate from.
+/// The state. Give it another name, "my_node/2", when its form changes, and keep this one to be read.
 #[derive(Debug, Serialize, Deserialize)]
 struct Errors {
     errors: Vec<f64>,

@@ -89,7 +89,7 @@ impl Operator for Averaging {
     }
 }
 
-/// The state. Give it another name, "my_node/2", when its form changes, and keep this one to migrate from.
+/// The state. Give it another name, "my_node/2", when its form changes, and keep this one to be read.
 #[derive(Debug, Serialize, Deserialize)]
 struct LastSamples {
     last: Vec<VecDeque<f64>>,

@@ -63,7 +63,6 @@ fn staged(path: &Path, staged: &Staged) -> Message {
         let (word, why) = match &node.outcome {
             Carry::Carried => continue,
             Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
-            Carry::Migrated { from } => ("goes on", format!("from a state of the form {from}")),
             Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
             Carry::Cold { reason } => ("cold", reason.clone()),
         };

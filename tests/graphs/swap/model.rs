@@ -28,13 +28,13 @@ pub fn model(text: &str, salt: &str) -> Model {
     };
     let mut fitted = BTreeMap::new();
     for node in &plan.nodes {
-        let PlannedRole::Estimator { regressors, .. } = &node.role else {
+        let PlannedRole::Estimator { fit, .. } = &node.role else {
             continue;
         };
         if !["linear", "ar", "arx"].contains(&node.kind.name) {
             continue;
         }
-        let names: Vec<_> = regressors.iter().map(|r| r.name.clone()).collect();
+        let names: Vec<_> = fit.regressors.iter().map(|r| r.name.clone()).collect();
         // Two of three regressors are used, so that some may be absent without harm.
         let number = |name: &str| {
             let hash = fnv_1a(format!("{}/{name}/{salt}", node.instance()).as_bytes());

@@ -1,4 +1,4 @@
-//! A node whose state has had three forms: the one before is migrated, the oldest is not, and both are told.
+//! A node whose state has had three forms: the one before is taken, the oldest is not, which is reported.
 
 use std::cell::Cell;
 
@@ -93,9 +93,7 @@ impl Operator for Counting {
         match state.downcast::<Second>() {
             Ok(second) => {
                 self.0 = second.count as u64;
-                Restored::Migrated {
-                    from: "test_count/2".to_owned(),
-                }
+                Restored::Accepted
             }
             Err(_) => Restored::cold("its first form did not say how many there were"),
         }
@@ -138,7 +136,7 @@ fn a_snapshot_of_the_form_before_goes_on_and_one_of_the_oldest_is_refused() {
 }
 
 #[test]
-fn a_swap_tells_what_was_migrated_and_what_begins_afresh_with_all_that_hangs_on_it() {
+fn a_swap_takes_the_form_before_and_reports_what_begins_afresh_with_all_that_hangs_on_it() {
     let graph = model(GRAPH, "0");
     let reason = "its first form did not say how many there were".to_owned();
     let behind = Carry::Adopted {
@@ -147,14 +145,7 @@ fn a_swap_tells_what_was_migrated_and_what_begins_afresh_with_all_that_hangs_on_
     // The fifth tick is the one after the swap; the retained past has four.
     for (form, outcome, after, count) in [
         (3, Carry::Carried, Carry::Carried, 5.0),
-        (
-            2,
-            Carry::Migrated {
-                from: "test_count/2".to_owned(),
-            },
-            Carry::Carried,
-            5.0,
-        ),
+        (2, Carry::Carried, Carry::Carried, 5.0),
         (1, Carry::Warmed { reason }, behind, 5.0),
     ] {
         let (mut stepper, mut control) = pair(&graph, LiveOptions::default()).unwrap();

@@ -12,7 +12,7 @@ use super::{slots, upstream};
 pub fn corrected_channels(plan: &Plan) -> Vec<&str> {
     let corrections = plan.nodes.iter().filter(|of| of.kind.name == "compensate");
     let rates = corrections.flat_map(|node| slots(plan, node.role.gathers()));
-    let seen = upstream(plan, rates.collect(), |node| goes_by(plan, node));
+    let seen = upstream(plan, rates, |node| goes_by(plan, node));
     let of_truths = super::of_truths(plan);
     let moved = plan.sources.iter().enumerate();
     moved
@@ -29,9 +29,7 @@ fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
     // A model that is only fitted on truths does not go by those of now.
     let truth = match &node.role {
         PlannedRole::Feature { .. } => None,
-        PlannedRole::Estimator {
-            truth, learning, ..
-        } => learning.as_ref().map(|_| truth),
+        PlannedRole::Estimator { fit, learning, .. } => learning.as_ref().map(|_| &fit.truth),
         PlannedRole::Combiner { truth, .. } => truth.as_ref(),
     };
     let mut read = slots(plan, node.role.gathers());

@@ -239,17 +239,14 @@ fn bound(features: &mut [FeatureLags], side: fn(&mut FeatureLags) -> &mut Correl
 fn features(plan: &Plan, truth: usize) -> Vec<usize> {
     let mut slots = Vec::new();
     for node in &plan.nodes {
-        let PlannedRole::Estimator {
-            gathers, truth: of, ..
-        } = &node.role
-        else {
+        let PlannedRole::Estimator { gathers, fit, .. } = &node.role else {
             continue;
         };
         let entries = gathers
             .iter()
             .flat_map(|&gather| &plan.gathers[gather].entries);
         let of_it = |slot: usize| slot == truth || plan.channels[slot].predicts == Some(truth);
-        for entry in entries.filter(|entry| of.slot == truth && !of_it(entry.slot)) {
+        for entry in entries.filter(|entry| fit.truth.slot == truth && !of_it(entry.slot)) {
             if !slots.contains(&entry.slot) {
                 slots.push(entry.slot);
             }

@@ -84,16 +84,8 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
     let plan = &*model.plan;
     let mut collecting = Vec::new();
     for (index, node) in plan.nodes.iter().enumerate() {
-        let (
-            PlannedRole::Estimator {
-                regressors,
-                gathers,
-                truth,
-                training,
-                ..
-            },
-            Some(predictor),
-        ) = (&node.role, model.fitted.get(&node.instance()))
+        let (PlannedRole::Estimator { fit, gathers, .. }, Some(predictor)) =
+            (&node.role, model.fitted.get(&node.instance()))
         else {
             continue;
         };
@@ -101,18 +93,18 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
             .iter()
             .flat_map(|&gather| (0..plan.gathers[gather].entries.len()).map(move |n| (gather, n)))
             .collect();
-        let place = |name: &String| regressors.iter().position(|of| of.name == *name);
+        let place = |name: &String| fit.regressors.iter().position(|of| of.name == *name);
         let used: Option<Vec<usize>> = predictor.uses().iter().map(place).collect();
         let Some(used) = used.filter(|used| !used.is_empty()) else {
             continue;
         };
         collecting.push(Collecting {
             node: index,
-            truth: truth.slot,
+            truth: fit.truth.slot,
             predictor: &**predictor,
             row: vec![0.0; used.len()],
-            runs: Pairing::new(truth, used.len()),
-            limits: *training,
+            runs: Pairing::new(&fit.truth, used.len()),
+            limits: fit.training,
             blocks: GramBlocks::with_row_memory(used.len(), 0),
             places: used.into_iter().map(|nth| places[nth]).collect(),
         });

@@ -1,14 +1,13 @@
 //! Which predictions a combiner may put together.
 
-use super::estimator::std_dev_of;
+use super::estimator::{about, std_dev_of};
 use super::instance::Instance;
 use super::plan::{AuxPorts, PlannedRole, STD_DEV, TruthLink, WEIGHTS};
 use super::provenance::Provenance;
-use super::resolver::{Resolver, Suspect};
+use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::node::{Combiner, InputPort, OutputPort};
 use crate::time::Duration;
-use crate::unit::Unit;
 
 impl Resolver<'_> {
     pub(super) fn combiner(
@@ -73,7 +72,13 @@ impl Resolver<'_> {
                 span: self.provenance[predicts].span(),
                 limit: Duration::ZERO,
             };
-            self.suspect(instance, (port.name, &voters), state, link);
+            // Predictions have been looked at with the nodes that make them.
+            let is_other = |slot: &usize| self.channels[*slot].predicts.is_none();
+            let others = voters.iter().copied().filter(is_other).collect();
+            self.suspect(instance, port.name, others, Duration::ZERO, &link);
+            if let Some((port, slot)) = state {
+                self.suspect(instance, port.name, vec![slot], Duration::ZERO, &link);
+            }
         }
         let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
         let behind = Provenance::of(slots.map(|slot| (&self.provenance[slot], Duration::ZERO)));
@@ -99,30 +104,6 @@ impl Resolver<'_> {
         self.add(instance, outputs, role, behind, predicts)
     }
 
-    /// Notes what may see the answer beside predictions, which have been looked at with the nodes that make them: what else
-    /// votes, and what gives a state.
-    fn suspect(
-        &mut self,
-        instance: &Instance<'_>,
-        (input, voters): (&'static str, &[usize]),
-        state: Option<(InputPort, usize)>,
-        link: TruthLink,
-    ) {
-        let unseen = voters.iter().copied();
-        let unseen = unseen.filter(|&slot| self.channels[slot].predicts.is_none());
-        let unseen = (input, unseen.collect::<Vec<usize>>());
-        let state = state.map(|(port, slot)| (port.name, vec![slot]));
-        for (input, features) in std::iter::once(unseen).chain(state) {
-            self.suspects.push(Suspect {
-                place: instance.input_place(input),
-                context: instance.context(),
-                features,
-                lag: Duration::ZERO,
-                link,
-            });
-        }
-    }
-
     /// What comes out of a combiner, where in the plan that is which always stands beside the prediction, and the gather of the
     /// deviations of its votes.
     fn ports(
@@ -132,7 +113,7 @@ impl Resolver<'_> {
         combined: Channel,
         (port, voters): (&InputPort, &[usize]),
     ) -> Option<(Vec<OutputPort>, AuxPorts, Option<usize>)> {
-        let reason = self.beside(voters[0], combined.name.clone());
+        let reason = about(&self.channels[voters[0]].channel, combined.name.clone());
         let std_dev = std_dev_of(&combined);
         let mut outputs = vec![OutputPort {
             name: "prediction",
@@ -196,18 +177,10 @@ impl Resolver<'_> {
                 &self.channels[slot].name
             }
         };
-        let weight = |&slot: &usize| self.beside(slot, format!("weight-{}", name(slot)));
+        let weight = |&slot: &usize| {
+            let vote = &self.channels[slot].channel;
+            about(vote, format!("weight-{}", name(slot)))
+        };
         voters.iter().map(weight).collect()
-    }
-
-    /// A channel of plain numbers about a vote, held as long as the vote is.
-    fn beside(&self, slot: usize, name: String) -> Channel {
-        Channel {
-            name,
-            unit: Unit::one(),
-            span: Duration::ZERO,
-            ahead: Duration::ZERO,
-            max_age: self.channels[slot].channel.default_max_age(),
-        }
     }
 }

@@ -6,15 +6,17 @@ use super::instance::{Declared, Instance};
 use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
-use super::plan::{PlannedRole, STD_DEV, TrainingLimits, TruthLink};
+use super::plan::{PlannedFit, PlannedRole, STD_DEV, TrainingLimits, TruthLink};
 use super::problem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
 use super::row::Row;
 use crate::channel::Channel;
+use crate::diagnostic::Problem;
 use crate::node::{Estimator, FREEZE, OutputPort};
 use crate::quantity::Quantity;
 use crate::time::Duration;
+use crate::unit::Unit;
 
 /// The port of the standard deviation of the truth about a prediction.
 pub(super) fn std_dev_of(prediction: &Channel) -> OutputPort {
@@ -25,6 +27,17 @@ pub(super) fn std_dev_of(prediction: &Channel) -> OutputPort {
     OutputPort {
         name: STD_DEV,
         channels: vec![channel],
+    }
+}
+
+/// A channel of plain numbers about a prediction, held as long as the prediction is.
+pub(super) fn about(prediction: &Channel, name: String) -> Channel {
+    Channel {
+        name,
+        unit: Unit::one(),
+        span: Duration::ZERO,
+        ahead: Duration::ZERO,
+        max_age: prediction.default_max_age(),
     }
 }
 
@@ -122,11 +135,13 @@ impl Resolver<'_> {
         }
         let behind = vec![behind; ports.len()];
         let role = PlannedRole::Estimator {
-            regressors: row.regressors,
+            fit: PlannedFit {
+                regressors: row.regressors,
+                truth: link,
+                training,
+            },
             gathers: row.gathers,
             every_tick: wanted.every_tick,
-            truth: link,
-            training,
             learning,
             std_dev: None,
         };
@@ -147,7 +162,7 @@ impl Resolver<'_> {
         ahead
     }
 
-    /// Whether predictions may be stacked: they agree, and are of the truth that is predicted from them.
+    /// Whether predictions may be stacked: they agree, and are of the truth that is predicted from them, as far ahead.
     fn may_stack(
         &mut self,
         instance: &Instance<'_>,
@@ -155,21 +170,8 @@ impl Resolver<'_> {
         voters: &[usize],
         link: &TruthLink,
     ) -> bool {
-        self.votes_agree(instance, input, voters) & self.votes_fit(instance, input, voters, link)
-    }
-
-    /// Whether predictions are of the truth that is predicted from them, as far ahead.
-    fn votes_fit(
-        &mut self,
-        instance: &Instance<'_>,
-        input: &str,
-        voters: &[usize],
-        link: &TruthLink,
-    ) -> bool {
-        let Some(&first) = voters.first() else {
-            return true;
-        };
-        let voter = &self.channels[first];
+        let agree = self.votes_agree(instance, input, voters);
+        let voter = &self.channels[voters[0]];
         if voter.channel.ahead != link.ahead {
             let problem = problem::Horizons {
                 first: voter.name.clone(),
@@ -177,11 +179,11 @@ impl Resolver<'_> {
                 second: instance.node.name.clone(),
                 second_ahead: link.ahead,
             };
-            self.diagnostics
-                .report(instance.input_place(input), problem);
+            let place = instance.input_place(input);
+            self.diagnostics.report(place, problem);
             return false;
         }
-        self.agree(instance, input, first, link.slot, false)
+        agree & self.agree(instance, input, voters[0], link.slot, false)
     }
 
     /// A truth as predictions `ahead` of it are paired with it.
@@ -191,46 +193,40 @@ impl Resolver<'_> {
         truth: usize,
         ahead: Duration,
     ) -> Option<TruthLink> {
-        let channel = &self.channels[truth].channel;
-        if channel.ahead != Duration::ZERO || self.channels[truth].predicts.is_some() {
-            let problem = problem::PredictedTruth {
-                channel: self.channels[truth].name.clone(),
+        let name = |slot: usize| self.channels[slot].name.clone();
+        let own = &self.channels[truth];
+        let problem: Box<dyn Problem> =
+            if own.channel.ahead != Duration::ZERO || own.predicts.is_some() {
+                let channel = name(truth);
+                problem::PredictedTruth { channel }.into()
+            } else if let Some(prediction) = self.prediction_beside(truth) {
+                let (channel, prediction) = (name(truth), name(prediction));
+                problem::TruthOfPrediction {
+                    channel,
+                    prediction,
+                }
+                .into()
+            } else if let Some(node) = self.endless(truth) {
+                let channel = name(truth);
+                problem::EndlessTruth { channel, node }.into()
+            } else {
+                // A node may forget what its inputs are means of.
+                let span = self.provenance[truth].span();
+                let limit = if span > Duration::ZERO {
+                    span
+                } else {
+                    self.max_ages(instance, "truth", &[truth])?[0]
+                };
+                return Some(TruthLink {
+                    slot: truth,
+                    ahead,
+                    span,
+                    limit,
+                });
             };
-            self.diagnostics
-                .report(instance.input_place("truth"), problem);
-            return None;
-        }
-        if let Some(prediction) = self.prediction_beside(truth) {
-            let name = |slot: usize| self.channels[slot].name.clone();
-            let problem = problem::TruthOfPrediction {
-                channel: name(truth),
-                prediction: name(prediction),
-            };
-            self.diagnostics
-                .report(instance.input_place("truth"), problem);
-            return None;
-        }
-        // A node may forget what its inputs are means of.
-        let span = self.provenance[truth].span();
-        if let Some(node) = self.endless(truth) {
-            let channel = self.channels[truth].name.clone();
-            let problem = problem::EndlessTruth { channel, node };
-            self.diagnostics
-                .report(instance.input_place("truth"), problem);
-            return None;
-        }
-        let limit = if span > Duration::ZERO {
-            Some(span)
-        } else {
-            let ages = self.max_ages(instance, "truth", &[truth]);
-            ages.and_then(|ages| ages.first().copied())
-        };
-        Some(TruthLink {
-            slot: truth,
-            ahead,
-            span,
-            limit: limit?,
-        })
+        let place = instance.input_place("truth");
+        self.diagnostics.report(place, problem);
+        None
     }
 
     /// A node behind a slot whose values depend on all of the past.
@@ -259,23 +255,19 @@ impl Resolver<'_> {
     /// Notes which measured channels each regressor is made from, which is known once loops have been followed.
     pub(super) fn name_sensors(&mut self) {
         for node in &mut self.nodes {
-            let (regressors, gathers) = match &mut node.role {
-                PlannedRole::Estimator {
-                    regressors,
-                    gathers,
-                    ..
-                } => (regressors, gathers),
-                PlannedRole::Feature {
-                    fit: Some(fit),
-                    gathers,
-                    ..
-                } => (&mut fit.regressors, gathers),
-                PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => continue,
+            let (PlannedRole::Estimator { fit, gathers, .. }
+            | PlannedRole::Feature {
+                fit: Some(fit),
+                gathers,
+                ..
+            }) = &mut node.role
+            else {
+                continue;
             };
             let entries = gathers
                 .iter()
                 .flat_map(|&gather| &self.gathers[gather].entries);
-            for (regressor, entry) in regressors.iter_mut().zip(entries) {
+            for (regressor, entry) in fit.regressors.iter_mut().zip(entries) {
                 let sources = self.provenance[entry.slot].sources();
                 let name = |(source, _): (usize, Duration)| self.channels[source].name.clone();
                 regressor.sensors = sources.map(name).collect();

@@ -4,7 +4,7 @@ use super::instance::Instance;
 use super::kind_fault::KindFault;
 use super::plan::{PlannedFit, PlannedRole};
 use super::provenance::Provenance;
-use super::resolver::{Resolver, Suspect};
+use super::resolver::Resolver;
 use crate::node::{Feature, InputPort, Inputs, Mistake, OutputPort, Read};
 use crate::time::Duration;
 
@@ -120,20 +120,8 @@ impl Resolver<'_> {
         for (port, slots) in ports.iter().filter(|(port, _)| port.read != Read::Truth) {
             let unit = Self::port_unit(port);
             for &lag in lags {
-                for &slot in slots {
-                    let mut regressor = self.regressor(slot, lag, false);
-                    if let Some(unit) = &unit {
-                        regressor.unit = unit.to_string();
-                    }
-                    regressors.push(regressor);
-                }
-                self.suspects.push(Suspect {
-                    place: instance.input_place(port.name),
-                    context: instance.context(),
-                    features: slots.clone(),
-                    lag,
-                    link: truth,
-                });
+                regressors.extend(self.regressors(slots, lag, unit.as_ref()));
+                self.suspect(instance, port.name, slots.clone(), lag, &truth);
             }
         }
         Some(PlannedFit {

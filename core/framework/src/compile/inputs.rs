@@ -23,25 +23,14 @@ pub(super) const COUNTS_ONCE: [&str; 2] = ["features", "voters"];
 /// is missing.
 pub(super) fn meant_input(instance: &Declared<'_>, given: &str) -> Option<&'static str> {
     let ports = (instance.kind.inputs)();
-    let names = || ports.iter().map(|port| port.name);
-    let is_strange = |given: &str| names().all(|name| name != given);
-    if !is_strange(given) {
+    let names = ports.iter().map(|port| port.name);
+    if names.clone().any(|name| name == given) {
         return None;
     }
-    if let near @ Some(_) = nearest(given, names()) {
-        return near;
-    }
-    let all = instance.decl.inputs.iter().map(|input| &*input.port);
-    let near: Vec<Option<&str>> = all
-        .filter(|given| is_strange(given))
-        .map(|given| nearest(given, names()))
-        .collect();
-    let is_given = |name: &str| instance.input(name).is_some() || near.contains(&Some(name));
-    let required = ports.iter().filter(|port| !port.optional);
-    let mut missing = required.filter(|port| !is_given(port.name));
-    let only = missing.next().filter(|_| missing.next().is_none())?;
-    let others = near.iter().filter(|near| near.is_none()).count();
-    (others == 1).then_some(only.name)
+    let is_missing = |port: &&InputPort| !port.optional && instance.input(port.name).is_none();
+    let mut missing = ports.iter().filter(is_missing);
+    let only = missing.next().filter(|_| missing.next().is_none());
+    nearest(given, names).or(only.map(|port| port.name))
 }
 
 impl Resolver<'_> {
@@ -72,7 +61,7 @@ impl Resolver<'_> {
         whole.then_some(slots)
     }
 
-    /// Tells of a regressor or a vote that stands among those before it already.
+    /// Reports a regressor or a vote that stands among those before it already; whether there is none.
     fn count_once(
         &mut self,
         input: &'static str,

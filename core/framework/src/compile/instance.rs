@@ -7,7 +7,7 @@ use super::guard::Panics;
 use super::keys::EstimatorKeys;
 use super::misplaced::{INPUTS, misplaced};
 use super::problem;
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, Problem};
 use crate::document::problem::InputAsKey;
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
@@ -74,7 +74,12 @@ pub(super) fn read_kinds(
 }
 
 fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> ReadNode {
-    let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
+    let kind = node.kind.as_ref().and_then(|(name, place)| {
+        let found = find(name);
+        found
+            .map_err(|problem| diagnostics.report(*place, problem))
+            .ok()
+    });
     let mut instances: Vec<ReadParts> = Vec::with_capacity(node.instances.len());
     for (nth, instance) in node.instances.iter().enumerate() {
         // Members whose parameters do not name them share one table, and so one specification.
@@ -93,35 +98,27 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
     ReadNode { kind, instances }
 }
 
-/// The kind of a name; `None` when an error about it has been reported.
-fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'static Kind> {
-    match kinds().get(name).map(Vec::as_slice) {
-        Some([kind]) => {
-            let Some((of, name, packages)) = taken_twice(kind.package) else {
-                return Some(*kind);
-            };
-            let problem = problem::WrittenTwice {
-                kind: kind.name.to_owned(),
-                of,
-                name,
-                packages,
-            };
-            diagnostics.report(place, problem);
+/// The kind of a name.
+fn find(name: &str) -> Result<&'static Kind, Box<dyn Problem>> {
+    let kind = name.to_owned();
+    let Some(same) = kinds().get(name) else {
+        let known = kinds().keys().copied().collect();
+        return Err(problem::UnknownKind { kind, known }.into());
+    };
+    let [only] = same[..] else {
+        let packages = same.iter().map(|kind| kind.package).collect();
+        return Err(problem::KindTwice { kind, packages }.into());
+    };
+    match taken_twice(only.package) {
+        None => Ok(only),
+        Some((of, name, packages)) => Err(problem::WrittenTwice {
+            kind,
+            of,
+            name,
+            packages,
         }
-        Some(several) => {
-            let packages = several.iter().map(|kind| kind.package).collect();
-            let kind = name.to_owned();
-            diagnostics.report(place, problem::KindTwice { kind, packages });
-        }
-        None => {
-            let problem = problem::UnknownKind {
-                kind: name.to_owned(),
-                known: kinds().keys().copied().collect(),
-            };
-            diagnostics.report(place, problem);
-        }
+        .into()),
     }
-    None
 }
 
 fn is_shared(a: &InstanceDecl, b: &InstanceDecl) -> bool {
@@ -139,21 +136,16 @@ fn read_instance(
     diagnostics: &mut Diagnostics,
 ) -> ReadParts {
     let mut parameters = instance.parameters.clone();
-    let mut framework = Value {
-        place: parameters.place,
-        data: Data::Table(Table::new()),
-    };
-    if let (keys, Data::Table(own), Data::Table(taken)) = (
-        kind.framework_keys(),
-        &mut parameters.data,
-        &mut framework.data,
-    ) {
-        for &key in keys {
-            if let Some(entry) = own.remove(key) {
-                taken.insert(key, entry);
-            }
+    let mut keys = Table::new();
+    for &key in kind.framework_keys() {
+        if let Some(entry) = parameters.as_table_mut().and_then(|own| own.remove(key)) {
+            keys.insert(key, entry);
         }
     }
+    let framework = Value {
+        place: parameters.place,
+        data: Data::Table(keys),
+    };
     diagnostics.within(context(node, instance), |diagnostics| {
         let is_whole = take_inputs(kind, &mut parameters, diagnostics);
         let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
@@ -259,22 +251,6 @@ impl Declared<'_> {
 
     pub(crate) fn input(&self, port: &str) -> Option<&InputDecl> {
         self.decl.inputs.iter().find(|input| input.port == port)
-    }
-
-    /// The place of an element of a list among the parameters, or of the list.
-    pub(crate) fn element_place(&self, key: &str, nth: usize) -> Place {
-        let Data::Table(table) = &self.decl.parameters.data else {
-            return self.node.place;
-        };
-        let Some(list) = table.get(key) else {
-            return self.node.place;
-        };
-        match &list.data {
-            Data::List(elements) => elements
-                .get(nth)
-                .map_or(list.place, |element| element.place),
-            _ => list.place,
-        }
     }
 
     /// The place of what a kind points at: an input or a parameter.

@@ -94,9 +94,9 @@ impl Resolver<'_> {
         let entries = node.role.inputs().flat_map(entries);
         let read = entries.map(|entry| (entry.slot, entry.lag));
         let learned = match &node.role {
-            PlannedRole::Estimator {
-                truth, learning, ..
-            } if learning.is_some() => Some(truth.learned_from()),
+            PlannedRole::Estimator { fit, learning, .. } if learning.is_some() => {
+                Some(fit.truth.learned_from())
+            }
             _ => None,
         };
         read.chain(learned).collect()

@@ -1,5 +1,6 @@
 //! Whether an estimator goes on learning while it runs, and what it never learns from.
 
+use super::estimator::about;
 use super::instance::Instance;
 use super::keys::{Learn, LearnLimits};
 use super::plan::PlannedLearning;
@@ -8,7 +9,6 @@ use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::node::{Estimator, FREEZE, InputPort, LearningLimits, Learns, Mistake, OutputPort};
 use crate::time::Duration;
-use crate::unit::Unit;
 
 impl Resolver<'_> {
     /// Whether an estimator learns while it runs, and how; `None` when an error about it has been reported.
@@ -65,12 +65,6 @@ impl Resolver<'_> {
 pub(super) fn port(of: &Channel) -> OutputPort {
     OutputPort {
         name: "learning",
-        channels: vec![Channel {
-            name: of.name.clone(),
-            unit: Unit::one(),
-            span: Duration::ZERO,
-            ahead: Duration::ZERO,
-            max_age: of.default_max_age(),
-        }],
+        channels: vec![about(of, of.name.clone())],
     }
 }

@@ -29,7 +29,6 @@ mod reference;
 mod resolver;
 mod row;
 mod scope;
-mod slot_set;
 mod steps;
 mod survey;
 

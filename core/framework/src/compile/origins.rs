@@ -1,4 +1,4 @@
-//! From which measured channels the slots of a plan follow.
+//! What the slots of a plan follow from, and what follows from them.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +8,55 @@ use super::{Plan, PlannedNode};
 #[must_use]
 pub fn upstream(
     plan: &Plan,
-    mut waiting: Vec<usize>,
+    slots: impl IntoIterator<Item = usize>,
     reads: impl Fn(&PlannedNode) -> Vec<usize>,
 ) -> Vec<bool> {
     let mut found = vec![false; plan.channels.len()];
-    while let Some(slot) = waiting.pop() {
-        let is_new = !std::mem::replace(&mut found[slot], true);
-        if let Some(node) = plan.channels[slot].node.filter(|_| is_new) {
-            waiting.extend(reads(&plan.nodes[node]));
+    let mut seen = vec![false; plan.nodes.len()];
+    let mut open: Vec<usize> = slots.into_iter().collect();
+    while let Some(slot) = open.pop() {
+        found[slot] = true;
+        if let Some(node) = plan.channels[slot].node
+            && !std::mem::replace(&mut seen[node], true)
+        {
+            open.extend(reads(&plan.nodes[node]));
         }
     }
     found
+}
+
+/// What follows from something, by number.
+pub(crate) struct Dependents {
+    pub(crate) nodes: Vec<bool>,
+    pub(crate) slots: Vec<bool>,
+}
+
+impl Dependents {
+    /// Everything that follows from these signals and nodes, through loops too.
+    pub(crate) fn of(plan: &Plan, signals: &[bool], node: impl Fn(usize) -> bool) -> Self {
+        let mut slots = vec![false; plan.channels.len()];
+        slots[..signals.len()].copy_from_slice(signals);
+        let mut readers = vec![Vec::new(); plan.channels.len()];
+        for (index, node) in plan.nodes.iter().enumerate() {
+            for slot in plan.reads(node) {
+                readers[slot].push(index);
+            }
+        }
+        let mut nodes = vec![false; plan.nodes.len()];
+        let mut open: Vec<usize> = (0..plan.nodes.len()).filter(|&index| node(index)).collect();
+        for slot in (0..signals.len()).filter(|&slot| signals[slot]) {
+            open.extend(&readers[slot]);
+        }
+        while let Some(index) = open.pop() {
+            if !std::mem::replace(&mut nodes[index], true) {
+                for slot in plan.nodes[index].slots.clone() {
+                    slots[slot] = true;
+                    open.extend(&readers[slot]);
+                }
+            }
+        }
+        Self { nodes, slots }
+    }
 }
 
 /// The slots of what a node takes as data; truths that it only learns from are not among them.

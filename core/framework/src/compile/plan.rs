@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::instance::instance_name;
+use super::origins::upstream;
 use super::persistence_lag;
 use super::provenance::smallest_lag;
-use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::{TableBase, TimeBase};
 use crate::node::{Inputs, Kind, LearningLimits, NodeSpec, Predictor, Read, Regressor, Role};
@@ -187,16 +187,12 @@ pub enum PlannedRole {
     },
     /// A prediction of a truth.
     Estimator {
-        /// What makes up a row, over all gathers.
-        regressors: Vec<Regressor>,
+        /// What it is fitted on; its truth is what it predicts.
+        fit: PlannedFit,
         /// The gathers of a row, one after the other.
         gathers: Vec<usize>,
         /// Whether it runs at every tick, or only when something in its first gather is fresh.
         every_tick: bool,
-        /// What it predicts.
-        truth: TruthLink,
-        /// Which rows it is fitted on.
-        training: TrainingLimits,
         /// How it goes on learning while it runs, where it does.
         learning: Option<PlannedLearning>,
         /// The slot of its standard deviation, where somebody reads it.
@@ -239,25 +235,22 @@ impl PlannedRole {
         self.inputs().chain(more)
     }
 
+    /// What it is fitted on, where it is fitted, or would be if it were not known what it predicts by.
+    #[must_use]
+    pub fn fit(&self) -> Option<&PlannedFit> {
+        match self {
+            Self::Feature { fit, .. } => fit.as_ref(),
+            Self::Estimator { fit, .. } => Some(fit),
+            Self::Combiner { .. } => None,
+        }
+    }
+
     /// What is predicted, or compared with predictions.
     #[must_use]
     pub fn truth(&self) -> Option<&TruthLink> {
         match self {
-            Self::Feature { fit, .. } => fit.as_ref().map(|fit| &fit.truth),
-            Self::Estimator { truth, .. } => Some(truth),
             Self::Combiner { truth, .. } => truth.as_ref(),
-        }
-    }
-
-    /// The truth that it is fitted on, and which of its values.
-    #[must_use]
-    pub fn learns_from(&self) -> Option<(&TruthLink, &TrainingLimits)> {
-        match self {
-            Self::Feature { fit, .. } => fit.as_ref().map(|fit| (&fit.truth, &fit.training)),
-            Self::Estimator {
-                truth, training, ..
-            } => Some((truth, training)),
-            Self::Combiner { .. } => None,
+            role => role.fit().map(|fit| &fit.truth),
         }
     }
 
@@ -281,7 +274,7 @@ impl PlannedRole {
     }
 }
 
-/// What a feature is fitted on.
+/// What a node is fitted on.
 #[derive(Debug, Clone)]
 pub struct PlannedFit {
     /// What makes up a row, over all gathers.
@@ -295,70 +288,46 @@ pub struct PlannedFit {
 /// The rows that a node is fitted on.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a> {
-    /// What makes up a row, over all gathers.
-    pub regressors: &'a [Regressor],
+    /// What they are made of, and which of them count.
+    pub fit: &'a PlannedFit,
     /// The gathers of a row, one after the other.
     pub gathers: &'a [usize],
     /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
     pub triggers: &'a [usize],
-    /// The truth that belongs to them.
-    pub truth: TruthLink,
-    /// Which of them it is fitted on.
-    pub training: TrainingLimits,
 }
 
 impl PlannedNode {
     /// What an estimator that needs no fit predicts by.
     pub(crate) fn fixed(&self) -> Option<Box<dyn Predictor>> {
-        let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
-            (&self.role, self.spec.role())
-        else {
+        let Role::Estimator(estimator) = self.spec.role() else {
             return None;
         };
-        let names = regressors.iter().map(|regressor| regressor.name.clone());
-        estimator.fixed(&names.collect::<Vec<_>>())
+        let regressors = self.role.fit()?.regressors.iter();
+        let names: Vec<_> = regressors.map(|of| of.name.clone()).collect();
+        estimator.fixed(&names)
     }
 
     /// The rows that the node is fitted on; none where it needs no fit.
     pub fn rows(&self) -> Option<Rows<'_>> {
-        match (&self.role, self.spec.role()) {
-            (
-                PlannedRole::Feature {
-                    gathers,
-                    every_tick,
-                    fit: Some(fit),
-                    ..
-                },
-                _,
-            ) => Some(Rows {
-                regressors: &fit.regressors,
+        let fit = self.role.fit().filter(|_| self.fixed().is_none())?;
+        let (gathers, triggers, every_tick) = match &self.role {
+            PlannedRole::Feature {
                 gathers,
-                triggers: if *every_tick { &[] } else { gathers },
-                truth: fit.truth,
-                training: fit.training,
-            }),
-            (
-                PlannedRole::Estimator {
-                    regressors,
-                    gathers,
-                    every_tick,
-                    truth,
-                    training,
-                    ..
-                },
-                Role::Estimator(_),
-            ) => {
-                let first = gathers.len().min(1);
-                self.fixed().is_none().then_some(Rows {
-                    regressors,
-                    gathers,
-                    triggers: if *every_tick { &[] } else { &gathers[..first] },
-                    truth: *truth,
-                    training: *training,
-                })
-            }
-            _ => None,
-        }
+                every_tick,
+                ..
+            } => (gathers, gathers.len(), *every_tick),
+            PlannedRole::Estimator {
+                gathers,
+                every_tick,
+                ..
+            } => (gathers, gathers.len().min(1), *every_tick),
+            PlannedRole::Combiner { .. } => return None,
+        };
+        Some(Rows {
+            fit,
+            gathers,
+            triggers: &gathers[..if every_tick { 0 } else { triggers }],
+        })
     }
 }
 
@@ -399,20 +368,9 @@ impl Plan {
         entries.map(|entry| entry.slot).chain(truth)
     }
 
-    /// These slots and every one that they depend on.
-    pub fn behind(&self, slots: impl Iterator<Item = usize>) -> SlotSet {
-        let mut behind = SlotSet::default();
-        let mut open: Vec<usize> = slots.collect();
-        let mut seen = vec![false; self.nodes.len()];
-        while let Some(slot) = open.pop() {
-            if behind.insert(slot)
-                && let Some(node) = self.channels[slot].node
-                && !std::mem::replace(&mut seen[node], true)
-            {
-                open.extend(self.reads(&self.nodes[node]));
-            }
-        }
-        behind
+    /// By slot, whether it is one of these or one that they depend on.
+    pub fn behind(&self, slots: impl IntoIterator<Item = usize>) -> Vec<bool> {
+        upstream(self, slots, |node| self.reads(node).collect())
     }
 }
 

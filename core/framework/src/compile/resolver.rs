@@ -16,10 +16,9 @@ use super::plan::{
 use super::problem;
 use super::provenance::Provenance;
 use super::scope::Scopes;
-use super::slot_set::SlotSet;
 use super::{Wanted, steps};
 use crate::channel::Channel;
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, Problem};
 use crate::document::{GraphFile, InstanceDecl, NodeDecl};
 use crate::node::{Kind, Mistake, OutputPort, Role, RoleName};
 use crate::time::Duration;
@@ -51,7 +50,7 @@ pub(crate) struct Resolver<'g> {
     /// Features whose leaks are looked for once all is known.
     pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
-    pub(super) read: SlotSet,
+    pub(super) read: Vec<usize>,
 }
 
 /// Features of an estimator that are still to be looked at.
@@ -84,7 +83,7 @@ impl<'g> Resolver<'g> {
             gathers: IndexSet::new(),
             nodes: Vec::new(),
             suspects: Vec::new(),
-            read: SlotSet::default(),
+            read: Vec::new(),
         }
     }
 
@@ -236,25 +235,29 @@ impl<'g> Resolver<'g> {
         sound
     }
 
+    /// Reports what the kind refuses.
     pub(crate) fn mistakes(&mut self, instance: &Declared<'_>, mistakes: Vec<Mistake>) {
-        for mistake in mistakes {
-            let place = instance.place_of(&mistake);
-            let problem = problem::Parameter {
-                message: mistake.message,
-                help: mistake.help,
-            };
-            self.diagnostics.report(place, problem);
-        }
+        self.report_each(instance, mistakes, |message, help| {
+            problem::Parameter { message, help }.into()
+        });
     }
 
-    /// Tells what the kind finds odd and can live with.
-    pub(crate) fn doubts(&mut self, instance: &Instance<'_>, doubts: Vec<Mistake>) {
-        for doubt in doubts {
-            let place = instance.place_of(&doubt);
-            let problem = problem::Doubt {
-                message: doubt.message,
-                help: doubt.help,
-            };
+    /// Reports what the kind finds odd and can live with.
+    pub(crate) fn doubts(&mut self, instance: &Declared<'_>, doubts: Vec<Mistake>) {
+        self.report_each(instance, doubts, |message, help| {
+            problem::Doubt { message, help }.into()
+        });
+    }
+
+    fn report_each(
+        &mut self,
+        instance: &Declared<'_>,
+        mistakes: Vec<Mistake>,
+        problem: fn(String, Option<String>) -> Box<dyn Problem>,
+    ) {
+        for mistake in mistakes {
+            let place = instance.place_of(&mistake);
+            let problem = problem(mistake.message, mistake.help);
             self.diagnostics.report(place, problem);
         }
     }

@@ -4,7 +4,6 @@ use super::instance::Instance;
 use super::plan::TruthLink;
 use super::provenance::{ONE_SAMPLE, leaks, persistence_lag};
 use super::resolver::{Resolver, Suspect};
-use crate::diagnostic::Place;
 use crate::node::{InputPort, Mistake, Regressor, TruthLags};
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -45,21 +44,10 @@ impl Resolver<'_> {
         }
         let mut whole = true;
         for &lag in lags {
-            for &slot in features {
-                let mut regressor = self.regressor(slot, lag, false);
-                if let Some(unit) = &unit {
-                    regressor.unit = unit.to_string();
-                }
-                row.regressors.push(regressor);
-                row.behind.push((slot, lag));
-            }
-            self.suspects.push(Suspect {
-                place: instance.input_place(port.name),
-                context: instance.context(),
-                features: features.to_vec(),
-                lag,
-                link: *link,
-            });
+            let regressors = self.regressors(features, lag, unit.as_ref());
+            row.regressors.extend(regressors);
+            row.behind.extend(features.iter().map(|&slot| (slot, lag)));
+            self.suspect(instance, port.name, features.to_vec(), lag, link);
             match self.gather(instance, port, features, &[lag], unit.as_ref()) {
                 Some(gather) => row.gathers.push(gather),
                 None => whole = false,
@@ -86,7 +74,8 @@ impl Resolver<'_> {
         let mut whole = true;
         for &lag in &lags {
             if leaks(lag, link.span, link.ahead) {
-                let place = Self::lag_place(instance, &lags, lag);
+                let nth = lags.iter().position(|&other| other == lag).unwrap_or(0);
+                let place = instance.parameter_place(&format!("lags.{nth}"));
                 let problem = self.leak((truth, lag), (lag, Duration::ZERO), link, Vec::new());
                 self.diagnostics.report(place, problem);
                 whole = false;
@@ -101,6 +90,40 @@ impl Resolver<'_> {
             }
         }
         whole
+    }
+
+    /// Channels as regressors at a lag, in the port's unit where there is one.
+    pub(super) fn regressors(
+        &self,
+        slots: &[usize],
+        lag: Duration,
+        unit: Option<&Unit>,
+    ) -> Vec<Regressor> {
+        let unit = unit.map(Unit::to_string);
+        let regressor = |&slot: &usize| {
+            let own = self.regressor(slot, lag, false);
+            let unit = unit.clone().unwrap_or(own.unit);
+            Regressor { unit, ..own }
+        };
+        slots.iter().map(regressor).collect()
+    }
+
+    /// Notes what may see the answer, which is looked for once all is known.
+    pub(super) fn suspect(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        features: Vec<usize>,
+        lag: Duration,
+        link: &TruthLink,
+    ) {
+        self.suspects.push(Suspect {
+            place: instance.input_place(input),
+            context: instance.context(),
+            features,
+            lag,
+            link: *link,
+        });
     }
 
     pub(super) fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
@@ -119,10 +142,5 @@ impl Resolver<'_> {
             lag,
             of_truth,
         }
-    }
-
-    fn lag_place(instance: &Instance<'_>, lags: &[Duration], lag: Duration) -> Place {
-        let nth = lags.iter().position(|&l| l == lag).unwrap_or(0);
-        instance.element_place("lags", nth)
     }
 }

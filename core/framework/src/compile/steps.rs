@@ -5,16 +5,16 @@ use std::ops::Range;
 
 use super::Wanted;
 use super::column_unit;
+use super::origins::Dependents;
 use super::plan::{Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHTS};
 use super::problem;
-use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 use crate::time::Duration;
 
 /// Makes a plan that can be stepped of nodes that stand in an order in which they can run. `read` are the slots that somebody
 /// reads.
-pub(super) fn lay_out(plan: &mut Plan, read: SlotSet, wanted: Wanted) {
+pub(super) fn lay_out(plan: &mut Plan, read: impl IntoIterator<Item = usize>, wanted: Wanted) {
     mark_read(plan, read, wanted);
     plan.steps = steps(plan);
     plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
@@ -76,24 +76,24 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
 impl Plan {
     /// Computes these slots too, and what they are made of, whether anything reads them or not.
     pub fn observe(&mut self, slots: impl IntoIterator<Item = usize>) {
-        lay_out(self, slots.into_iter().collect(), Wanted::default());
+        lay_out(self, slots, Wanted::default());
     }
 }
 
 /// Notes what is computed only where somebody reads it, beside what has been noted: all ports of features but the first, weights
 /// and standard deviations.
-fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
-    let truths: SlotSet = plan
-        .nodes
-        .iter()
-        .filter_map(|node| node.role.truth())
-        .map(|truth| truth.slot)
-        .collect();
+fn mark_read(plan: &mut Plan, read: impl IntoIterator<Item = usize>, wanted: Wanted) {
+    let mut is_read = vec![false; plan.channels.len()];
+    read.into_iter().for_each(|slot| is_read[slot] = true);
+    let mut is_truth = vec![false; plan.channels.len()];
+    let truths = plan.nodes.iter().filter_map(|node| node.role.truth());
+    truths.for_each(|truth| is_truth[truth.slot] = true);
     // Whoever is read comes before its readers, and a combination of deviations reads those of its voters.
     for node in plan.nodes.iter_mut().rev() {
-        let is_truth = truths.has_any(node.slots.clone());
+        let is_truth = is_truth[node.slots.clone()].contains(&true);
+        let any_read = |slots: &Range<usize>| is_read[slots.clone()].contains(&true);
         let first = |port: Option<Range<usize>>, wanted: bool| {
-            let slots = port.filter(|slots| wanted || read.has_any(slots.clone()))?;
+            let slots = port.filter(|slots| wanted || any_read(slots))?;
             Some(slots.start)
         };
         let weights = first(node.port(WEIGHTS), false);
@@ -102,7 +102,7 @@ fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
             PlannedRole::Feature { wanted: ports, .. } => {
                 for (index, (name, slots)) in node.ports.iter().enumerate() {
                     let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
-                    ports[index] |= index == 0 || error_of_truth || read.has_any(slots.clone());
+                    ports[index] |= index == 0 || error_of_truth || any_read(slots);
                 }
             }
             PlannedRole::Estimator {
@@ -115,7 +115,7 @@ fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
                 beside.std_dev = beside.std_dev.or(std_dev.zip(*std_devs));
                 if let Some((_, of_votes)) = beside.std_dev {
                     let entries = &plan.gathers[of_votes].entries;
-                    read.extend(entries.iter().map(|entry| entry.slot));
+                    entries.iter().for_each(|of| is_read[of.slot] = true);
                 }
             }
         }
@@ -128,10 +128,10 @@ pub(super) fn check_use(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagno
         diagnostics.report(graph.tree.place, problem::NoOutputs {});
         return;
     }
-    let fed = fed(plan);
+    let fed = Dependents::of(plan, &vec![true; plan.sources.len()], |_| false).slots;
     let owner = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
     let mut dry = HashMap::new();
-    for column in plan.outputs.iter().filter(|c| !fed.contains(c.slot)) {
+    for column in plan.outputs.iter().filter(|c| !fed[c.slot]) {
         dry.entry(owner(&column.name))
             .or_insert_with(|| column.name.clone());
     }
@@ -145,7 +145,7 @@ pub(super) fn check_use(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagno
     let used_nodes: HashSet<&str> = plan
         .nodes
         .iter()
-        .filter(|node| used.has_any(node.slots.clone()))
+        .filter(|node| used[node.slots.clone()].contains(&true))
         .map(|node| node.name.as_str())
         .collect();
     for node in graph
@@ -164,7 +164,7 @@ pub(super) fn check_use(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagno
         }
     }
     let used_signals: HashSet<String> = (0..plan.sources.len())
-        .filter(|&slot| used.contains(slot))
+        .filter(|&slot| used[slot])
         .map(|slot| owner(&plan.channels[slot].name))
         .collect();
     for signal in &graph.signals {
@@ -184,25 +184,6 @@ pub(super) fn check_use(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagno
                     signal: signal.name.clone(),
                 },
             );
-        }
-    }
-}
-
-/// Every slot that a measured channel reaches.
-fn fed(plan: &Plan) -> SlotSet {
-    let mut fed: SlotSet = (0..plan.sources.len()).collect();
-    loop {
-        let mut more = false;
-        for node in &plan.nodes {
-            if plan.reads(node).any(|slot| fed.contains(slot)) {
-                for slot in node.slots.clone() {
-                    more |= fed.insert(slot);
-                }
-            }
-        }
-        // A second round is needed only where a loop is closed from behind.
-        if !more {
-            return fed;
         }
     }
 }

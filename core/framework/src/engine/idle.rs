@@ -19,11 +19,9 @@ impl Engine {
     pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         for node in &self.nodes {
             match node {
-                NodeRunner::Operator { .. } => {}
-                NodeRunner::Estimate { estimate, .. } => {
-                    estimate
-                        .iter()
-                        .for_each(|estimate| estimate.ask_idly(value));
+                NodeRunner::Operator(_) => {}
+                NodeRunner::Estimate(node) => {
+                    node.estimate.iter().for_each(|of| of.ask_idly(value));
                 }
                 NodeRunner::Vote(vote) => {
                     let votes = self.gathered[vote.wires.voters].values.iter();
@@ -42,7 +40,7 @@ impl Engine {
     pub fn answer(&self, votes: &[f64]) -> Option<Answer> {
         self.nodes.iter().find_map(|node| match node {
             NodeRunner::Vote(vote) => Some(vote.answer(votes)),
-            NodeRunner::Operator { .. } | NodeRunner::Estimate { .. } => None,
+            NodeRunner::Operator(_) | NodeRunner::Estimate(_) => None,
         })
     }
 }

@@ -12,7 +12,7 @@ mod sample_range;
 mod state;
 mod tick;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 pub use at_work::{When, naming_one};
@@ -31,7 +31,7 @@ pub(crate) use at_work::naming;
 use tick::Gathered;
 
 use crate::channel::Extremes;
-use crate::compile::{Plan, Step, admits};
+use crate::compile::{Plan, Step, admits, origins};
 use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
 use tick::{Estimate, NodeRunner, OutputSlots, Slots, TickContext, Work, runners, work};
@@ -97,7 +97,15 @@ impl Engine {
                 .iter()
                 .map(|channel| channel.history.map(History::new))
                 .collect(),
-            row: vec![0.0; nodes.iter().map(NodeRunner::width).max().unwrap_or(0)],
+            row: vec![
+                0.0;
+                nodes
+                    .iter()
+                    .filter_map(NodeRunner::estimate)
+                    .map(Estimate::width)
+                    .max()
+                    .unwrap_or(0)
+            ],
             work: work(&plan, &nodes),
             nodes,
             last: Instant::MIN,
@@ -154,30 +162,20 @@ impl Engine {
         self.last = time;
         self.slots.tick += 1;
         self.take_in(time, samples);
-        let Self {
-            plan,
-            slots,
-            gathered,
-            histories,
-            nodes,
-            work,
-            row,
-            frozen,
-            ..
-        } = self;
-        naming(plan, When::Tick(time), |at_work| {
+        naming(&self.plan, When::Tick(time), |at_work| {
+            let nodes = &mut *self.nodes;
             let mut context = TickContext {
                 now: time,
-                slots,
-                gathered,
-                row,
-                frozen: *frozen,
+                slots: &mut self.slots,
+                gathered: &mut self.gathered,
+                row: &mut self.row,
+                frozen: self.frozen,
                 at_work,
             };
-            for work in work {
+            for work in &mut self.work {
                 match work {
                     Work::Step(Step::Gather(gather)) => {
-                        context.gathered[*gather].read(context.slots, histories, time);
+                        context.gathered[*gather].read(context.slots, &self.histories, time);
                     }
                     Work::Step(Step::Run(node)) => {
                         context.at_work.is(*node);
@@ -219,21 +217,15 @@ impl Engine {
     ///
     /// Predictions that are fed back are kept in memory that grows as it must.
     pub fn predict_in(&mut self, mode: Mode) {
-        let Self {
-            plan,
-            nodes,
-            fed_back,
-            ..
-        } = self;
-        fed_back.clear();
-        for (index, (node, running)) in plan.nodes.iter().zip(nodes).enumerate() {
-            if let (NodeRunner::Estimate { estimate, .. }, Some(link)) =
-                (running, node.role.truth())
-                && let Some(estimate) = estimate
+        self.fed_back.clear();
+        let nodes = self.plan.nodes.iter().zip(&mut self.nodes);
+        for (index, (node, running)) in nodes.enumerate() {
+            if let Some(estimate) = running.estimate_mut()
+                && let Some(link) = node.role.truth()
             {
-                estimate.predict_in(mode, link, &plan.gathers);
+                estimate.predict_in(mode, link, &self.plan.gathers);
                 if estimate.feedback().is_some() {
-                    fed_back.push((index, link.slot));
+                    self.fed_back.push((index, link.slot));
                 }
             }
         }
@@ -243,10 +235,7 @@ impl Engine {
     /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
     /// where no past truth changes what it predicts in the mode of the engine.
     pub fn step_of(&self, node: usize) -> Option<Option<Duration>> {
-        match self.nodes.get(node) {
-            Some(NodeRunner::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
-            _ => None,
-        }
+        self.nodes.get(node)?.estimate()?.step()
     }
 
     /// Whether learning has been frozen on command.
@@ -277,13 +266,10 @@ impl Engine {
             for (nth, node) in self.nodes.iter_mut().enumerate() {
                 at_work.is(nth);
                 match node {
-                    NodeRunner::Operator { operator, .. } => operator.segment(),
-                    NodeRunner::Estimate { estimate, .. } => {
-                        if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
-                            learning.segment(self.last, &self.gathered, !self.frozen);
-                        }
-                        if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
-                            feedback.segment();
+                    NodeRunner::Operator(node) => node.operator.segment(),
+                    NodeRunner::Estimate(node) => {
+                        if let Some(estimate) = &mut node.estimate {
+                            estimate.segment(self.last, &self.gathered, !self.frozen);
                         }
                     }
                     NodeRunner::Vote(vote) => vote.segment(self.last),
@@ -360,27 +346,14 @@ impl Engine {
     /// Where the plan has no such slot.
     #[must_use]
     pub fn first_silent(&self, slot: usize) -> String {
-        let Plan {
-            channels,
-            gathers,
-            nodes,
-            sources,
-            ..
-        } = &*self.plan;
-        let (mut waiting, mut found) = (vec![slot], BTreeSet::new());
-        while let Some(slot) = waiting.pop() {
-            if let (true, Some(node)) = (found.insert(slot), channels[slot].node) {
-                let inputs = nodes[node].role.inputs();
-                waiting.extend(inputs.flat_map(|of| gathers[of].entries.iter().map(|of| of.slot)));
-            }
-        }
-        let may_rest = |slot: usize| sources.get(slot).is_some_and(|source| source.optional);
-        let mut silent = found.into_iter();
-        let first = silent.find(|&slot| self.slots.values[slot].is_nan() && !may_rest(slot));
-        let first = &channels[first.unwrap_or(slot)];
-        first
-            .node
-            .map_or_else(|| first.name.clone(), |node| nodes[node].instance())
+        let plan = &*self.plan;
+        let behind = origins::upstream(plan, vec![slot], |node| origins::inputs(plan, node));
+        let may_rest = |slot: usize| plan.sources.get(slot).is_some_and(|of| of.optional);
+        let lacks = |&slot: &usize| self.slots.values[slot].is_nan() && !may_rest(slot);
+        let mut behind = (0..behind.len()).filter(|&slot| behind[slot]);
+        let first = &plan.channels[behind.find(lacks).unwrap_or(slot)];
+        let node = first.node.map(|node| plan.nodes[node].instance());
+        node.unwrap_or_else(|| first.name.clone())
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
@@ -425,8 +398,8 @@ impl Engine {
             }
         }
         for &(node, slot) in &self.fed_back {
-            if let NodeRunner::Estimate { estimate, .. } = &mut self.nodes[node]
-                && let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback)
+            let estimate = self.nodes[node].estimate_mut();
+            if let Some(feedback) = estimate.and_then(Estimate::feedback)
                 && self.slots.ran(slot)
             {
                 feedback.observe(self.slots.values[slot], self.slots.given[slot].stamp, now);

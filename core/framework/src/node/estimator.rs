@@ -266,42 +266,40 @@ pub struct Trained {
 
 /// How a fit went, for people and model cards.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TrainingReport {
     /// The regressors chosen, in the order in which they were, with the score after each.
     pub selection: Vec<SelectionStep>,
     /// The step at which selection stopped, since it was not worth it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<SelectionStep>,
     /// The orders that were compared, where they were.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub orders: Option<Box<OrderTable>>,
     /// Condition number of the standardised design.
     #[serde(
-        default,
-        with = "crate::node::number_or_none",
+        with = "super::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub condition: Option<f64>,
     /// Root mean square error over the rows of the fit, in the unit of the truth.
     #[serde(
-        default,
-        with = "crate::node::number_or_none",
+        with = "super::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub in_sample_rmse: Option<f64>,
     /// The median size of the errors over the rows of the fit, over that of predicting the median of the truths; where outliers cannot
     /// pull the fit, which is then not judged by its root mean square error.
     #[serde(
-        default,
-        with = "crate::node::number_or_none",
+        with = "super::number_or_none",
         skip_serializing_if = "Option::is_none"
     )]
     pub robust_error: Option<f64>,
     /// What the user should know, a sentence each.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
     /// What else was found, for programs: every figure of a sentence stands here by its name, unrounded.
-    #[serde(default, skip_serializing_if = "Figures::is_empty")]
+    #[serde(skip_serializing_if = "Figures::is_empty")]
     pub figures: Figures,
 }
 
@@ -316,7 +314,7 @@ impl TrainingReport {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OrderTable {
     /// The figure that chose.
-    #[serde(with = "figure_name")]
+    #[serde(with = "FigureName")]
     pub by: OrderFigure,
     /// The rows on which each was fitted.
     pub rows: usize,
@@ -341,11 +339,6 @@ pub enum OrderFigure {
     Fpe,
 }
 
-impl OrderFigure {
-    /// All that there are.
-    pub const ALL: [Self; 4] = [Self::Aic, Self::Aicc, Self::Bic, Self::Fpe];
-}
-
 impl std::fmt::Display for OrderFigure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
@@ -357,23 +350,18 @@ impl std::fmt::Display for OrderFigure {
     }
 }
 
-/// A figure by its usual name, as models and reports have it; a graph has it in small letters.
-mod figure_name {
-    use serde::de::{Deserialize, Deserializer, Error};
-    use serde::ser::Serializer;
-
-    use super::OrderFigure;
-
-    pub(super) fn serialize<S: Serializer>(by: &OrderFigure, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(by)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<OrderFigure, D::Error> {
-        let name = String::deserialize(from)?;
-        let mut all = OrderFigure::ALL.into_iter();
-        all.find(|figure| figure.to_string() == name)
-            .ok_or_else(|| D::Error::unknown_variant(&name, &["AIC", "AICc", "BIC", "FPE"]))
-    }
+/// A figure as models name it: as it is displayed.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "OrderFigure")]
+enum FigureName {
+    #[serde(rename = "AIC")]
+    Aic,
+    #[serde(rename = "AICc")]
+    Aicc,
+    #[serde(rename = "BIC")]
+    Bic,
+    #[serde(rename = "FPE")]
+    Fpe,
 }
 
 impl OrderTable {

@@ -51,52 +51,40 @@ pub struct InputPort {
 }
 
 impl InputPort {
-    /// A port that takes only new values.
-    #[must_use]
-    pub const fn fresh(name: &'static str, summary: &'static str) -> Self {
+    const fn new(name: &'static str, read: Read, summary: &'static str) -> Self {
         Self {
             name,
-            read: Read::Fresh,
+            read,
             optional: false,
             unit: None,
             summary,
         }
+    }
+
+    /// A port that takes only new values.
+    #[must_use]
+    pub const fn fresh(name: &'static str, summary: &'static str) -> Self {
+        Self::new(name, Read::Fresh, summary)
     }
 
     /// A port that takes the last value up to its maximum age.
     #[must_use]
     pub const fn held(name: &'static str, summary: &'static str) -> Self {
-        Self {
-            name,
-            read: Read::Held,
-            optional: false,
-            unit: None,
-            summary,
-        }
+        Self::new(name, Read::Held, summary)
     }
 
     /// The port of the truth.
     #[must_use]
     pub const fn truth(summary: &'static str) -> Self {
-        Self {
-            name: "truth",
-            read: Read::Truth,
-            optional: false,
-            unit: None,
-            summary,
-        }
+        Self::new("truth", Read::Truth, summary)
     }
 
     /// The port that freezes the learning of an estimator: see [`FREEZE`].
     #[must_use]
     pub const fn freeze() -> Self {
-        Self {
-            name: FREEZE,
-            read: Read::Held,
-            optional: true,
-            unit: None,
-            summary: "learning goes on only while all of these are 0, such as the reason of a `health` node",
-        }
+        let summary =
+            "learning goes on only while all of these are 0, such as the reason of a `health` node";
+        Self::new(FREEZE, Read::Held, summary).or_none()
     }
 
     /// The same port, its channels given in a unit (UCUM): `mK/min`.

@@ -70,20 +70,17 @@ impl Range {
 impl std::fmt::Display for Range {
     /// As it ends the sentence "it must be …".
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match (self.above, self.min, self.below, self.max) {
-            (None, Some(min), None, Some(max)) => write!(f, "from {min} to {max}"),
-            (Some(above), _, None, None) => write!(f, "greater than {above}"),
-            (Some(above), _, Some(below), _) => {
-                write!(f, "greater than {above} and less than {below}")
-            }
-            (Some(above), _, None, Some(max)) => {
-                write!(f, "greater than {above} and at most {max}")
-            }
-            (None, Some(min), None, None) => write!(f, "{min} or more"),
-            (None, Some(min), Some(below), _) => write!(f, "{min} or more and less than {below}"),
-            (None, None, Some(below), _) => write!(f, "less than {below}"),
-            (None, None, None, Some(max)) => write!(f, "at most {max}"),
-            (None, None, None, None) => write!(f, "a finite number"),
+        if let (None, Some(min), None, Some(max)) = (self.above, self.min, self.below, self.max) {
+            return write!(f, "from {min} to {max}");
+        }
+        let above = self.above.map(|above| format!("greater than {above}"));
+        let low = above.or_else(|| Some(format!("{} or more", self.min?)));
+        let below = self.below.map(|below| format!("less than {below}"));
+        let high = below.or_else(|| Some(format!("at most {}", self.max?)));
+        match (low, high) {
+            (Some(low), Some(high)) => write!(f, "{low} and {high}"),
+            (Some(one), None) | (None, Some(one)) => f.write_str(&one),
+            (None, None) => f.write_str("a finite number"),
         }
     }
 }

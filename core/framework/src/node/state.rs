@@ -9,7 +9,7 @@ use serde::Deserialize;
 /// What a running node knows: all that its next outputs depend on, beside its inputs.
 ///
 /// A state is a serde struct whose registered name ends in the version of its form, `"slope/1"`. A form that has been
-/// replaced stays registered, so that what was written by an older program can be read and migrated. [`state!`](crate::state)
+/// replaced stays registered, so that what was written by an older program can be read. [`state!`](crate::state)
 /// makes a struct a state.
 #[typetag::serialize(tag = "state")]
 pub trait State: fmt::Debug + Send + Sync {
@@ -90,11 +90,6 @@ impl dyn State {
 pub enum Restored {
     /// It goes on from there, with the same bits as if it had never stopped.
     Accepted,
-    /// It goes on from a state of an older form.
-    Migrated {
-        /// The name of that form.
-        from: String,
-    },
     /// It starts afresh.
     Cold {
         /// Why, as a sentence without its full stop.

@@ -1,7 +1,6 @@
 //! Decides under which names states and fitted predictors become known, and which names were taken twice; what stands under them
 //! in a file is decided by what is written.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -55,24 +54,16 @@ pub fn written_names() -> &'static [WrittenName] {
 
 /// The first of a crate's names that is taken twice: what it names, the name and the crates that took it.
 pub fn taken_twice(package: &str) -> Option<(Written, &'static str, Vec<&'static str>)> {
-    type Takers = BTreeMap<(Written, &'static str), Vec<&'static str>>;
-    static TWICE: OnceLock<Takers> = OnceLock::new();
-    let twice = TWICE.get_or_init(|| {
-        let mut takers = Takers::new();
-        for known in written_names() {
-            let packages = takers.entry((known.of, known.name)).or_default();
-            packages.push(known.package);
-        }
-        takers.retain(|_, packages| packages.len() > 1);
-        takers
-    });
-    let of_package = |packages: &Vec<&str>| packages.contains(&package);
-    let mut found = twice.iter().filter(|(_, packages)| of_package(packages));
-    let (&(of, name), packages) = found.next()?;
-    Some((of, name, packages.clone()))
+    let mut names = written_names().chunk_by(|a, b| (a.of, a.name) == (b.of, b.name));
+    let of_package = |same: &&[WrittenName]| same.iter().any(|of| of.package == package);
+    let twice = names.find(|same| same.len() > 1 && of_package(same))?;
+    Some((
+        twice[0].of,
+        twice[0].name,
+        twice.iter().map(|of| of.package).collect(),
+    ))
 }
 
-/// Makes a name known, with the crate that takes it.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __written {

@@ -1,4 +1,4 @@
-//! The codes of all mistakes that this program knows, each declared beside its mistakes by [`code!`](crate::code).
+//! The codes of all mistakes that this program knows, each declared with its first mistake by [`problem!`](crate::problem).
 
 use std::sync::OnceLock;
 

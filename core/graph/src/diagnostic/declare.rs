@@ -1,12 +1,15 @@
-//! The macros [`code!`](crate::code) and [`problem!`](crate::problem): all that is shown of a mistake stands in one place.
+//! The macro [`problem!`](crate::problem): all that is shown of a mistake stands in one place.
 
-/// Declares a code as a constant of its name and enters it into [`codes()`](crate::diagnostic::codes): how bad the mistake is, its
-/// title, and why it is a mistake and what to do about it.
+/// Declares one mistake: a struct of the data of its texts, whose fields the texts name, and how it is shown.
 ///
-/// Beside the file, in `pages`, stand two whole graphs: `A000-wrong.toml` with the mistake, and no other, and `A000-right.toml`.
+/// A message and a label are `&str` or `String`, help one of them, or an `Option<String>`.
+///
+/// The first mistake of a code declares the code too: its title as an `error` or a `warning`, and with `explanation` why it is a mistake
+/// and what to do about it. The code is then a constant of its name and one of [`codes()`](crate::diagnostic::codes). Beside the file,
+/// in `pages`, stand two whole graphs: `A000-wrong.toml` with the mistake, and no other, and `A000-right.toml`.
 #[macro_export]
-macro_rules! code {
-    ($code:ident, $severity:ident, $title:literal, $explanation:literal $(,)?) => {
+macro_rules! problem {
+    (@code $code:ident $severity:ident $title:literal $explanation:literal) => {
         #[doc = $title]
         pub const $code: $crate::diagnostic::Code = $crate::diagnostic::Code {
             code: stringify!($code),
@@ -19,13 +22,14 @@ macro_rules! code {
 
         $crate::diagnostic::inventory::submit! { $code }
     };
-}
-
-/// Declares one mistake: a struct of the data of its texts, whose fields the texts name, and how it is shown.
-///
-/// A message and a label are `&str` or `String`, help one of them, or an `Option<String>`.
-#[macro_export]
-macro_rules! problem {
+    ($(#[$about:meta])* $code:ident $name:ident $data:tt error: $title:literal, explanation: $explanation:literal, $($shown:tt)*) => {
+        $crate::problem!(@code $code Error $title $explanation);
+        $crate::problem! { $(#[$about])* $code $name $data $($shown)* }
+    };
+    ($(#[$about:meta])* $code:ident $name:ident $data:tt warning: $title:literal, explanation: $explanation:literal, $($shown:tt)*) => {
+        $crate::problem!(@code $code Warning $title $explanation);
+        $crate::problem! { $(#[$about])* $code $name $data $($shown)* }
+    };
     (@or, $default:expr) => {
         $default
     };

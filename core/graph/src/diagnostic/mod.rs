@@ -24,7 +24,7 @@ pub use nearest::nearest;
 pub use panicked::{NodePanic, panic_message, panic_text};
 pub use place::{Place, SourceId, Sources};
 
-pub use crate::{code, problem};
+pub use crate::problem;
 
 #[cfg(test)]
 mod tests;

@@ -118,19 +118,17 @@ impl Collector {
         let mut trainees = Vec::new();
         for &node in nodes {
             let Rows {
-                regressors,
+                fit,
                 gathers,
                 triggers,
-                truth,
-                training,
             } = plan.nodes[node]
                 .rows()
                 .expect("only what needs a fit is trained");
             let shared = |&gather: &usize| {
-                let key = (gather, triggers, truth.ahead, truth.limit);
+                let key = (gather, triggers, fit.truth.ahead, fit.truth.limit);
                 *known.entry(key).or_insert_with(|| {
                     let width = plan.gathers[gather].entries.len();
-                    let pairing = Pairing::new(&truth, width);
+                    let pairing = Pairing::new(&fit.truth, width);
                     taps.push(Tap {
                         gather,
                         triggers: triggers.to_vec(),
@@ -150,16 +148,16 @@ impl Collector {
             };
             let between = match wanted {
                 Runs::OfTruths => None,
-                Runs::BetweenTruths { every } => Some(Between::new(every, regressors.len())),
+                Runs::BetweenTruths { every } => Some(Between::new(every, fit.regressors.len())),
             };
             trainees.push(Trainee {
                 node,
-                link: truth,
-                limits: training,
+                link: fit.truth,
+                limits: fit.training,
                 between,
                 kept_between: KeptBetween::default(),
                 taps: gathers.iter().map(shared).collect(),
-                validity: Validity::new(regressors.len()),
+                validity: Validity::new(fit.regressors.len()),
                 dropped: Dropped::default(),
                 truths: Vec::new(),
                 rows: Vec::new(),
@@ -269,15 +267,12 @@ impl Collector {
         if trainee.taps.iter().any(|&tap| self.taps[tap].ran) {
             return None;
         }
-        let Rows {
-            regressors,
-            triggers,
-            ..
-        } = plan.nodes[trainee.node].rows()?;
-        let entries = triggers
+        let rows = plan.nodes[trainee.node].rows()?;
+        let entries = rows
+            .triggers
             .iter()
             .flat_map(|&gather| &plan.gathers[gather].entries);
-        let waits = &regressors[..entries.clone().count()];
+        let waits = &rows.fit.regressors[..entries.clone().count()];
         let spans = entries.map(|entry| plan.channels[entry.slot].channel.span);
         let mut silent: Vec<String> = Vec::new();
         for sensor in waits.iter().flat_map(|regressor| &regressor.sensors) {

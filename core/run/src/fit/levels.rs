@@ -127,7 +127,7 @@ impl<'a> Fitting<'a> {
         let above = levels.iter().filter(|level| level.of_predictions);
         let rows = above.flat_map(|level| &level.nodes);
         let rows = rows.filter_map(|&node| plan.nodes[node].rows());
-        let truths = rows.map(|rows| rows.truth.slot).collect();
+        let truths = rows.map(|rows| rows.fit.truth.slot).collect();
         let top = levels.len().saturating_sub(1);
         let whole = &mut Planned::default();
         Self {
@@ -405,7 +405,7 @@ fn levels(plan: &Plan) -> Vec<Level> {
     let fitted = plan.nodes.iter().filter(|node| node.rows().is_some());
     let feeds = plan.behind(fitted.flat_map(|node| plan.reads(node)));
     for level in &mut levels {
-        let feeding = |node: &&usize| feeds.has_any(plan.nodes[**node].slots.clone());
+        let feeding = |node: &&usize| feeds[plan.nodes[**node].slots.clone()].contains(&true);
         level.feeding = level.nodes.iter().filter(feeding).copied().collect();
     }
     levels

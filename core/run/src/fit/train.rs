@@ -110,7 +110,7 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 /// Starts the fit of one estimator, now that it is known which candidates have values, and which of them stay the same.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec<usize>) -> Making {
     let node = &plan.nodes[trainee.node];
-    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
     let learning = match &node.role {
         PlannedRole::Estimator { learning, .. } => learning.as_ref(),
         PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
@@ -178,7 +178,7 @@ pub(super) fn end(
 ) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
-    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
     let mut dropped = trainee.dropped;
     dropped.incomplete = making.incomplete;
     let has_values = trainee.validity.kept();
@@ -265,8 +265,8 @@ fn no_truth(plan: &Plan, collector: &Collector, trainee: &Trainee) -> TrainingEr
     let (slot, dropped) = (trainee.link.slot, trainee.dropped);
     let truth = plan.channels[slot].name.clone();
     let none_came = dropped.outside_limits == 0 && dropped.without_run == 0;
-    let behind = plan.behind([slot].into_iter());
-    let measured = (0..plan.channels.len()).filter(|&slot| behind.contains(slot));
+    let behind = plan.behind([slot]);
+    let measured = (0..plan.channels.len()).filter(|&slot| behind[slot]);
     let measured = measured.filter(|&slot| plan.channels[slot].node.is_none());
     let measured: Vec<usize> = measured.collect();
     let is_known = measured

@@ -126,19 +126,16 @@ fn estimator_of(
     node: &PlannedNode,
     predictor: &dyn Predictor,
 ) -> Option<FittedEstimator> {
-    let PlannedRole::Estimator {
-        regressors, truth, ..
-    } = &node.role
-    else {
+    let PlannedRole::Estimator { fit, .. } = &node.role else {
         return None;
     };
-    let channel = &plan.channels[truth.slot];
+    let channel = &plan.channels[fit.truth.slot];
     let used = predictor.uses().iter();
     let used: Option<Vec<&Regressor>> = used
-        .map(|name| regressors.iter().find(|of| of.name == *name))
+        .map(|name| fit.regressors.iter().find(|of| of.name == *name))
         .collect();
     let parts = used.zip(predictor.coefficients()).map(|(used, mut found)| {
-        recur(&mut found, &used, truth.ahead.as_ns());
+        recur(&mut found, &used, fit.truth.ahead.as_ns());
         Names(&used).parts(found)
     });
     Some(FittedEstimator {

@@ -318,7 +318,7 @@ impl Model {
             }
             self.fitted.insert(instance.clone(), Arc::clone(fit));
             let behind = self.plan.behind(node.slots.clone());
-            let mut slots = (0..self.plan.channels.len()).filter(|&slot| behind.contains(slot));
+            let mut slots = (0..self.plan.channels.len()).filter(|&slot| behind[slot]);
             if slots.any(|slot| self.plan.channels[slot].node.is_some_and(changed)) {
                 doubtful.push(instance);
             }

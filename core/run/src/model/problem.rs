@@ -3,14 +3,7 @@
 use serde_json::Value;
 
 use crate::compile::{Change, ParameterChange};
-use crate::diagnostic::{Place, code, listed, problem};
-
-code!(
-    A190,
-    Error,
-    "unusable model",
-    "`model` names what `athermal fit` has written. `fit`, `compare`, `diff` and `test` do without it."
-);
+use crate::diagnostic::{Place, listed, problem};
 
 problem! {
     /// The model cannot be read.
@@ -23,6 +16,8 @@ problem! {
         /// Whether there is no file at its path, which a fit may then write.
         is_free: bool,
     }
+    error: "unusable model",
+    explanation: "`model` names what `athermal fit` has written. `fit`, `compare`, `diff` and `test` do without it.",
     message: format!("the model {path} cannot be used: {reason}"),
     label: "",
     help: match is_free {
@@ -31,13 +26,6 @@ problem! {
         false => format!("name what `athermal fit {machine} --data FILE -o MODEL.json` writes"),
     },
 }
-
-code!(
-    A191,
-    Error,
-    "model of another graph",
-    "A machine file runs with the fits of its `model` only where the parameters and inputs of each estimator are those of the fit."
-);
 
 problem! {
     /// An estimator is another than the model's.
@@ -51,6 +39,9 @@ problem! {
         named: Place,
         machine: String,
     }
+    error: "model of another graph",
+    explanation: "A machine file runs with the fits of its `model` only where the parameters and inputs of each estimator are those of \
+        the fit.",
     message: {
         let are_not = match more {
             0 => "is not".to_owned(),
@@ -69,16 +60,12 @@ problem! {
     related: vec![(*named, "the model that was fitted".to_owned())],
 }
 
-code!(
-    A192,
-    Warning,
-    "fit on other values",
-    "An estimator is as in the `model`, and what it reads is now made in another way: its coefficients may no longer be right."
-);
-
 problem! {
     /// What estimators read is made in another way than it was for the fit.
     A192 ReadsOther { instances: Vec<String>, path: String, named: Place }
+    warning: "fit on other values",
+    explanation: "An estimator is as in the `model`, and what it reads is now made in another way: its coefficients may no longer be \
+        right.",
     message: format!(
         "{} as in the model {path}, though what is read is now made in another way",
         match &instances[..] {

@@ -87,11 +87,6 @@ pub(super) fn versions(subject: &Subject<'_>, others: &[Subject<'_>]) -> Result<
             Carry::Cold { reason } if reason.trim().is_empty() => {
                 return Err(format!("a state of {which} is refused without a reason"));
             }
-            Carry::Migrated { from } => {
-                return Err(format!(
-                    "it says that it has migrated a state of {which} from `{from}`, which it cannot have"
-                ));
-            }
             Carry::Cold { .. } => {}
             Carry::Carried | Carry::Adopted { .. } | Carry::Warmed { .. } => {
                 return Err(format!("a state of {which} is taken as if it were its own"));
@@ -99,12 +94,12 @@ pub(super) fn versions(subject: &Subject<'_>, others: &[Subject<'_>]) -> Result<
         }
     }
     for other in others {
-        offer(subject, other)?;
+        offer(subject, other);
     }
     for case in of_other_widths(subject) {
         // With other channels a case may be refused, or allow no fit.
         if let Ok(other) = Subject::new(subject.kind, &case) {
-            offer(subject, &other)?;
+            offer(subject, &other);
         }
     }
     Ok(())
@@ -125,15 +120,10 @@ fn of_other_widths(subject: &Subject<'_>) -> Vec<Case> {
 }
 
 /// Offers what a node knows of one shape to one of another.
-fn offer(subject: &Subject<'_>, other: &Subject<'_>) -> Result<(), String> {
+fn offer(subject: &Subject<'_>, other: &Subject<'_>) {
     let mut engine = other.engine();
     course(&other.fixture, &mut engine, other.events());
-    match offered(subject, &engine.state()) {
-        Carry::Migrated { from } => Err(format!(
-            "a state of its own form, of another shape, is said to be migrated from `{from}`"
-        )),
-        _ => Ok(()),
-    }
+    offered(subject, &engine.state());
 }
 
 /// What the node answers to a state; then it has to live on.

@@ -19,21 +19,24 @@ use crate::unit::Unit;
 pub(super) struct Facts(IndexMap<String, Fact>);
 
 /// A property.
-#[derive(Debug, Clone)]
-enum Fact {
-    /// Data, equal when written alike.
-    Plain(Value),
-    /// Data whose texts may be units or quantities, equal when they mean the same.
-    Measured(Value),
+#[derive(Debug, Clone, PartialEq)]
+struct Fact {
+    value: Value,
+    /// Whether texts in it may be units or quantities, which are equal when they mean the same.
+    measured: bool,
 }
 
 impl Facts {
     fn plain(&mut self, path: impl Into<String>, value: impl Into<Value>) {
-        self.0.insert(path.into(), Fact::Plain(value.into()));
+        self.insert(path.into(), value.into(), false);
     }
 
     fn measured(&mut self, path: impl Into<String>, value: impl Into<Value>) {
-        self.0.insert(path.into(), Fact::Measured(value.into()));
+        self.insert(path.into(), value.into(), true);
+    }
+
+    fn insert(&mut self, path: String, value: Value, measured: bool) {
+        self.0.insert(path, Fact { value, measured });
     }
 
     /// Takes the leaves of a tree of parameters; lists stay whole, and null is the absence of a value.
@@ -45,38 +48,34 @@ impl Facts {
                     self.parameters(&format!("{path}.{key}"), value, measured);
                 }
             }
-            value if measured => self.measured(path, value),
-            value => self.plain(path, value),
+            value => self.insert(path.to_owned(), value, measured),
         }
     }
 
     /// The properties as data, which are the same where [`Self::changes_to`] finds nothing.
     pub(super) fn meaning(self, texts: &mut Texts) -> Value {
-        let meaning = |(path, fact): (String, Fact)| match fact {
-            Fact::Plain(value) => (path, value),
-            Fact::Measured(value) => (path, texts.meaning(value)),
-        };
+        let meaning = |(path, fact): (String, Fact)| (path, texts.of(fact));
         let sorted: BTreeMap<_, _> = self.0.into_iter().map(meaning).collect();
         sorted.into_iter().collect()
     }
 
     /// What differs, in the order of what there is now, then what is gone.
-    pub(super) fn changes_to(&self, to: &Self) -> Vec<ParameterChange> {
+    pub(super) fn changes_to(&self, to: &Self, texts: &mut Texts) -> Vec<ParameterChange> {
         let change = |path: &String, from: Option<&Fact>, to: Option<&Fact>| ParameterChange {
             path: path.clone(),
-            from: from.map(|fact| fact.value().clone()),
-            to: to.map(|fact| fact.value().clone()),
+            from: from.map(|fact| fact.value.clone()),
+            to: to.map(|fact| fact.value.clone()),
         };
         // The parameters of one kind mean nothing to another.
         if let (Some(before), Some(after)) = (self.0.get("type"), to.0.get("type"))
-            && !before.means(after)
+            && before != after
         {
             return vec![change(&"type".to_owned(), Some(before), Some(after))];
         }
         let mut changes = Vec::new();
         for (path, after) in &to.0 {
             let before = self.0.get(path);
-            if !before.is_some_and(|before| before.means(after)) {
+            if !before.is_some_and(|before| texts.are_one(before, after)) {
                 changes.push(change(path, before, Some(after)));
             }
         }
@@ -87,49 +86,25 @@ impl Facts {
     }
 }
 
-impl Fact {
-    fn value(&self) -> &Value {
-        match self {
-            Self::Plain(value) | Self::Measured(value) => value,
-        }
-    }
-
-    fn means(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Measured(a), Self::Measured(b)) => measures(a, b),
-            _ => self.value() == other.value(),
-        }
-    }
-}
-
-/// Whether two texts are the same unit or quantity, or two lists hold the same ones.
-fn measures(a: &Value, b: &Value) -> bool {
-    match (a, b) {
-        (Value::Array(a), Value::Array(b)) => {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| measures(a, b))
-        }
-        // One text for all channels, and each channel's own where they are spelt differently.
-        (one @ Value::String(_), Value::Array(all))
-        | (Value::Array(all), one @ Value::String(_)) => all.iter().all(|each| measures(one, each)),
-        (Value::String(a), Value::String(b)) if a != b => match (a.parse(), b.parse()) {
-            (Ok(a), Ok(b)) => same_quantity(&a, &b),
-            _ => matches!((Unit::parse(a), Unit::parse(b)), (Ok(a), Ok(b)) if a == b),
-        },
-        _ => a == b,
-    }
-}
-
-/// Converting may cost a rounding on either side.
-fn same_quantity(a: &Quantity, b: &Quantity) -> bool {
-    a.in_unit(&b.unit)
-        .is_some_and(|a| a == b.value || (a - b.value).abs() <= 2.0 * f64::EPSILON * b.value.abs())
-}
-
 /// What texts that may be units or quantities mean; each is read once.
 #[derive(Default)]
 pub(super) struct Texts(HashMap<String, String>);
 
 impl Texts {
+    fn of(&mut self, fact: Fact) -> Value {
+        match fact.measured {
+            true => self.meaning(fact.value),
+            false => fact.value,
+        }
+    }
+
+    /// Whether two properties mean the same. Lists are compared one by one, though one text may stand for all of a list.
+    fn are_one(&mut self, a: &Fact, b: &Fact) -> bool {
+        let lengths = |of: &Fact| of.value.as_array().map(Vec::len);
+        let differ = lengths(a).zip(lengths(b)).is_some_and(|(a, b)| a != b);
+        a == b || (!differ && self.of(a.clone()) == self.of(b.clone()))
+    }
+
     fn meaning(&mut self, value: Value) -> Value {
         match value {
             Value::Array(values) => {
@@ -256,12 +231,12 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
 fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
-    if let Some((truth, training)) = node.role.learns_from() {
-        facts.plain("ahead", truth.ahead.to_string());
-        let unit = &plan.channels[truth.slot].channel.unit;
+    if let Some(fit) = node.role.fit() {
+        facts.plain("ahead", fit.truth.ahead.to_string());
+        let unit = &plan.channels[fit.truth.slot].channel.unit;
         for (path, limit, none) in [
-            ("train.abs_truth.below", training.below, f64::INFINITY),
-            ("train.abs_truth.above", training.above, 0.0),
+            ("train.abs_truth.below", fit.training.below, f64::INFINITY),
+            ("train.abs_truth.above", fit.training.above, 0.0),
         ] {
             if limit != none {
                 facts.measured(path, format!("{limit} {unit}"));
@@ -315,10 +290,10 @@ fn is_measured<'a>(schema: &'a Value, definitions: &'a Value, followed: &mut Vec
 
 fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
     let (gathers, link) = match &node.role {
-        PlannedRole::Estimator { gathers, truth, .. } => {
+        PlannedRole::Estimator { gathers, fit, .. } => {
             // The gathers after the first read the same channels at other lags, which are parameters.
             let first = gathers.first().filter(|_| reads_features(node));
-            (first.copied().into_iter().collect(), Some(*truth))
+            (first.copied().into_iter().collect(), Some(fit.truth))
         }
         role => (role.inputs().collect::<Vec<_>>(), role.truth().copied()),
     };
@@ -414,33 +389,41 @@ mod tests {
 
     #[test]
     fn texts_mean_the_same_exactly_where_they_measure_the_same() {
-        let texts = [
-            "150 nm/min",
-            "0.15 um/min",
-            "2.5 nm/s",
-            "20 Cel",
-            "293.15 K",
-            "20 K",
-            "0 nm",
-            "-0 nm",
-            "0 K",
-            "K",
-            "Cel",
-            "mK/min",
-            "mK.min-1",
-            "uK/min",
-            "1 dB",
-            "ridge",
-            "lasso",
+        let alike = [
+            &["150 nm/min", "0.15 um/min", "2.5 nm/s"][..],
+            &["20 Cel", "293.15 K"],
+            &["20 K"],
+            &["0 nm", "-0 nm"],
+            &["0 K"],
+            &["K"],
+            &["Cel"],
+            &["mK/min", "mK.min-1"],
+            &["uK/min"],
+            &["1 dB"],
+            &["ridge"],
+            &["lasso"],
         ];
-        for a in texts {
-            for b in texts {
-                let alike = measures(&a.into(), &b.into());
-                assert_eq!(of_text(a) == of_text(b), alike, "{a} and {b}");
+        let all = || {
+            alike
+                .iter()
+                .enumerate()
+                .flat_map(|(nth, of)| of.iter().map(move |text| (nth, *text)))
+        };
+        for (a, one) in all() {
+            for (b, other) in all() {
+                assert_eq!(of_text(one) == of_text(other), a == b, "{one} and {other}");
             }
         }
-        let meaning = |value: Value| Texts::default().meaning(value);
-        assert_eq!(meaning(json!(["1 K", "1000 mK"])), meaning(json!("1 K")));
-        assert_ne!(meaning(json!(["1 K", "2 K"])), meaning(json!("1 K")));
+        let fact = |value: Value| Fact {
+            value,
+            measured: true,
+        };
+        let are_one = |a, b| Texts::default().are_one(&fact(a), &fact(b));
+        assert!(are_one(json!(["1 K", "1000 mK"]), json!("1 K")));
+        assert!(!are_one(json!(["1 K", "2 K"]), json!("1 K")));
+        assert!(!are_one(
+            json!(["1 K", "1 K"]),
+            json!(["1 K", "1 K", "1 K"])
+        ));
     }
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::plan::Plan;
-use facts::Facts;
+use facts::{Facts, Texts};
 
 /// What differs between two plans.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -104,29 +104,28 @@ impl PlanDiff {
 /// Compares two plans.
 #[must_use]
 pub fn diff(from: &Plan, to: &Plan) -> PlanDiff {
-    let signals = changes(facts::signals(from), facts::signals(to));
-    let nodes = changes(facts::nodes(from), facts::nodes(to));
-    let outputs = changes(facts::outputs(from), facts::outputs(to));
+    let texts = &mut Texts::default();
+    let time = facts::time(from).changes_to(&facts::time(to), texts);
+    let signals = changes(facts::signals(from), facts::signals(to), texts);
+    let signals = signals.map(|(channel, change)| SignalChange { channel, change });
+    let nodes = changes(facts::nodes(from), facts::nodes(to), texts);
+    let nodes = nodes.map(|(instance, change)| NodeChange { instance, change });
+    let outputs = changes(facts::outputs(from), facts::outputs(to), texts);
+    let outputs = outputs.map(|(output, change)| OutputChange { output, change });
     PlanDiff {
-        time: facts::time(from).changes_to(&facts::time(to)),
-        signals: signals
-            .map(|(channel, change)| SignalChange { channel, change })
-            .collect(),
-        nodes: nodes
-            .map(|(instance, change)| NodeChange { instance, change })
-            .collect(),
-        outputs: outputs
-            .map(|(output, change)| OutputChange { output, change })
-            .collect(),
+        time,
+        signals: signals.collect(),
+        nodes: nodes.collect(),
+        outputs: outputs.collect(),
     }
 }
 
 /// What a plan means, as data: the same for two plans between which [`diff`] finds nothing.
 ///
-/// Units and quantities stand in base units, in twelve significant digits, so that a rounding in converting them is none here.
+/// Units and quantities stand in base units, in twelve significant digits, so that a rounding in converting them is none.
 #[must_use]
 pub fn meaning(plan: &Plan) -> Value {
-    let mut texts = facts::Texts::default();
+    let mut texts = Texts::default();
     let mut all = |facts: IndexMap<String, Facts>| -> BTreeMap<String, Value> {
         let meaning = |(name, facts): (String, Facts)| (name, facts.meaning(&mut texts));
         facts.into_iter().map(meaning).collect()
@@ -143,9 +142,11 @@ pub fn meaning(plan: &Plan) -> Value {
 fn changes(
     from: IndexMap<String, Facts>,
     to: IndexMap<String, Facts>,
-) -> impl Iterator<Item = (String, Change)> {
+    texts: &mut Texts,
+) -> impl Iterator<Item = (String, Change)> + use<> {
     let compared = |(name, after): (&String, &Facts)| {
-        let change = match from.get(name).map(|before| before.changes_to(after)) {
+        let before = from.get(name);
+        let change = match before.map(|before| before.changes_to(after, texts)) {
             None => Change::Added,
             Some(differing) if differing.is_empty() => Change::Unchanged,
             Some(differing) => Change::Changed(differing),

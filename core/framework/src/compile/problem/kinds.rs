@@ -2,19 +2,14 @@
 
 use super::nearest_or_all;
 use crate::compile::KindFault;
-use crate::diagnostic::{code, names, problem};
+use crate::diagnostic::{names, problem};
 use crate::node::{Kind, Written};
-
-code!(
-    A040,
-    Error,
-    "unknown node type",
-    "No crate in this program has a node of this type. `athermal nodes` lists the types that there are."
-);
 
 problem! {
     /// A `type` that no linked crate brings.
     A040 UnknownKind { kind: String, known: Vec<&'static str> }
+    error: "unknown node type",
+    explanation: "No crate in this program has a node of this type. `athermal nodes` lists the types that there are.",
     message: format!("there is no node type `{kind}`"),
     label: "no such type",
     help: nearest_or_all(
@@ -24,17 +19,12 @@ problem! {
     ),
 }
 
-code!(
-    A041,
-    Error,
-    "ambiguous name",
-    "Two crates in this program have a node of the same type, or write what a node knows under the same name, so that a graph or a \
-     file could mean either."
-);
-
 problem! {
     /// Two crates bring the same kind.
     A041 KindTwice { kind: String, packages: Vec<&'static str> }
+    error: "ambiguous name",
+    explanation: "Two crates in this program have a node of the same type, or write what a node knows under the same name, so that a \
+        graph or a file could mean either.",
     message: format!("the node type `{kind}` is brought by several crates: {}", names(packages)),
     label: "which of them?",
     help: "leave one of the crates out when the program is built",
@@ -58,62 +48,42 @@ problem! {
     ),
 }
 
-code!(
-    A054,
-    Error,
-    "parameters that do not fit",
-    "The node's type refuses a parameter, or how its inputs fit together. `athermal nodes TYPE` lists what it takes."
-);
-
 problem! {
     /// A mistake that the kind found.
     A054 Parameter { message: String, help: Option<String> }
+    error: "parameters that do not fit",
+    explanation: "The node's type refuses a parameter, or how its inputs fit together. `athermal nodes TYPE` lists what it takes.",
     message: message.as_str(),
     label: "here",
     help: help.clone(),
 }
-
-code!(
-    A065,
-    Warning,
-    "doubtful use",
-    "The node works as it is written, but not as it is meant to be used. Its documentation describes what it needs."
-);
 
 problem! {
     /// Something that the kind can use and doubts to be meant.
     A065 Doubt { message: String, help: Option<String> }
+    warning: "doubtful use",
+    explanation: "The node works as it is written, but not as it is meant to be used. Its documentation describes what it needs.",
     message: message.as_str(),
     label: "here",
     help: help.clone(),
 }
 
-code!(
-    A110,
-    Error,
-    "estimator that does not learn",
-    "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters."
-);
-
 problem! {
     /// An estimator with `learn` that cannot learn while it runs.
     A110 NeverLearns { kind: &'static str, help: Option<&'static str> }
+    error: "estimator that does not learn",
+    explanation: "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters.",
     message: format!("`{kind}`, as it is here, does not learn while it runs"),
     label: "stays as it was fitted",
     help: help.unwrap_or("leave `learn` out, or choose a kind that learns"),
 }
 
-code!(
-    A180,
-    Error,
-    "mistake of a plugin",
-    "The code of the node's type does what no node may: it panics, or asks for values from the future. The graph is not at fault, and \
-     can only do without the type until its author has fixed it; `athermal nodes TYPE` names the crate."
-);
-
 problem! {
     /// A mistake in the code of a kind.
     A180 FaultyKind { kind: &'static str, author: String, fault: KindFault }
+    error: "mistake of a plugin",
+    explanation: "The code of the node's type does what no node may: it panics, or asks for values from the future. The graph is not at \
+        fault, and can only do without the type until its author has fixed it; `athermal nodes TYPE` names the crate.",
     message: format!("`{kind}` {}", fault.found),
     label: "a mistake of its kind, not of the graph",
     help: format!("for {author}: {}", fault.remedy),

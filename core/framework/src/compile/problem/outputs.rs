@@ -1,20 +1,15 @@
 //! Mistakes in what comes out of a graph, and what does not.
 
-use crate::diagnostic::{code, problem};
+use crate::diagnostic::problem;
 use crate::unit::Unit;
-
-code!(
-    A058,
-    Error,
-    "duplicate channel",
-    "Two channels of a port, or two columns of what comes out, would have the same name."
-);
 
 const ANOTHER_NAME: &str = "give one of them another name, or refer to fewer channels";
 
 problem! {
     /// Two channels of the same name.
     A058 DuplicateName { name: String, what: &'static str }
+    error: "duplicate channel",
+    explanation: "Two channels of a port, or two columns of what comes out, would have the same name.",
     message: format!("there are two {what} named `{name}`"),
     label: "the name is taken",
     help: ANOTHER_NAME,
@@ -38,16 +33,11 @@ problem! {
     },
 }
 
-code!(
-    A059,
-    Warning,
-    "unused node",
-    "No output depends on the node. It costs time and probably shows a reference that was forgotten."
-);
-
 problem! {
     /// A node whose outputs nobody uses; of a file that the graph extends, or of its own.
     A059 UnusedNode { node: String, inherited: bool }
+    warning: "unused node",
+    explanation: "No output depends on the node. It costs time and probably shows a reference that was forgotten.",
     message: format!("no output depends on the node `{node}`"),
     label: "not used",
     help: match (node.contains('/'), inherited) {
@@ -61,61 +51,42 @@ problem! {
     },
 }
 
-code!(
-    A060,
-    Warning,
-    "unused signal",
-    "No output depends on the signal."
-);
-
 problem! {
     /// A signal that nobody uses.
     A060 UnusedSignal { signal: String }
+    warning: "unused signal",
+    explanation: "No output depends on the signal.",
     message: format!("no output depends on the signal `{signal}`"),
     label: "not used",
     help: "refer to it or remove it",
 }
 
-code!(
-    A061,
-    Error,
-    "output without a signal",
-    "No measured channel reaches the output, so it would never have a value."
-);
-
 problem! {
     /// An output behind which there is no signal.
     A061 Unreachable { output: String }
+    error: "output without a signal",
+    explanation: "No measured channel reaches the output, so it would never have a value.",
     message: format!("no signal reaches the output `{output}`"),
     label: "nothing flows in",
     help: "check the inputs on the way to it",
 }
 
-code!(
-    A062,
-    Error,
-    "no outputs",
-    "A graph names under `[outputs]` what it is for; without that nothing of it needs to be computed."
-);
-
 problem! {
     /// A graph without outputs.
     A062 NoOutputs {}
+    error: "no outputs",
+    explanation: "A graph names under `[outputs]` what it is for; without that nothing of it needs to be computed.",
     message: "the graph has no outputs",
     label: "no `[outputs]`",
     help: "name what the graph is for: `[outputs]` and `predicted = \"NODE\"`",
 }
 
-code!(
-    A069,
-    Warning,
-    "columns in another unit",
-    "A table's columns are named for another unit than their signal's, which measures the same. Values are read in the unit of the signal."
-);
-
 problem! {
     /// Columns that are named for another unit than their signal's.
     A069 ColumnUnit { signal: String, column: String, named: Unit, unit: Unit }
+    warning: "columns in another unit",
+    explanation: "A table's columns are named for another unit than their signal's, which measures the same. Values are read in the unit \
+        of the signal.",
     message: format!("`{signal}` is in {unit}, and its column `{column}` is named for {named}"),
     label: "another unit",
     help: format!(

@@ -3,18 +3,13 @@
 use std::sync::Arc;
 
 use super::{nearest_of_many, nearest_or_all};
-use crate::diagnostic::{Names, code, names, problem};
-
-code!(
-    A042,
-    Error,
-    "unknown node or signal",
-    "A reference begins with the name of a node or signal of the graph."
-);
+use crate::diagnostic::{Names, names, problem};
 
 problem! {
     /// A reference to a node or signal that is not there.
     A042 UnknownNode { node: String, known: Arc<Names> }
+    error: "unknown node or signal",
+    explanation: "A reference begins with the name of a node or signal of the graph.",
     message: format!("there is no node or signal `{node}`"),
     label: "not found",
     help: match node.split_once('[') {
@@ -34,16 +29,11 @@ problem! {
     help: "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`",
 }
 
-code!(
-    A043,
-    Error,
-    "unknown port",
-    "What follows the `:` of a reference is one of the node's output ports. `athermal nodes TYPE` lists them."
-);
-
 problem! {
     /// A reference to a port that the node does not have.
     A043 UnknownPort { node: String, port: String, known: Vec<&'static str> }
+    error: "unknown port",
+    explanation: "What follows the `:` of a reference is one of the node's output ports. `athermal nodes TYPE` lists them.",
     message: format!("`{node}` has no output port `{port}`"),
     label: "no such port",
     help: if known.is_empty() {
@@ -71,16 +61,11 @@ problem! {
     },
 }
 
-code!(
-    A044,
-    Error,
-    "unknown channel",
-    "A reference that matches nothing is a mistake, since an empty input would silently have no effect."
-);
-
 problem! {
     /// A reference that matches no channel.
     A044 UnknownChannel { node: String, channel: String, known: Arc<Names> }
+    error: "unknown channel",
+    explanation: "A reference that matches nothing is a mistake, since an empty input would silently have no effect.",
     message: format!("`{node}` has no channel that matches `{channel}`"),
     label: "matches nothing",
     help: match channel.split_once(':') {
@@ -89,17 +74,12 @@ problem! {
     },
 }
 
-code!(
-    A051,
-    Error,
-    "nodes that wait for each other",
-    "A node runs after those that it reads, so they cannot form a loop. Feedback goes through a `delay`, which gives what was known at \
-     an earlier tick."
-);
-
 problem! {
     /// A loop without a delay.
     A051 Cycle { path: Vec<String> }
+    error: "nodes that wait for each other",
+    explanation: "A node runs after those that it reads, so they cannot form a loop. Feedback goes through a `delay`, which gives what \
+        was known at an earlier tick.",
     message: format!("these nodes wait for each other: {}", path.join(" → ")),
     label: "part of a loop",
     help: "let the feedback go through a `delay` node",

@@ -3,19 +3,10 @@
 use std::cmp::Ordering;
 
 use crate::compile::provenance::smallest_lag;
-use crate::diagnostic::{code, problem};
+use crate::diagnostic::problem;
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
-
-code!(
-    A052,
-    Error,
-    "part of the answer",
-    "A regressor, or a vote that is no prediction, overlaps the value that is predicted. Windows of neighbouring truths overlap. So a \
-     recent truth, a feature made of the truth's signal, or what learns from the truth while it runs, contains part of the answer, and \
-     scores would flatter. A lag of at least the truth's span less `ahead` is free of it."
-);
 
 problem! {
     /// A regressor that contains part of the answer.
@@ -30,6 +21,10 @@ problem! {
         /// The channels from the regressor back to what was measured; none where the truth itself is lagged.
         path: Vec<String>,
     }
+    error: "part of the answer",
+    explanation: "A regressor, or a vote that is no prediction, overlaps the value that is predicted. Windows of neighbouring truths \
+        overlap. So a recent truth, a feature made of the truth's signal, or what learns from the truth while it runs, contains part of \
+        the answer, and scores would flatter. A lag of at least the truth's span less `ahead` is free of it.",
     message: format!(
         "`{regressor}` contains part of the answer: it overlaps the value of `{truth}` that is predicted"
     ),
@@ -70,34 +65,25 @@ fn way_back(path: &[String]) -> String {
     format!("{} from … from {}", quoted(first), quoted(last))
 }
 
-code!(
-    A055,
-    Error,
-    "an estimator without a horizon",
-    "An estimator predicts the value that its truth will have at `t + ahead`, so it needs an `ahead`; `\"0s\"` is a virtual sensor."
-);
-
 problem! {
     /// An estimator without a horizon.
     A055 NoHorizon { kind: &'static str }
+    error: "an estimator without a horizon",
+    explanation: "An estimator predicts the value that its truth will have at `t + ahead`, so it needs an `ahead`; `\"0s\"` is a virtual \
+        sensor.",
     message: format!("`{kind}` needs to know how far `ahead` it predicts"),
     label: "`ahead` is missing",
     help: "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor",
 }
-
-code!(
-    A056,
-    Error,
-    "a truth that is a prediction",
-    "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what describes one, \
-     such as its `std_dev` or `weights`."
-);
 
 const SOMETHING_MEASURED: &str = "refer to something measured, such as the slope of a position";
 
 problem! {
     /// A truth that is a prediction.
     A056 PredictedTruth { channel: String }
+    error: "a truth that is a prediction",
+    explanation: "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what \
+        describes one, such as its `std_dev` or `weights`.",
     message: format!("`{channel}` is a prediction and cannot be the truth"),
     label: "not measured",
     help: SOMETHING_MEASURED,
@@ -111,17 +97,12 @@ problem! {
     help: SOMETHING_MEASURED,
 }
 
-code!(
-    A057,
-    Error,
-    "a limit in another unit",
-    "Limits of the absolute truth are in a unit that converts to the truth's, and `blend` is a rate above zero in one that converts to \
-     the output's per second."
-);
-
 problem! {
     /// A limit of a unit that is not the truth's.
     A057 LimitUnit { found: Unit, expected: Unit }
+    error: "a limit in another unit",
+    explanation: "Limits of the absolute truth are in a unit that converts to the truth's, and `blend` is a rate above zero in one that \
+        converts to the output's per second.",
     message: format!("the limit is in {found} and the truth in {expected}, which do not convert"),
     label: "another unit",
     help: format!("write the limit in {expected}"),
@@ -137,32 +118,22 @@ problem! {
     ),
 }
 
-code!(
-    A064,
-    Error,
-    "limits that admit nothing",
-    "`train.abs_truth` leaves no row to fit on: `below` is larger than `above`, and neither is negative."
-);
-
 problem! {
     /// Limits of a fit that admit no row.
     A064 NoRows { below: Quantity, above: Quantity }
+    error: "limits that admit nothing",
+    explanation: "`train.abs_truth` leaves no row to fit on: `below` is larger than `above`, and neither is negative.",
     message: format!("no truth lies below {below} and at or above {above}"),
     label: "admits no row",
     help: "`above` is 0 or more, and `below` is larger",
 }
 
-code!(
-    A160,
-    Error,
-    "a truth without a span",
-    "What may be known of a truth, and when, follows from its span: the length of past time that one value summarises. A first-order lag \
-     depends on all of the past, so it has none unless `span` defines how much of it counts."
-);
-
 problem! {
     /// A truth made of values that depend on all of the past.
     A160 EndlessTruth { channel: String, node: String }
+    error: "a truth without a span",
+    explanation: "What may be known of a truth, and when, follows from its span: the length of past time that one value summarises. A \
+        first-order lag depends on all of the past, so it has none unless `span` defines how much of it counts.",
     message: format!("`{channel}` cannot be the truth, since `{node}` remembers all of the past"),
     label: "of no span",
     help: format!(

@@ -115,10 +115,8 @@ impl Embargo {
         pairing.keep_from(withheld.front().map(|late| late.run));
     }
 
-    /// Hands over all, up to the last tick of a segment that has ended.
-    pub(crate) fn end_segment(&mut self, last: Instant, give: impl FnMut(DueTruth<'_>)) {
-        // The embargo guards predictions of the segment that has ended; none of them is still to come.
-        self.release(last, give);
+    /// Forgets the runs of a segment that has ended: none of its truths is still to come.
+    pub(crate) fn clear(&mut self) {
         self.state.pairing.clear();
     }
 

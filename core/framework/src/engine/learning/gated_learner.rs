@@ -173,29 +173,29 @@ impl GatedLearner {
     ) -> Option<(LearnOutcome, Instant)> {
         let frozen = self.frozen(gathered, on);
         let newest = self.newest(now);
-        let (learner, gate) = (&mut *self.learner, &mut self.gate);
-        let mut newest_outcome = None;
-        let free = self.mode == Mode::FreeRun;
-        self.withheld.release(newest, |released| {
-            if free && learner.is_settled() {
-                return;
-            }
-            newest_outcome = Some((gate.offer(learner, released, frozen), released.arrived));
-        });
-        self.changed |= newest_outcome.is_some();
-        newest_outcome
+        let outcome = self.learn_up_to(newest, frozen);
+        self.changed |= outcome.is_some();
+        outcome
     }
 
-    /// The segment has ended with this tick.
-    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
-        let frozen = self.frozen(gathered, on);
+    #[inline]
+    fn learn_up_to(&mut self, newest: Instant, frozen: f64) -> Option<(LearnOutcome, Instant)> {
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
         let free = self.mode == Mode::FreeRun;
-        self.withheld.end_segment(last, |released| {
+        let mut outcome = None;
+        self.withheld.release(newest, |released| {
             if !(free && learner.is_settled()) {
-                gate.offer(learner, released, frozen);
+                outcome = Some((gate.offer(learner, released, frozen), released.arrived));
             }
         });
+        outcome
+    }
+
+    /// The segment has ended with this tick: the embargo guards its predictions, of which none is still to come.
+    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = self.frozen(gathered, on);
+        self.learn_up_to(last, frozen);
+        self.withheld.clear();
         self.changed = true;
         self.step.segment();
     }

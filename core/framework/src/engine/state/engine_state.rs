@@ -1,9 +1,9 @@
 //! The state of an engine and its form in bytes. [`snapshot`](super::snapshot) takes it down.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::blend::Blending;
 use super::revision::fnv_1a;
@@ -83,18 +83,25 @@ impl NodeState {
 }
 
 /// Why a snapshot is not taken.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum RestoreError {
     /// The bytes are no snapshot.
+    #[error("these bytes are no snapshot of an engine")]
     NotASnapshot,
     /// The bytes have changed since they were written.
+    #[error("the snapshot is damaged: its checksum does not fit; use an older one")]
     Damaged,
     /// The form is one that this program does not know.
+    #[error("the snapshot was written by another version: {reason}")]
     Unreadable {
         /// The message of the reader.
         reason: String,
     },
     /// The snapshot belongs to another graph or fit.
+    #[error(
+        "the snapshot belongs to revision {found} and the engine runs revision {expected}: load the model that it was taken of, or start \
+         cold"
+    )]
     OtherGraph {
         /// The revision that the snapshot belongs to.
         found: String,
@@ -102,6 +109,7 @@ pub enum RestoreError {
         expected: String,
     },
     /// A node does not go on from its state.
+    #[error("`{node}` does not go on from its state: {reason}")]
     Refused {
         /// The node.
         node: String,
@@ -109,31 +117,6 @@ pub enum RestoreError {
         reason: String,
     },
 }
-
-impl fmt::Display for RestoreError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotASnapshot => write!(f, "these bytes are no snapshot of an engine"),
-            Self::Damaged => write!(
-                f,
-                "the snapshot is damaged: its checksum does not fit; use an older one"
-            ),
-            Self::Unreadable { reason } => {
-                write!(f, "the snapshot was written by another version: {reason}")
-            }
-            Self::OtherGraph { found, expected } => write!(
-                f,
-                "the snapshot belongs to revision {found} and the engine runs revision {expected}: \
-                 load the model that it was taken of, or start cold"
-            ),
-            Self::Refused { node, reason } => {
-                write!(f, "`{node}` does not go on from its state: {reason}")
-            }
-        }
-    }
-}
-
-impl std::error::Error for RestoreError {}
 
 impl EngineState {
     /// The state as bytes: a name, a checksum, and the state as MessagePack with names.

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::engine_state::{NodeState, SlotState};
-use super::transfer::{Begin, Carry, Dependents, NodeCarry, StateTransfer};
+use super::transfer::{Begin, Carry, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
 use crate::compile::PlannedRole;
+use crate::compile::origins::Dependents;
 use crate::engine::tick::Estimate;
 use crate::engine::tick::NodeRunner;
 use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
@@ -66,7 +67,7 @@ impl Engine {
         let carried = self.adopt(state, &StateTransfer::all(&self.plan), false);
         carried.into_iter().find_map(|node| match node.outcome {
             Carry::Cold { reason } | Carry::Warmed { reason } => Some((node.node, reason)),
-            Carry::Carried | Carry::Adopted { .. } | Carry::Migrated { .. } => None,
+            Carry::Carried | Carry::Adopted { .. } => None,
         })
     }
 
@@ -120,11 +121,11 @@ impl Engine {
             let states = nodes.map(|(index, (node, runner))| {
                 at_work.is(index);
                 let state = match runner {
-                    NodeRunner::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
-                    NodeRunner::Estimate { estimate, .. } => estimate
-                        .as_ref()
-                        .map(Estimate::snapshot)
-                        .unwrap_or_default(),
+                    NodeRunner::Operator(node) => NodeState::pack(node.operator.snapshot()),
+                    NodeRunner::Estimate(node) => {
+                        let estimate = node.estimate.as_ref();
+                        estimate.map(Estimate::snapshot).unwrap_or_default()
+                    }
                     NodeRunner::Vote(vote) => vote.snapshot(),
                 };
                 (node.instance(), state)
@@ -158,7 +159,6 @@ impl Engine {
             let outcome = match &transfer.nodes[index] {
                 Begin::AsItWas => match restored() {
                     Restored::Accepted => Carry::Carried,
-                    Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason } => {
                         refusing[index] = true;
                         afresh(reason)
@@ -168,7 +168,6 @@ impl Engine {
                     Restored::Accepted => Carry::Adopted {
                         reason: reason.clone(),
                     },
-                    Restored::Migrated { from } => Carry::Migrated { from },
                     Restored::Cold { reason: why } => afresh(format!("{reason}: {why}")),
                 },
                 Begin::Afresh { reason } => afresh(reason.clone()),
@@ -181,7 +180,7 @@ impl Engine {
         self.adopt_slots(state, transfer, &refusing);
         if refusing.contains(&true) {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.
-            let touched = Dependents::by(&plan, &[], |node| refusing[node]);
+            let touched = Dependents::of(&plan, &[], |node| refusing[node]);
             for (node, carry) in plan.nodes.iter().zip(&mut carried) {
                 let read = plan.reads(node).find(|&slot| touched.slots[slot]);
                 if let (Carry::Carried, Some(slot)) = (&carry.outcome, read) {
@@ -255,12 +254,12 @@ fn restored(running: &mut NodeRunner, state: Option<&NodeState>) -> Restored {
         return Restored::cold("nothing is known of it");
     };
     match running {
-        NodeRunner::Operator { operator, .. } => match state.unpack() {
-            Ok(Some(own)) => operator.restore(own),
+        NodeRunner::Operator(node) => match state.unpack() {
+            Ok(Some(own)) => node.operator.restore(own),
             Ok(None) => Restored::Accepted,
             Err(cold) => cold,
         },
-        NodeRunner::Estimate { estimate, .. } => match estimate {
+        NodeRunner::Estimate(node) => match &mut node.estimate {
             Some(estimate) => estimate.restore(state),
             None => Restored::Accepted,
         },

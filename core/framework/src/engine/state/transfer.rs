@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
+use crate::compile::origins::Dependents;
 use crate::compile::{Change, Plan, PlannedNode, diff};
 use crate::engine::{Engine, Fitted};
 
@@ -56,11 +57,6 @@ pub enum Carry {
         /// What changed.
         reason: String,
     },
-    /// From the old state, which was of an older form.
-    Migrated {
-        /// The name of that form.
-        from: String,
-    },
     /// Warmed by the retained past.
     Warmed {
         /// Why it could not be carried.
@@ -112,8 +108,8 @@ impl StateTransfer {
             .map(|signal| signal.change != Change::Unchanged);
         let mut other_signals: Vec<bool> = signals.collect();
         other_signals.truncate(plan.sources.len());
-        let touched = Dependents::by(plan, &other_signals, |node| own[node].is_some());
-        let but_for_fits = Dependents::by(plan, &other_signals, |node| {
+        let touched = Dependents::of(plan, &other_signals, |node| own[node].is_some());
+        let but_for_fits = Dependents::of(plan, &other_signals, |node| {
             own[node].as_ref().is_some_and(|own| *own != Own::Fit)
         });
         let nodes = plan.nodes.iter().enumerate().map(|(index, node)| {
@@ -243,40 +239,6 @@ impl Own {
             Self::Unit => "the unit of its outputs changed",
             Self::Fit => "it was fitted anew",
         }
-    }
-}
-
-/// What hangs on something, by number.
-pub(crate) struct Dependents {
-    pub(crate) nodes: Vec<bool>,
-    pub(crate) slots: Vec<bool>,
-}
-
-impl Dependents {
-    /// Everything that hangs on these signals and nodes, through loops too.
-    pub(crate) fn by(plan: &Plan, signals: &[bool], node: impl Fn(usize) -> bool) -> Self {
-        let mut slots = vec![false; plan.channels.len()];
-        slots[..signals.len()].copy_from_slice(signals);
-        let mut readers = vec![Vec::new(); plan.channels.len()];
-        for (index, node) in plan.nodes.iter().enumerate() {
-            for slot in plan.reads(node) {
-                readers[slot].push(index);
-            }
-        }
-        let mut nodes = vec![false; plan.nodes.len()];
-        let mut open: Vec<usize> = (0..plan.nodes.len()).filter(|&index| node(index)).collect();
-        for slot in (0..signals.len()).filter(|&slot| signals[slot]) {
-            open.extend(&readers[slot]);
-        }
-        while let Some(index) = open.pop() {
-            if !std::mem::replace(&mut nodes[index], true) {
-                for slot in plan.nodes[index].slots.clone() {
-                    slots[slot] = true;
-                    open.extend(&readers[slot]);
-                }
-            }
-        }
-        Self { nodes, slots }
     }
 }
 

@@ -80,15 +80,10 @@ impl<'a> Linear<'a> {
     const MANY: usize = 8;
 
     fn of(node: usize, running: &'a NodeRunner) -> Option<Self> {
-        let NodeRunner::Estimate {
-            estimate: Some(estimate),
-            trigger,
-            slot,
-            ..
-        } = running
-        else {
+        let NodeRunner::Estimate(running) = running else {
             return None;
         };
+        let estimate = running.estimate.as_ref()?;
         // Without regressors there is no oldest stamp.
         let form = estimate
             .form()
@@ -101,8 +96,8 @@ impl<'a> Linear<'a> {
         };
         Some(Self {
             node,
-            slot: *slot,
-            trigger: *trigger,
+            slot: running.slot,
+            trigger: running.trigger,
             learns: estimate.learning.is_some(),
             form,
             shared,
@@ -182,10 +177,7 @@ impl Bank {
     fn learn(&mut self, context: &mut TickContext<'_>, nodes: &mut [NodeRunner]) {
         let learning = self.members.iter_mut().enumerate();
         for (nth, member) in learning.filter(|(_, of)| of.learns) {
-            if let NodeRunner::Estimate {
-                estimate: Some(estimate),
-                ..
-            } = &mut nodes[member.node]
+            if let Some(estimate) = nodes[member.node].estimate_mut()
                 && let Some(learning) = estimate.learning()
             {
                 context.at_work.is(member.node);

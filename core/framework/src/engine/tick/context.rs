@@ -1,16 +1,14 @@
 //! What one node does at a tick: whether it runs, what it reads and where its outputs go.
 
-use std::ops::Range;
-
 use super::estimate::Estimate;
 use super::gather::Gathered;
-use super::runner::NodeRunner;
+use super::runner::{EstimateRunner, NodeRunner, OperatorRunner};
 use super::slots::Slots;
 use super::vote::Vote;
 use crate::channel::unless_infinite;
 use crate::engine::at_work::AtWork;
 use crate::engine::learning::GatedLearner;
-use crate::node::{Operator, Outputs, Tick};
+use crate::node::{Outputs, Tick};
 use crate::time::Instant;
 
 /// What all nodes see of a tick.
@@ -29,27 +27,16 @@ impl TickContext<'_> {
     #[inline]
     pub(crate) fn run(&mut self, running: &mut NodeRunner) {
         match running {
-            NodeRunner::Operator {
-                operator,
-                gathers,
-                every_tick,
-                closes_loops,
-                slots,
-            } => {
+            NodeRunner::Operator(node) => {
                 let changed = |&gather: &usize| {
                     let gathered = &self.gathered[gather];
                     gathered.fresh | gathered.ended
                 };
-                if *every_tick || gathers.iter().any(changed) {
-                    self.operator(&mut **operator, slots.clone(), gathers, *closes_loops);
+                if node.every_tick || node.gathers.iter().any(changed) {
+                    self.operator(node);
                 }
             }
-            NodeRunner::Estimate {
-                estimate,
-                trigger,
-                slot,
-                std_dev,
-            } => self.estimate(estimate.as_mut(), *trigger, *slot, *std_dev),
+            NodeRunner::Estimate(node) => self.estimate(node),
             NodeRunner::Vote(vote) => self.vote(vote),
         }
     }
@@ -57,50 +44,34 @@ impl TickContext<'_> {
     /// Lets a node take what it needs of values that are not yet there when it runs.
     #[inline(never)]
     pub(crate) fn capture(&self, running: &mut NodeRunner) {
-        if let NodeRunner::Operator {
-            operator, gathers, ..
-        } = running
-        {
-            operator.capture(&Tick {
+        if let NodeRunner::Operator(node) = running {
+            node.operator.capture(&Tick {
                 now: self.now,
                 gathered: &&*self.gathered,
-                ports: gathers,
+                ports: &node.gathers,
             });
         }
     }
 
-    fn operator(
-        &mut self,
-        operator: &mut dyn Operator,
-        range: Range<usize>,
-        gathers: &[usize],
-        closes_loops: bool,
-    ) {
-        let Self {
-            now,
-            slots,
-            gathered,
-            ..
-        } = self;
-        let now = *now;
-        let oldest = |&gather: &usize| gathered[gather].oldest();
-        let stamp = if closes_loops {
+    fn operator(&mut self, node: &mut OperatorRunner) {
+        let stamp = if node.closes_loops {
             None
         } else {
-            gathers.iter().filter_map(oldest).min()
+            let oldest = |&gather: &usize| self.gathered[gather].oldest();
+            node.gathers.iter().filter_map(oldest).min()
         };
         let mut outputs = Outputs {
-            values: &mut slots.values[range.clone()],
-            given: &mut slots.given[range],
-            tick: slots.tick,
-            default_stamp: stamp.unwrap_or(now),
+            values: &mut self.slots.values[node.slots.clone()],
+            given: &mut self.slots.given[node.slots.clone()],
+            tick: self.slots.tick,
+            default_stamp: stamp.unwrap_or(self.now),
         };
         let tick = Tick {
-            now,
-            gathered: &&**gathered,
-            ports: gathers,
+            now: self.now,
+            gathered: &&*self.gathered,
+            ports: &node.gathers,
         };
-        operator.step(&tick, &mut outputs);
+        node.operator.step(&tick, &mut outputs);
     }
 
     /// Lets an estimator learn before it runs; the outcome of the newest truth stands beside its prediction.
@@ -118,57 +89,37 @@ impl TickContext<'_> {
 
     /// Lets an estimator learn, then predict.
     #[inline(never)]
-    fn estimate(
-        &mut self,
-        mut estimate: Option<&mut Estimate>,
-        trigger: Option<usize>,
-        slot: usize,
-        std_dev: Option<usize>,
-    ) {
-        if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
-            self.learn(learning, slot);
+    fn estimate(&mut self, node: &mut EstimateRunner) {
+        if let Some(learning) = node.estimate.as_mut().and_then(Estimate::learning) {
+            self.learn(learning, node.slot);
         }
-        let Self {
-            now,
-            slots,
-            gathered,
-            row,
-            frozen,
-            ..
-        } = self;
-        let (now, on) = (*now, !*frozen);
-        if trigger.is_some_and(|gather| !gathered[gather].fresh) {
+        if node.trigger.is_some_and(|of| !self.gathered[of].fresh) {
             return;
         }
-        let Some(estimate) = estimate else {
-            slots.set(slot, f64::NAN, now);
+        let now = self.now;
+        let Some(estimate) = &mut node.estimate else {
+            self.slots.set(node.slot, f64::NAN, now);
             return;
         };
         if let Some(feedback) = estimate.feedback() {
-            feedback.before_run(slots, now);
+            feedback.before_run(self.slots, now);
         }
-        let row = &mut row[..estimate.width()];
-        let (value, stamp) = estimate.run(gathered, row, now, on);
-        slots.set(slot, value, stamp);
-        if let Some(slot) = std_dev {
+        let row = &mut self.row[..estimate.width()];
+        let (value, stamp) = estimate.run(self.gathered, row, now, !self.frozen);
+        self.slots.set(node.slot, value, stamp);
+        if let Some(slot) = node.std_dev {
             let known = if value.is_nan() {
                 f64::NAN
             } else {
                 estimate.std_dev(row, now)
             };
-            slots.set(slot, known, stamp);
+            self.slots.set(slot, known, stamp);
         }
     }
 
     #[inline]
     fn vote(&mut self, vote: &mut Vote) {
-        let Self {
-            now,
-            slots,
-            gathered,
-            ..
-        } = self;
-        let now = *now;
+        let (now, gathered, slots) = (self.now, &*self.gathered, &mut *self.slots);
         vote.release(now);
         let votes = &gathered[vote.wires.voters];
         let mut fresh = votes.fresh;

@@ -87,10 +87,8 @@ impl Estimate {
         widths: &[usize],
     ) -> Result<Self, EngineError> {
         let PlannedRole::Estimator {
-            regressors,
+            fit,
             gathers,
-            truth,
-            training,
             learning,
             std_dev,
             ..
@@ -104,7 +102,7 @@ impl Estimate {
             .iter()
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
-        let used = places_of(node, regressors, &*predictor)?;
+        let used = places_of(node, &fit.regressors, &*predictor)?;
         let used_of_gathers: Vec<_> = used.iter().map(|&index| places[index]).collect();
         let same_gather = |one: &(usize, usize), other: &(usize, usize)| one.0 == other.0;
         let parts = used_of_gathers.chunk_by(same_gather).map(|part| {
@@ -112,26 +110,20 @@ impl Estimate {
             Part::new(part[0].0, &places)
         });
         let parts = parts.collect();
-        let learning = match learning {
-            None => None,
-            Some(planned) => {
-                let learning = GatedLearner::new(&predictor, *planned, *truth, *training);
-                Some(
-                    learning
-                        .map(Box::new)
-                        .ok_or_else(|| EngineError::DoesNotLearn {
-                            node: node.instance(),
-                        })?,
-                )
-            }
-        };
+        let learning = learning.map(|planned| {
+            let learning = GatedLearner::new(&predictor, planned, fit.truth, fit.training);
+            learning.map(Box::new).ok_or_else(|| {
+                let node = node.instance();
+                EngineError::DoesNotLearn { node }
+            })
+        });
         Ok(Self {
             width: used.len(),
             plain: std_dev.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
-            learning,
+            learning: learning.transpose()?,
             feedback: None,
         })
     }
@@ -272,6 +264,16 @@ impl Estimate {
     /// What goes on learning.
     pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
         self.learning.as_deref_mut()
+    }
+
+    /// The segment has ended with this tick.
+    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
+        if let Some(learning) = &mut self.learning {
+            learning.segment(last, gathered, on);
+        }
+        if let Some(feedback) = &mut self.feedback {
+            feedback.segment();
+        }
     }
 
     /// What was learned since the fit.

@@ -14,58 +14,64 @@ use crate::node::{Inputs, Operator, Predictor, Role};
 
 /// What runs a node, with all that a tick needs of its plan.
 pub(crate) enum NodeRunner {
-    Operator {
-        operator: Box<dyn Operator>,
-        gathers: Box<[usize]>,
-        every_tick: bool,
-        closes_loops: bool,
-        slots: Range<usize>,
-    },
-    Estimate {
-        estimate: Option<Estimate>,
-        trigger: Option<usize>,
-        slot: usize,
-        /// The slot of the standard deviation, where somebody reads it.
-        std_dev: Option<usize>,
-    },
+    Operator(OperatorRunner),
+    Estimate(EstimateRunner),
     Vote(Box<Vote>),
 }
 
+/// What runs a feature.
+pub(crate) struct OperatorRunner {
+    pub(crate) operator: Box<dyn Operator>,
+    pub(crate) gathers: Box<[usize]>,
+    pub(crate) every_tick: bool,
+    pub(crate) closes_loops: bool,
+    pub(crate) slots: Range<usize>,
+}
+
+/// What runs an estimator.
+pub(crate) struct EstimateRunner {
+    pub(crate) estimate: Option<Estimate>,
+    /// The gather that lets it run, unless it does at every tick.
+    pub(crate) trigger: Option<usize>,
+    pub(crate) slot: usize,
+    /// The slot of the standard deviation, where somebody reads it.
+    pub(crate) std_dev: Option<usize>,
+}
+
 impl NodeRunner {
-    /// How many regressors it reads as an estimator.
-    pub(crate) fn width(&self) -> usize {
+    /// A fitted estimator.
+    pub(crate) fn estimate(&self) -> Option<&Estimate> {
         match self {
-            Self::Estimate {
-                estimate: Some(estimate),
-                ..
-            } => estimate.width(),
-            _ => 0,
+            Self::Estimate(node) => node.estimate.as_ref(),
+            Self::Operator(_) | Self::Vote(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn estimate_mut(&mut self) -> Option<&mut Estimate> {
+        match self {
+            Self::Estimate(node) => node.estimate.as_mut(),
+            Self::Operator(_) | Self::Vote(_) => None,
         }
     }
 
     /// What goes on learning, of an estimator that does.
     pub(crate) fn learning(&mut self) -> Option<&mut GatedLearner> {
-        match self {
-            Self::Estimate { estimate, .. } => estimate.as_mut()?.learning(),
-            _ => None,
-        }
+        self.estimate_mut()?.learning()
     }
 
     /// Whether what it knows stays true whatever becomes of what it reads.
     pub(crate) fn outlives_changes(&self) -> bool {
-        matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
+        matches!(self, Self::Operator(node) if node.operator.outlives_changes())
     }
 
     /// The slot of the truth that it is given after all outputs.
     pub(crate) fn truth(&self) -> Option<usize> {
-        match self {
-            Self::Operator { .. } => None,
-            Self::Estimate { estimate, .. } => {
-                let learning = estimate.as_ref()?.learning.as_ref()?;
-                (!learning.at_once()).then(|| learning.truth())
-            }
-            Self::Vote(vote) => vote.truth(),
+        if let Self::Vote(vote) = self {
+            return vote.truth();
         }
+        let learning = self.estimate()?.learning.as_ref()?;
+        (!learning.at_once()).then(|| learning.truth())
     }
 }
 
@@ -74,10 +80,7 @@ impl NodeRunner {
 /// # Errors
 /// When something fitted does not belong to the plan.
 pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
-    let learning = plan
-        .nodes
-        .iter()
-        .filter(|of| of.role.learns_from().is_some());
+    let learning = plan.nodes.iter().filter(|of| of.role.fit().is_some());
     let learning: HashSet<String> = learning.map(PlannedNode::instance).collect();
     if let Some(node) = fitted.keys().find(|name| !learning.contains(*name)) {
         return Err(EngineError::NotAnEstimator { node: node.clone() });
@@ -123,13 +126,13 @@ fn runner(
                 }
                 None => spec.build(inputs, wanted),
             };
-            NodeRunner::Operator {
+            NodeRunner::Operator(OperatorRunner {
                 operator,
                 gathers: gathers.clone().into(),
                 every_tick: *every_tick,
                 closes_loops: *closes_loops,
                 slots: node.slots.clone(),
-            }
+            })
         }
         (
             PlannedRole::Estimator {
@@ -142,7 +145,7 @@ fn runner(
         ) => {
             let predictor = fit.cloned().or_else(|| node.fixed().map(Arc::from));
             let estimate = predictor.map(|predictor| Estimate::new(node, predictor, widths));
-            NodeRunner::Estimate {
+            NodeRunner::Estimate(EstimateRunner {
                 estimate: estimate.transpose().map_err(|error| match error {
                     EngineError::DoesNotLearn { node: instance } if fit.is_none() => {
                         EngineError::NoLearner {
@@ -155,7 +158,7 @@ fn runner(
                 trigger: gathers.first().copied().filter(|_| !every_tick),
                 slot: node.slots.start,
                 std_dev: *std_dev,
-            }
+            })
         }
         (
             PlannedRole::Combiner {

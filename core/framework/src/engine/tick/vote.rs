@@ -67,19 +67,19 @@ impl Vote {
     /// Hands over what the embargo lets through at `now`.
     #[inline]
     pub(crate) fn release(&mut self, now: Instant) {
-        let Self {
-            combine,
-            withheld,
-            weights,
-            truths,
-            ..
-        } = self;
-        if let Some(withheld) = withheld {
+        if let Some(withheld) = &self.withheld {
             let newest = withheld.newest(now);
+            self.hand_over(newest);
+            self.combine.advance(newest);
+        }
+    }
+
+    #[inline]
+    fn hand_over(&mut self, newest: Instant) {
+        if let Some(withheld) = &mut self.withheld {
             withheld.release(newest, |released| {
-                *truths += observe(&mut **combine, weights.len(), released);
+                self.truths += observe(&mut *self.combine, self.weights.len(), released);
             });
-            combine.advance(newest);
         }
     }
 
@@ -157,19 +157,11 @@ impl Vote {
         }
     }
 
-    /// The segment has ended with this tick.
+    /// The segment has ended with this tick: the embargo guards its votes, of which none is still to come.
     pub(crate) fn segment(&mut self, last: Instant) {
-        let Self {
-            combine,
-            withheld,
-            weights,
-            truths,
-            ..
-        } = self;
-        if let Some(withheld) = withheld {
-            withheld.end_segment(last, |released| {
-                *truths += observe(&mut **combine, weights.len(), released);
-            });
+        self.hand_over(last);
+        if let Some(withheld) = &mut self.withheld {
+            withheld.clear();
         }
     }
 

@@ -1,13 +1,6 @@
 //! Mistakes that show only when `each` and modules are expanded.
 
-use crate::diagnostic::{code, problem};
-
-code!(
-    A016,
-    Error,
-    "too many instances",
-    "`each` would expand the graph beyond what fits into memory."
-);
+use crate::diagnostic::problem;
 
 const SMALLER: &str =
     "use fewer members, repeat less of what a module is given, or split the graph into several";
@@ -20,6 +13,8 @@ problem! {
         instances: usize,
         limit: usize,
     }
+    error: "too many instances",
+    explanation: "`each` would expand the graph beyond what fits into memory.",
     message: format!("with node \"{node}\" the graph has {instances} instances, more than {limit}"),
     label: "",
     help: SMALLER,
@@ -37,13 +32,6 @@ problem! {
     help: SMALLER,
 }
 
-code!(
-    A026,
-    Error,
-    "endless modules",
-    "A module cannot be part of itself, and modules nest at most 16 deep."
-);
-
 problem! {
     /// A module that is part of itself, or modules nested too deeply.
     A026 ModuleLoop {
@@ -52,6 +40,8 @@ problem! {
         /// The greatest depth.
         limit: usize,
     }
+    error: "endless modules",
+    explanation: "A module cannot be part of itself, and modules nest at most 16 deep.",
     message: match path.split_last() {
         Some((last, before)) if before.contains(last) => {
             format!("a module is part of itself: {}", path.join(" → "))

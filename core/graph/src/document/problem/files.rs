@@ -4,16 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{nearest_of_many, quoted};
-use crate::diagnostic::{Names, code, nearest, problem};
+use crate::diagnostic::{Names, nearest, problem};
 use crate::document::foreign_syntax::ForeignSyntax;
 use crate::document::toml_text::DUPLICATE_KEY;
-
-code!(
-    A001,
-    Error,
-    "syntax",
-    "The file is not TOML. Every syntax error is shown; nothing else is checked until there is none."
-);
 
 problem! {
     /// Not TOML.
@@ -25,6 +18,8 @@ problem! {
         /// What is usual elsewhere and stands there instead of TOML.
         foreign: Option<ForeignSyntax>,
     }
+    error: "syntax",
+    explanation: "The file is not TOML. Every syntax error is shown; nothing else is checked until there is none.",
     message: format!("this is not TOML: {reason}"),
     label: "here",
     help: match (foreign, bare) {
@@ -40,13 +35,6 @@ problem! {
     },
 }
 
-code!(
-    A002,
-    Error,
-    "unreadable file",
-    "A file named on the command line or by `extends` cannot be read, or is not UTF-8."
-);
-
 problem! {
     /// A file cannot be read.
     A002 Unreadable {
@@ -59,6 +47,8 @@ problem! {
         /// Whether another file names it.
         named: bool,
     }
+    error: "unreadable file",
+    explanation: "A file named on the command line or by `extends` cannot be read, or is not UTF-8.",
     message: format!("cannot read \"{path}\": {reason}"),
     label: "named here",
     help: match graph_meant(path, beside) {
@@ -90,19 +80,15 @@ fn graph_meant<'a>(path: &str, beside: &'a [String]) -> Option<&'a str> {
     names.find(|name| stem(name) == Some(meant))
 }
 
-code!(
-    A003,
-    Error,
-    "too large",
-    "Files have at most 16 MB, lists 200,000 values, tables nest at most 64 deep, and `extends` chains have at most 16 files."
-);
-
 problem! {
     /// A file is too large.
     A003 TooLarge {
         /// The largest size in bytes.
         limit: usize,
     }
+    error: "too large",
+    explanation: "Files have at most 16 MB, lists 200,000 values, tables nest at most 64 deep, and `extends` chains have at most 16 \
+        files.",
     message: format!("the file is larger than {} MB", limit / 1_000_000),
     label: "",
     help: None,
@@ -132,16 +118,11 @@ problem! {
     help: None,
 }
 
-code!(
-    A004,
-    Error,
-    "schema",
-    "Every graph file has `schema = 1`, so that a later version of the language is never misread."
-);
-
 problem! {
     /// `schema` is missing.
     A004 SchemaMissing {}
+    error: "schema",
+    explanation: "Every graph file has `schema = 1`, so that a later version of the language is never misread.",
     message: "the file does not name the schema that it follows",
     label: "`schema = 1` is missing",
     help: "begin the file with `schema = 1`",
@@ -155,30 +136,18 @@ problem! {
     help: "begin the file with `schema = 1`",
 }
 
-code!(
-    A005,
-    Error,
-    "extends",
-    "`extends` names one file. A chain of files that comes back to itself has no beginning."
-);
-
 problem! {
     /// A chain of `extends` comes back to itself.
     A005 ExtendsLoop {
         /// The paths from the first file back to it.
         chain: Vec<String>,
     }
+    error: "extends",
+    explanation: "`extends` names one file. A chain of files that comes back to itself has no beginning.",
     message: format!("`extends` comes back to its own file: {}", chain.join(" → ")),
     label: "extends this file",
     help: "one of these files must extend none of the others",
 }
-
-code!(
-    A019,
-    Error,
-    "nothing to remove",
-    "`nodes.NAME = false` removes an inherited node and `outputs.NAME = false` an inherited output, and there is none of that name."
-);
 
 problem! {
     /// `nodes.NAME = false` or `outputs.NAME = false` without one of that name that is inherited.
@@ -188,6 +157,9 @@ problem! {
         name: String,
         inherited: Arc<Names>,
     }
+    error: "nothing to remove",
+    explanation: "`nodes.NAME = false` removes an inherited node and `outputs.NAME = false` an inherited output, and there is none of \
+        that name.",
     message: format!("there is no inherited {role} \"{name}\" to remove"),
     label: "",
     help: nearest_of_many(name, inherited, &format!("the inherited {role}s are"))

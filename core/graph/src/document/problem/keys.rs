@@ -1,15 +1,8 @@
 //! Mistakes about keys and the type of their values.
 
 use super::nearest_or_all;
-use crate::diagnostic::{code, problem};
+use crate::diagnostic::problem;
 use crate::document::hint::Hint;
-
-code!(
-    A006,
-    Error,
-    "unknown key",
-    "Unknown keys are errors everywhere, since a misspelt one would silently have no effect."
-);
 
 problem! {
     /// A key that its table does not have.
@@ -19,6 +12,8 @@ problem! {
         what: String,
         known: Vec<String>,
     }
+    error: "unknown key",
+    explanation: "Unknown keys are errors everywhere, since a misspelt one would silently have no effect.",
     message: format!("{what} has no key \"{key}\""),
     label: "unknown key",
     help: nearest_or_all(key, known, "the keys are"),
@@ -37,13 +32,6 @@ problem! {
     help: format!("`{input}` is an input: write `inputs.{input} = …`"),
 }
 
-code!(
-    A007,
-    Error,
-    "missing key",
-    "A table lacks a key that has no default."
-);
-
 problem! {
     /// A key that has no default is not there.
     A007 MissingKey {
@@ -53,17 +41,12 @@ problem! {
         /// What to write, where that is known.
         advice: Option<String>,
     }
+    error: "missing key",
+    explanation: "A table lacks a key that has no default.",
     message: format!("{what} needs the key \"{key}\""),
     label: format!("\"{key}\" is missing"),
     help: advice.clone(),
 }
-
-code!(
-    A008,
-    Error,
-    "wrong type of value",
-    "A key has a value of another type than it needs. Durations and quantities are texts with a unit."
-);
 
 problem! {
     /// A value of another type than its key needs.
@@ -75,6 +58,8 @@ problem! {
         /// What is near what was found, and right.
         hint: Option<Hint>,
     }
+    error: "wrong type of value",
+    explanation: "A key has a value of another type than it needs. Durations and quantities are texts with a unit.",
     message: format!("expected {expected}{}, found {found}", for_key(key)),
     label: format!("expected {expected}"),
     help: hint.as_ref().map(Hint::help),
@@ -85,27 +70,15 @@ fn for_key(key: &Option<String>) -> String {
         .map_or_else(String::new, |key| format!(" for \"{key}\""))
 }
 
-code!(
-    A009,
-    Error,
-    "unknown choice",
-    "A text names none of the choices that the key has."
-);
-
 problem! {
     /// A text that is none of the choices.
     A009 UnknownChoice { key: Option<String>, found: String, choices: Vec<String> }
+    error: "unknown choice",
+    explanation: "A text names none of the choices that the key has.",
     message: format!("\"{found}\" is not a choice{}", for_key(key)),
     label: "not a choice",
     help: nearest_or_all(found, choices, "the choices are"),
 }
-
-code!(
-    A010,
-    Error,
-    "value out of range",
-    "A value has the right type and is refused by what reads it."
-);
 
 problem! {
     /// The value has the right type, and its reader refuses it.
@@ -114,6 +87,8 @@ problem! {
         /// The reader's reason.
         reason: String,
     }
+    error: "value out of range",
+    explanation: "A value has the right type and is refused by what reads it.",
     message: match key {
         Some(key) => format!("\"{key}\" is refused: {reason}"),
         None => reason.clone(),
@@ -138,13 +113,6 @@ problem! {
     help: None,
 }
 
-code!(
-    A024,
-    Error,
-    "contradicting time",
-    "`[time]` has two keys that exclude each other, e.g. both `step` and a unit, or a `format` beside one."
-);
-
 problem! {
     /// Two keys of `[time]` exclude each other.
     A024 TimeContradiction {
@@ -153,6 +121,8 @@ problem! {
         /// The key and value that it contradicts.
         with: String,
     }
+    error: "contradicting time",
+    explanation: "`[time]` has two keys that exclude each other, e.g. both `step` and a unit, or a `format` beside one.",
     message: format!("`{key}` has no meaning with {with}"),
     label: "",
     help: match *key {

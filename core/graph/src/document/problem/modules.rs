@@ -3,14 +3,7 @@
 use std::sync::Arc;
 
 use super::{nearest_of_many, quoted};
-use crate::diagnostic::{Names, code, problem};
-
-code!(
-    A025,
-    Error,
-    "unknown module",
-    "`module = \"…\"` names a module that `[modules]` does not have, neither here nor in the file that the module comes from."
-);
+use crate::diagnostic::{Names, problem};
 
 problem! {
     /// `module = …` names a module that is not declared.
@@ -19,18 +12,14 @@ problem! {
         /// The modules in sight.
         known: Arc<Names>,
     }
+    error: "unknown module",
+    explanation: "`module = \"…\"` names a module that `[modules]` does not have, neither here nor in the file that the module comes \
+        from.",
     message: format!("there is no module \"{name}\""),
     label: "not a module",
     help: nearest_of_many(name, known, "the modules are")
         .unwrap_or_else(|| format!("describe it under `[modules.{name}]`")),
 }
-
-code!(
-    A027,
-    Error,
-    "out of a module's reach",
-    "Inside a module a reference names one of its nodes or begins with one of its inputs, so that it means the same wherever it is used."
-);
 
 problem! {
     /// A module refers to what is not part of it.
@@ -40,6 +29,9 @@ problem! {
         /// The nodes and inputs that the module has.
         known: Arc<Names>,
     }
+    error: "out of a module's reach",
+    explanation: "Inside a module a reference names one of its nodes or begins with one of its inputs, so that it means the same wherever \
+        it is used.",
     message: format!("\"{name}\" is not a node of module \"{module}\""),
     label: "out of the module's reach",
     help: match known.nearest(name) {
@@ -47,13 +39,6 @@ problem! {
         None => format!("name it under the module's `inputs`; there it has {}", quoted(known.iter())),
     },
 }
-
-code!(
-    A028,
-    Error,
-    "unknown output of a module",
-    "A reference to an instance of a module names one of the outputs that the module declares; without one it means the first."
-);
 
 problem! {
     /// An output that a module does not have.
@@ -65,6 +50,9 @@ problem! {
         module: String,
         known: Arc<Names>,
     }
+    error: "unknown output of a module",
+    explanation: "A reference to an instance of a module names one of the outputs that the module declares; without one it means the \
+        first.",
     message: match output {
         None => format!("module \"{module}\" has no outputs"),
         Some(output) => {

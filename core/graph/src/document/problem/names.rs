@@ -3,14 +3,7 @@
 use std::sync::Arc;
 
 use super::nearest_of_many;
-use crate::diagnostic::{Names, Place, code, nearest, problem};
-
-code!(
-    A011,
-    Error,
-    "bad name",
-    "Names begin with a letter, then letters, digits, `_` and `-`; members and channels may begin with a digit."
-);
+use crate::diagnostic::{Names, Place, nearest, problem};
 
 problem! {
     /// A name that breaks the rules.
@@ -21,6 +14,8 @@ problem! {
         /// Whether it may begin with a digit.
         digit_first: bool,
     }
+    error: "bad name",
+    explanation: "Names begin with a letter, then letters, digits, `_` and `-`; members and channels may begin with a digit.",
     message: format!("\"{name}\" cannot be the name of a {role}"),
     label: "not a name",
     help: match digit_first {
@@ -28,13 +23,6 @@ problem! {
         true => "a name begins with a letter or digit, then letters, digits, `_` and `-`",
     },
 }
-
-code!(
-    A012,
-    Error,
-    "duplicate name",
-    "Nodes, sets and signals share one name space; members of a set and channels of a signal are distinct."
-);
 
 problem! {
     /// A name that is taken.
@@ -47,6 +35,8 @@ problem! {
         /// Where that is.
         first: Option<Place>,
     }
+    error: "duplicate name",
+    explanation: "Nodes, sets and signals share one name space; members of a set and channels of a signal are distinct.",
     message: {
         let article = if role == first_role { "another" } else { "a" };
         format!("the {role} \"{name}\" has the name of {article} {first_role}")
@@ -59,13 +49,6 @@ problem! {
     related: first.iter().map(|place| (*place, format!("the {first_role} is here"))).collect(),
 }
 
-code!(
-    A013,
-    Error,
-    "unknown set",
-    "`each` or `channels` names a set that `[sets]` does not have."
-);
-
 problem! {
     /// A set that is not declared.
     A013 UnknownSet {
@@ -74,6 +57,8 @@ problem! {
         /// What else to write, where something else than a set may be meant.
         or: Option<String>,
     }
+    error: "unknown set",
+    explanation: "`each` or `channels` names a set that `[sets]` does not have.",
     message: format!("there is no set \"{name}\""),
     label: "not a set",
     help: {
@@ -85,13 +70,6 @@ problem! {
         }
     },
 }
-
-code!(
-    A014,
-    Error,
-    "unknown placeholder",
-    "`{x}` stands for a member of a set that the node has in its `each`; `{channel}` for a signal's channel."
-);
 
 problem! {
     /// `{x}` that stands for nothing.
@@ -105,6 +83,8 @@ problem! {
         /// What to write for all members, where no single one can be meant.
         instead: Option<String>,
     }
+    error: "unknown placeholder",
+    explanation: "`{x}` stands for a member of a set that the node has in its `each`; `{channel}` for a signal's channel.",
     message: format!("\"{{{name}}}\" stands for nothing in {what}"),
     label: "stands for nothing",
     help: match (instead, nearest(name, known.iter().map(String::as_str))) {
@@ -118,19 +98,14 @@ problem! {
     },
 }
 
-code!(
-    A015,
-    Error,
-    "empty list",
-    "A set, a list of channels or a list of references has no entries."
-);
-
 problem! {
     /// A list that needs an entry has none.
     A015 EmptyList {
         /// What the list is of.
         what: String,
     }
+    error: "empty list",
+    explanation: "A set, a list of channels or a list of references has no entries.",
     message: format!("{what} has no entries"),
     label: "empty",
     help: "name at least one",

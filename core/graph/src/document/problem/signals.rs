@@ -3,30 +3,18 @@
 use std::sync::Arc;
 
 use super::nearest_of_many;
-use crate::diagnostic::{Names, code, problem};
+use crate::diagnostic::{Names, problem};
 use crate::unit::Unit;
-
-code!(
-    A021,
-    Error,
-    "column pattern",
-    "The columns of a signal with several channels must differ: the pattern contains `{channel}`."
-);
 
 problem! {
     /// Several channels would be read from one column.
     A021 OneColumn { pattern: String, channels: usize }
+    error: "column pattern",
+    explanation: "The columns of a signal with several channels must differ: the pattern contains `{channel}`.",
     message: format!("{channels} channels would all be read from the column \"{pattern}\""),
     label: "",
     help: "put `{channel}` into the pattern",
 }
-
-code!(
-    A022,
-    Error,
-    "bad range",
-    "A range is `[low, high]`, both in units that convert to the signal's, the low one below the high one."
-);
 
 problem! {
     /// A range whose ends do not measure what the signal measures.
@@ -36,6 +24,8 @@ problem! {
         /// The unit of the signal.
         unit: Unit,
     }
+    error: "bad range",
+    explanation: "A range is `[low, high]`, both in units that convert to the signal's, the low one below the high one.",
     message: format!("the range is in \"{found}\", which does not convert to the signal's unit \"{unit}\""),
     label: format!("does not convert to {unit}"),
     help: match unit.scale_meant() {
@@ -52,16 +42,11 @@ problem! {
     help: "write the lower limit first",
 }
 
-code!(
-    A023,
-    Error,
-    "unknown channel",
-    "`optional` names a channel that the signal does not have."
-);
-
 problem! {
     /// `optional` names what is not a channel.
     A023 UnknownChannel { name: String, signal: String, known: Arc<Names> }
+    error: "unknown channel",
+    explanation: "`optional` names a channel that the signal does not have.",
     message: format!("signal \"{signal}\" has no channel \"{name}\""),
     label: "not a channel",
     help: nearest_of_many(name, known, "its channels are"),

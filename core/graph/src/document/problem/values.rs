@@ -1,35 +1,25 @@
 //! Mistakes in units, durations and quantities.
 
-use crate::diagnostic::{code, problem};
+use crate::diagnostic::problem;
 use crate::quantity::{Quantity, QuantityError};
 use crate::time::DurationError;
 use crate::unit::{Unit, UnitError};
 
-code!(
-    A017,
-    Error,
-    "unknown unit",
-    "A unit is a UCUM code or a common spelling of one. Differences of temperatures are in K."
-);
-
 problem! {
     /// A text that is no unit.
     A017 NotAUnit { error: UnitError }
+    error: "unknown unit",
+    explanation: "A unit is a UCUM code or a common spelling of one. Differences of temperatures are in K.",
     message: error.reason(),
     label: "not a unit",
     help: error.help(),
 }
 
-code!(
-    A018,
-    Error,
-    "duration or quantity",
-    "A duration is a number and a unit of time, a quantity a number and a UCUM unit, in one text."
-);
-
 problem! {
     /// A text that is no duration.
     A018 NotADuration { error: DurationError }
+    error: "duration or quantity",
+    explanation: "A duration is a number and a unit of time, a quantity a number and a UCUM unit, in one text.",
     message: error.reason(),
     label: "not a duration",
     help: error.help(),
@@ -65,16 +55,11 @@ problem! {
     },
 }
 
-code!(
-    A020,
-    Error,
-    "samples without sample time",
-    "`2 samples` has a meaning only where `[time]` counts samples."
-);
-
 problem! {
     /// A number of samples where time is not counted in samples.
     A020 SamplesWithoutClock { text: String }
+    error: "samples without sample time",
+    explanation: "`2 samples` has a meaning only where `[time]` counts samples.",
     message: format!("\"{text}\" counts samples, and the time of this graph does not"),
     label: "",
     help: "write a duration like \"5min\", or count samples: `[time] unit = \"sample\"`",

@@ -27,8 +27,6 @@ faulty! {
     TakesAnyState,
     /// Takes a state of another number of channels.
     TakesAnyShape,
-    /// Says that it migrates what is not its own.
-    MigratesAny,
     /// Its state has no version.
     Unversioned,
     /// Takes nothing for zero.
@@ -216,9 +214,6 @@ impl Operator for Averaging {
             }
             Ok(_) => Restored::cold("the number of channels differs"),
             Err(_) if self.fault == Fault::TakesAnyState => Restored::Accepted,
-            Err(_) if self.fault == Fault::MigratesAny => Restored::Migrated {
-                from: String::new(),
-            },
             Err(_) => Restored::cold("the state belongs to another kind of node"),
         }
     }
@@ -286,15 +281,6 @@ fn a_state_of_another_version_kind_or_shape_is_not_taken() {
         with("takes_any_shape"),
         Rule::Versions,
         "it panics: index out of bounds: the len is 1 but the index is 1",
-    );
-}
-
-#[test]
-fn a_state_of_another_kind_is_not_migrated() {
-    breaks_one::<Averages>(
-        with("migrates_any"),
-        Rule::Versions,
-        "it says that it has migrated a state of another kind from ``, which it cannot have",
     );
 }
 
