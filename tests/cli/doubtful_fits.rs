@@ -357,7 +357,7 @@ fn sensors_without_a_value_are_named_and_the_truth_is_not_blamed() {
     };
     let node = format!("type = \"linear\"\n{FEATURES}");
     let both = fit("silent", &node, &without(2), &[]).ended(1);
-    both.tells(&["m could not be fitted: `in.u` and `in.v` have no value in the data"]);
+    both.tells(&["m could not be fitted: `in.u`, `in.v` have no value in the data"]);
     assert!(
         !both.told.contains("out.y") && !both.out.contains("too early"),
         "{}{}",

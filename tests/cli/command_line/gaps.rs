@@ -94,7 +94,6 @@ memory = "1h"
 "#;
     let expected = [
         (24, "`conformal` has no input `voters`"),
-        (27, "`conformal` needs the input `prediction`"),
         (29, "`conformal` has no input `voters`"),
         (30, "`conformal` has no input `others`"),
     ];
