@@ -12,6 +12,8 @@
 //!
 //! | layer | decides |
 //! |---|---|
+//! | [`connector`] | what a source and a sink implement, and how their kinds become known |
+//! | [`deployment`] | what a machine file says of them, and of time |
 //! | [`moment`] | time that the host's clock does not touch |
 //! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
 //! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
@@ -21,6 +23,8 @@
 //! | [`recovery`] | from there to where the service was |
 
 pub mod checkpoint;
+pub mod connector;
+pub mod deployment;
 pub mod folder;
 pub mod journal;
 pub mod keeper;
@@ -31,7 +35,13 @@ pub mod sequencer;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, engine, time};
+use athermal_core::{channel, compile, diagnostic, document, engine, node, time};
 
 #[cfg(test)]
 mod tests;
+
+/// What macros of this crate make use of.
+#[doc(hidden)]
+pub mod __private {
+    pub use {inventory, schemars, serde_json};
+}
