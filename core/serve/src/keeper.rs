@@ -72,6 +72,12 @@ impl Keeper {
         Ok(self.control)
     }
 
+    /// After how many ticks, beats, breaks and freezes the oldest checkpoint was taken; none where there is none.
+    #[must_use]
+    pub fn oldest(&self) -> Option<u64> {
+        self.checkpoints.oldest().ok().flatten()
+    }
+
     /// The control of the graph.
     pub fn control(&mut self) -> &mut Control {
         &mut self.control

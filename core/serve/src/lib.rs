@@ -21,6 +21,7 @@
 //! | [`worker`] | the engine thread: samples in, ticks through the engine, decisions into the journal |
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
+//! | [`service`] | all of it at work, with its threads |
 
 pub mod checkpoint;
 pub mod connector;
@@ -32,10 +33,11 @@ pub mod moment;
 pub mod recovery;
 pub mod replay;
 pub mod sequencer;
+pub mod service;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, time};
+use athermal_core::{channel, compile, diagnostic, document, engine, node, time, unit};
 
 #[cfg(test)]
 mod tests;

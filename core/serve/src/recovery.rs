@@ -6,6 +6,7 @@ use std::{fmt, io};
 use athermal_run::model::Model;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
+use crate::compile::Plan;
 use crate::engine::{Engine, EngineError, NodeCarry, StateTransfer};
 use crate::folder::StateFolder;
 use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
@@ -126,7 +127,8 @@ impl From<CheckpointError> for RecoveryError {
 }
 
 impl Recovered {
-    /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on.
+    /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on, by the plan that
+    /// runs.
     ///
     /// A checkpoint that cannot be used is passed over for an older one. The journal's damaged end is cut off. `look` sees each
     /// step that is made again, with how many ticks, beats, breaks and freezes there are then. `least` is up to where all sinks have
@@ -138,7 +140,7 @@ impl Recovered {
         folder: &StateFolder,
         checkpoints: &Checkpoints,
         model: &Model,
-        feed: &FeedNames,
+        feed: impl Fn(&Plan) -> FeedNames,
         least: u64,
         mut look: impl FnMut(u64, &Engine),
     ) -> Result<Self, RecoveryError> {
@@ -164,7 +166,14 @@ impl Recovered {
         }
         if let Some((engine, model, happenings)) = found {
             report.start = Start::Checkpoint(happenings);
-            return Self::follow(folder, (engine, model), happenings, report, feed, &mut look);
+            return Self::follow(
+                folder,
+                (engine, model),
+                happenings,
+                report,
+                &feed,
+                &mut look,
+            );
         }
         let revision = first.as_ref().map(|begin| begin.revision.as_str());
         let model = match revision {
@@ -186,7 +195,7 @@ impl Recovered {
             (engine, model),
             goes_back_to,
             report,
-            feed,
+            &feed,
             &mut look,
         )
     }
@@ -213,7 +222,7 @@ impl Recovered {
         (engine, mut model): (Engine, Model),
         from: u64,
         mut report: RecoveryReport,
-        feed: &FeedNames,
+        feed: impl Fn(&Plan) -> FeedNames,
         look: &mut impl FnMut(u64, &Engine),
     ) -> Result<Self, RecoveryError> {
         let mut log = Log::open_at(&folder.journal(), from)?;
@@ -252,7 +261,9 @@ impl Recovered {
         report.torn = log.torn().cloned();
         report.stepped = replay.stepped();
         report.difference = replay.difference();
-        let mut timeline = replay.feed().map(replay.timeline(), feed);
+        let engine = replay.engine();
+        let feed = feed(engine.plan());
+        let mut timeline = replay.feed().map(replay.timeline(), &feed);
         let engine = replay.into_engine();
         if report.ahead > 0 {
             timeline.not_before(engine.last().unwrap_or(Instant::MIN));
@@ -261,7 +272,7 @@ impl Recovered {
             engine,
             model,
             timeline,
-            feed: feed.clone(),
+            feed,
             event: log.event() + report.ahead,
             happenings: seen.max(from),
             report,

@@ -7,6 +7,7 @@ use super::{ConnectorError, Outflow, Stop};
 use crate::compile::SourceChannel;
 use crate::document::{TableBase, TimeBase};
 use crate::time::Instant;
+use crate::unit::Unit;
 
 /// A kind of source: the parameters of one, as a machine file gives them.
 pub trait Source: Debug + Send + Sync {
@@ -62,6 +63,8 @@ pub struct SourceWiring {
 pub struct WiredChannel {
     /// The channel as the graph knows it.
     pub channel: SourceChannel,
+    /// The unit in which the graph has it.
+    pub unit: Unit,
     /// Where the source has it: a column, a topic, a node.
     pub address: String,
     /// The unit of the channel from that of the source: `value * factor + offset`; none where it is the same.
