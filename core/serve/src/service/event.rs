@@ -20,6 +20,13 @@ pub enum ServiceEvent {
         /// After so many seconds.
         again_s: f64,
     },
+    /// A source left something out.
+    SourceRemark {
+        /// Its name.
+        source: String,
+        /// What, and why.
+        words: String,
+    },
     /// A source has come to its end.
     SourceEnded {
         /// Its name.

@@ -37,8 +37,8 @@ pub use status::Snapshot;
 use crate::checkpoint::Checkpoints;
 use crate::compile::Plan;
 use crate::connector::{
-    Inlet, Outflow, Purpose, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel, WiredOutput,
-    link,
+    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel,
+    WiredOutput, link,
 };
 use crate::deployment::{Deployment, Runtime};
 use crate::folder::StateFolder;
@@ -84,6 +84,7 @@ pub struct Service {
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
     remarks: Consumer<(Admission, u64)>,
+    heard: Vec<(String, Receiver<String>)>,
     shared: Arc<Shared>,
     progress: Arc<Progress>,
     stop_sources: Stop,
@@ -259,6 +260,7 @@ impl Service {
             })?
         };
         let (mut inlets, mut links, mut source_counts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut heard = Vec::new();
         for source in sources {
             let after = |name: &str| place(name).map_or(Instant::MIN, |place| stamps[place]);
             let unit = |name: &str| {
@@ -276,14 +278,19 @@ impl Service {
             let wired: Vec<_> = wired.collect();
             let places = wired.iter().filter_map(|of| place(&of.channel.name));
             let places: Vec<_> = places.map(|place| place as u32).collect();
+            let (remarks, words) = Remarks::new();
             let (outflow, link) = link(
                 ARRIVALS,
                 &wired,
                 &places,
                 source.parameters.stamps(),
-                engine_thread.thread().clone(),
-                Arc::clone(&progress),
+                (
+                    engine_thread.thread().clone(),
+                    Arc::clone(&progress),
+                    remarks,
+                ),
             );
+            heard.push((source.name.clone(), words));
             let wiring = SourceWiring {
                 name: source.name.clone(),
                 folder: options.folder.clone(),
@@ -310,6 +317,7 @@ impl Service {
             engine: engine_thread,
             orders: to_engine,
             remarks: from_engine,
+            heard,
             shared,
             progress,
             stop_sources,
@@ -342,6 +350,13 @@ impl Service {
         }
         while let Ok((admission, count)) = self.remarks.pop() {
             events.push(ServiceEvent::NotAccepted { admission, count });
+        }
+        for (source, words) in &self.heard {
+            let remark = |words| ServiceEvent::SourceRemark {
+                source: source.clone(),
+                words,
+            };
+            events.extend(words.try_iter().map(remark));
         }
         while let Ok(event) = self.events.try_recv() {
             self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
