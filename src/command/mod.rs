@@ -21,6 +21,7 @@ mod new;
 mod nodes;
 mod numbers;
 mod refused;
+mod replay;
 mod report;
 mod run;
 mod schema;
@@ -64,7 +65,7 @@ commands! {
     Demo(demo::Demo), Init(init::Init), Show(show::Show), Check(check::Check),
     Explain(explain::Explain), Diff(diff::Diff), Nodes(nodes::Nodes), Fit(fit::Fit),
     Evaluate(evaluate::Evaluate), Compare(compare::Compare), Diagnose(diagnose::Diagnose),
-    Report(report::Report), Run(run::Run), Serve(serve::Serve), Simulate(simulate::Simulate),
+    Report(report::Report), Run(run::Run), Serve(serve::Serve), Replay(replay::Replay), Simulate(simulate::Simulate),
     Completions(completions::Completions), Test(test::Test), Schema(schema::Schema),
     New(new::New), Build(build::Build),
 }

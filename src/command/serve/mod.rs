@@ -1,6 +1,6 @@
 //! `athermal serve`: a machine file as a service.
 
-mod events;
+pub(super) mod events;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
