@@ -221,7 +221,8 @@ impl Recovered {
             Some(_) => Start::Cold,
         };
         let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
-        let engine = engine.map_err(RecoveryError::Unfit)?;
+        let mut engine = engine.map_err(RecoveryError::Unfit)?;
+        engine.isolate_panics();
         Self::follow(
             (folder, seals),
             (engine, model),
@@ -343,6 +344,7 @@ fn usable(
     };
     let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut engine = engine.map_err(|error| refused(error.to_string()))?;
+    engine.isolate_panics();
     let restored = engine.restore(&snapshot);
     restored.map_err(|error| refused(error.to_string()))?;
     Ok((engine, model, happenings))
@@ -359,6 +361,7 @@ fn no_model(revision: &str, error: impl fmt::Display) -> RecoveryError {
 fn swap(replay: &mut Replay, model: &Model) -> Result<Vec<NodeCarry>, RecoveryError> {
     let next = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut next = next.map_err(RecoveryError::Unfit)?;
+    next.isolate_panics();
     let before = replay.engine();
     let transfer = StateTransfer::between(before, &next, false);
     let carry = next.adopt(&before.state(), &transfer, false);

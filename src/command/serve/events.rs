@@ -66,6 +66,9 @@ impl Events<'_> {
                 "the journal is written again; {} lost",
                 counted(status.lost, "record")
             )),
+            ServiceEvent::NodeGivenUp(panic) => {
+                terminal.warning(format_args!("{panic}; it gives nothing from now on"));
+            }
             ServiceEvent::EngineFailed(reason) => {
                 terminal.warning(format_args!("the engine cannot go on: {reason}"));
             }

@@ -100,6 +100,8 @@ pub struct Service {
     keep: Keep,
     retired: Clock,
     is_degraded: bool,
+    /// How many nodes were given up and reported.
+    given_up: usize,
     has_failed: bool,
 }
 
@@ -182,6 +184,7 @@ impl Service {
         let stamps = recovered.timeline.stamps().to_vec();
         let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
         let live = LiveOptions {
+            isolates: true,
             channels: given.clone(),
             ..LiveOptions::default()
         };
@@ -333,6 +336,7 @@ impl Service {
             keep: keep(&runtime),
             retired: Clock::now(),
             is_degraded: false,
+            given_up: 0,
             has_failed: false,
         };
         if differs {
@@ -362,6 +366,12 @@ impl Service {
             self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
             events.push(event);
         }
+        let replica = self.keeper.control().replica();
+        let panics = replica.map_or(&[][..], crate::engine::Engine::panics);
+        for panic in panics.iter().skip(self.given_up) {
+            events.push(ServiceEvent::NodeGivenUp(panic.to_string()));
+        }
+        self.given_up = panics.len();
         let status = self.progress.status();
         if status.is_degraded != self.is_degraded {
             self.is_degraded = status.is_degraded;
