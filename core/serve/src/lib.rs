@@ -37,7 +37,7 @@ pub mod service;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, time, unit};
+use athermal_core::{channel, compile, diagnostic, document, engine, node, quantity, time, unit};
 
 #[cfg(test)]
 mod tests;

@@ -97,7 +97,7 @@ impl Serve {
         let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
         let loaded = Model::load_from(&self.machine, Wanted::default(), &mut sources, &mut doubts);
         let model = loaded?;
-        let deployment = Deployment::read(&model.graph, &model.plan, &mut doubts);
+        let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut doubts);
         let Some(deployment) = deployment.filter(|_| !doubts.has_errors()) else {
             return Err(Failure::Graph {
                 diagnostics: Box::new(doubts),

@@ -13,7 +13,9 @@ mod stop;
 
 pub use error::ConnectorError;
 pub use inlet::{Inlet, Source, SourceWiring, Stamps, WiredChannel};
-pub use kind::{SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds};
+pub use kind::{
+    ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,
+};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
 pub use outlet::{Kept, OutRow, Outlet, Purpose, Sink, SinkWiring, WiredOutput};

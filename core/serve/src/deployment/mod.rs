@@ -1,11 +1,24 @@
 //! What a machine file says about a service: its sources and sinks, and how ticks are cut.
 
-use std::path::PathBuf;
+mod channels;
+mod keys;
+pub mod problem;
+mod runtime;
+mod sinks;
+mod size;
+mod sources;
 
-use crate::compile::SourceChannel;
+pub use runtime::{Keep, Runtime};
+
+use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Sink, SinkKind, Source, SourceKind};
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::GraphFile;
 use crate::sequencer::ClockRule;
 use crate::time::Duration;
+
+/// The sections that a deployment is read from.
+pub const SECTIONS: [&str; 3] = ["sources", "sinks", "runtime"];
 
 /// What a machine file says about a service.
 #[derive(Debug)]
@@ -16,61 +29,6 @@ pub struct Deployment {
     pub sources: Vec<DeclaredSource>,
     /// `[sinks.NAME]`, in the order of the file.
     pub sinks: Vec<DeclaredSink>,
-}
-
-/// What `[runtime]` says.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Runtime {
-    /// The state folder; none where the file does not name one.
-    pub state: Option<PathBuf>,
-    /// How long nothing may be measured until time passes without samples; for ever without.
-    pub heartbeat: Option<Duration>,
-    /// An instant is stepped so long after its first sample came.
-    pub wait: Duration,
-    /// No tick is cut after a start or a reconnect until every source has been connected so long.
-    pub settle: Duration,
-    /// Instants no further apart are one tick.
-    pub join: Duration,
-    /// A stamp further ahead is refused.
-    pub future: Duration,
-    /// At most so much is lost in a power cut.
-    pub sync: Duration,
-    /// How often a checkpoint is taken.
-    pub checkpoint: Duration,
-    /// How long, and how much of, the journal is kept, and how many checkpoints.
-    pub keep: Keep,
-}
-
-/// What `[runtime] keep` says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Keep {
-    /// How long files of the journal are kept; for ever without.
-    pub journal: Option<Duration>,
-    /// How many bytes of the journal are kept; all without.
-    pub at_most: Option<u64>,
-    /// How many checkpoints are kept.
-    pub checkpoints: usize,
-}
-
-impl Default for Runtime {
-    fn default() -> Self {
-        let ms = |ms: i64| Duration::from_ns(ms * 1_000_000);
-        Self {
-            state: None,
-            heartbeat: None,
-            wait: ms(200),
-            settle: ms(5_000),
-            join: Duration::ZERO,
-            future: ms(5_000),
-            sync: ms(1_000),
-            checkpoint: ms(60_000),
-            keep: Keep {
-                journal: Some(ms(30 * 86_400_000)),
-                at_most: Some(20 << 30),
-                checkpoints: 3,
-            },
-        }
-    }
 }
 
 /// A source that a machine file declares.
@@ -119,13 +77,48 @@ pub struct DeclaredSink {
     /// By how much a command may change per second, in the unit of each output; without bound where there is none.
     pub rate: Vec<Option<f64>>,
 }
+
 impl Deployment {
-    /// stub
+    /// What a graph that has been compiled to a plan says of its deployment. `files` are those that it was read from: relative paths
+    /// start at the file in which they stand. All mistakes are reported; without one there is a deployment.
     pub fn read(
-        _: &crate::document::GraphFile,
-        _: &crate::compile::Plan,
-        _: &mut crate::diagnostic::Diagnostics,
+        graph: &GraphFile,
+        plan: &Plan,
+        files: &Sources,
+        diagnostics: &mut Diagnostics,
     ) -> Option<Self> {
+        let deployment = Self::check(graph, plan, files, diagnostics);
+        if graph.deployment.contains_key("sources") {
+            return deployment;
+        }
+        diagnostics.report(graph.tree.place, problem::NoSources {});
         None
     }
+
+    /// As [`read`](Self::read), of a graph that need not have sources: it may be one that others extend.
+    pub fn check(
+        graph: &GraphFile,
+        plan: &Plan,
+        files: &Sources,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Self> {
+        let before = diagnostics.error_count();
+        let section = |name: &str| graph.deployment.get(name);
+        let runtime = runtime::read(section("runtime"), files, diagnostics);
+        let sources = section("sources")
+            .map(|section| sources::read(section, graph, plan, diagnostics))
+            .unwrap_or_default();
+        let sinks = section("sinks")
+            .map(|section| sinks::read(section, graph, plan, diagnostics))
+            .unwrap_or_default();
+        let deployment = Self {
+            runtime: runtime?,
+            sources,
+            sinks,
+        };
+        (diagnostics.error_count() == before).then_some(deployment)
+    }
 }
+
+#[cfg(test)]
+mod tests;
