@@ -24,6 +24,7 @@ pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 pub use athermal_run as run;
 pub use athermal_run::model::{Model, ModelError};
+pub use athermal_serve as serve;
 pub use athermal_trial as trial;
 
 #[cfg(feature = "analysis")]

@@ -88,6 +88,8 @@ impl Keeper {
         let happenings = self.before + self.control.events();
         if let Some(replica) = self.control.replica()
             && happenings > self.last
+            // What a node that was given up had learned is not whole: the journal goes on from before.
+            && replica.panics().is_empty()
         {
             self.waiting = Some(Checkpoint::of(replica, happenings));
         }

@@ -79,7 +79,7 @@ impl Inlet for FileInlet {
             let file = file.map_err(|error| {
                 ConnectorError::new(format_args!("cannot open {name}: {error}"))
             })?;
-            let opened = reader(&name, file, &self.wiring, Some(self.format), self.last);
+            let opened = reader(&name, file, &self.wiring, Some(self.format), self.last, out);
             let mut reader = match opened {
                 Ok(reader) => reader,
                 // Stopped before there was a line, or replaced by one that has.

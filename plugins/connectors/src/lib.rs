@@ -9,6 +9,8 @@
 //!
 //! How ticks are made of what comes, and when rows leave, is decided in `athermal-serve`.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 mod file_sink;
 mod file_source;
 mod follow;

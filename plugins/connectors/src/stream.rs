@@ -69,7 +69,14 @@ struct StandardInlet {
 impl Inlet for StandardInlet {
     fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
         let input = io::stdin();
-        let opened = reader(STANDARD_INPUT, input, &self.wiring, Some(self.format), None);
+        let opened = reader(
+            STANDARD_INPUT,
+            input,
+            &self.wiring,
+            Some(self.format),
+            None,
+            out,
+        );
         let mut reader = opened.map_err(ConnectorError::new)?;
         out.connected();
         pass(&mut reader, out, stop, |_| true).map(|_| ())

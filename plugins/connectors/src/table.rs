@@ -37,16 +37,15 @@ pub(crate) fn reader(
     wiring: &SourceWiring,
     format: Option<Format>,
     known: Option<Instant>,
+    out: &Outflow,
 ) -> Result<Reader, FileError> {
     let mut reader = Reader::from_read(name, input, layout(wiring), options(format))?;
-    reader.report_first({
-        let name = wiring.name.clone();
-        move |first| {
-            eprintln!(
-                "warning: source `{name}`: {}; others like it are counted",
-                first.without_advice()
-            );
-        }
+    let remarks = out.remarks().clone();
+    reader.report_first(move |first| {
+        remarks.report(format_args!(
+            "{}; others like it are counted",
+            first.without_advice()
+        ));
     });
     let stamps = wiring.channels.iter().map(|of| of.after);
     let known = known.or_else(|| stamps.max().filter(|of| *of > Instant::MIN));

@@ -20,5 +20,5 @@ pub use kind::{
 pub use kind::{read_sink, read_source};
 pub use outlet::{Kept, OutRow, Outlet, Purpose, Sink, SinkWiring, WiredOutput};
 pub(crate) use source_link::{Arrival, SourceLink, link};
-pub use source_link::{Outflow, SourceCounts};
+pub use source_link::{Outflow, Remarks, SourceCounts};
 pub use stop::Stop;

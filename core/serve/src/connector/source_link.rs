@@ -1,7 +1,9 @@
 //! What lies between the thread of a source and the engine thread: a bounded ring, on which neither waits for the other's work.
 
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
@@ -21,6 +23,24 @@ pub(crate) enum Arrival {
     /// The times of what follows may start again.
     Segment,
     Ended,
+}
+
+/// Where a source reports what it leaves out.
+#[derive(Debug, Clone)]
+pub struct Remarks(Sender<String>);
+
+impl Remarks {
+    /// Where reports are received.
+    pub(crate) fn new() -> (Self, Receiver<String>) {
+        let (send, receive) = channel();
+        (Self(send), receive)
+    }
+
+    /// Reports something that does not stop the source: what was left out and why, once of each kind.
+    pub fn report(&self, words: impl fmt::Display) {
+        // Nobody listens any more where the service has ended.
+        let _ = self.0.send(words.to_string());
+    }
 }
 
 /// What a source counts.
@@ -45,6 +65,7 @@ pub struct Outflow {
     engine: Thread,
     counts: Arc<SourceCounts>,
     progress: Arc<Progress>,
+    remarks: Remarks,
     /// By channel of the source: its place in the feed, its conversion, and the newest stamp that is known.
     channels: Vec<(u32, Option<(f64, f64)>, Instant)>,
     stamps: Stamps,
@@ -67,8 +88,7 @@ pub(crate) fn link(
     channels: &[WiredChannel],
     places: &[u32],
     stamps: Stamps,
-    engine: Thread,
-    progress: Arc<Progress>,
+    (engine, progress, remarks): (Thread, Arc<Progress>, Remarks),
 ) -> (Outflow, SourceLink) {
     let (ring, arrivals) = RingBuffer::new(room);
     let counts = Arc::new(SourceCounts::default());
@@ -78,6 +98,7 @@ pub(crate) fn link(
         engine,
         counts: Arc::clone(&counts),
         progress,
+        remarks,
         channels: wired
             .map(|(wired, &place)| (place, wired.conversion, wired.after))
             .collect(),
@@ -152,6 +173,12 @@ impl Outflow {
             self.sample(0, stamp, f64::NAN);
         }
         true
+    }
+
+    /// Where it reports what it leaves out.
+    #[must_use]
+    pub fn remarks(&self) -> &Remarks {
+        &self.remarks
     }
 
     /// How many samples there is room for.

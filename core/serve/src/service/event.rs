@@ -20,6 +20,13 @@ pub enum ServiceEvent {
         /// After so many seconds.
         again_s: f64,
     },
+    /// A source left something out.
+    SourceRemark {
+        /// Its name.
+        source: String,
+        /// What, and why.
+        words: String,
+    },
     /// A source has come to its end.
     SourceEnded {
         /// Its name.
@@ -59,6 +66,8 @@ pub enum ServiceEvent {
     NoCheckpoint(CheckpointError),
     /// The journal cannot be written, or can again.
     Journal(JournalStatus),
-    /// The code of a node panicked, or the engine cannot go on otherwise: the service ends.
+    /// The code of a node panicked: it is absent from then on, and the graph goes on.
+    NodeGivenUp(String),
+    /// The engine cannot go on: the service ends.
     EngineFailed(String),
 }

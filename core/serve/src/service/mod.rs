@@ -37,8 +37,8 @@ pub use status::Snapshot;
 use crate::checkpoint::Checkpoints;
 use crate::compile::Plan;
 use crate::connector::{
-    Inlet, Outflow, Purpose, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel, WiredOutput,
-    link,
+    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel,
+    WiredOutput, link,
 };
 use crate::deployment::{Deployment, Runtime};
 use crate::folder::StateFolder;
@@ -84,6 +84,7 @@ pub struct Service {
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
     remarks: Consumer<(Admission, u64)>,
+    heard: Vec<(String, Receiver<String>)>,
     shared: Arc<Shared>,
     progress: Arc<Progress>,
     stop_sources: Stop,
@@ -99,6 +100,8 @@ pub struct Service {
     keep: Keep,
     retired: Clock,
     is_degraded: bool,
+    /// How many nodes were given up and reported.
+    given_up: usize,
     has_failed: bool,
 }
 
@@ -181,6 +184,7 @@ impl Service {
         let stamps = recovered.timeline.stamps().to_vec();
         let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
         let live = LiveOptions {
+            isolates: true,
             channels: given.clone(),
             ..LiveOptions::default()
         };
@@ -259,6 +263,7 @@ impl Service {
             })?
         };
         let (mut inlets, mut links, mut source_counts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut heard = Vec::new();
         for source in sources {
             let after = |name: &str| place(name).map_or(Instant::MIN, |place| stamps[place]);
             let unit = |name: &str| {
@@ -276,14 +281,19 @@ impl Service {
             let wired: Vec<_> = wired.collect();
             let places = wired.iter().filter_map(|of| place(&of.channel.name));
             let places: Vec<_> = places.map(|place| place as u32).collect();
+            let (remarks, words) = Remarks::new();
             let (outflow, link) = link(
                 ARRIVALS,
                 &wired,
                 &places,
                 source.parameters.stamps(),
-                engine_thread.thread().clone(),
-                Arc::clone(&progress),
+                (
+                    engine_thread.thread().clone(),
+                    Arc::clone(&progress),
+                    remarks,
+                ),
             );
+            heard.push((source.name.clone(), words));
             let wiring = SourceWiring {
                 name: source.name.clone(),
                 folder: options.folder.clone(),
@@ -310,6 +320,7 @@ impl Service {
             engine: engine_thread,
             orders: to_engine,
             remarks: from_engine,
+            heard,
             shared,
             progress,
             stop_sources,
@@ -325,6 +336,7 @@ impl Service {
             keep: keep(&runtime),
             retired: Clock::now(),
             is_degraded: false,
+            given_up: 0,
             has_failed: false,
         };
         if differs {
@@ -343,10 +355,23 @@ impl Service {
         while let Ok((admission, count)) = self.remarks.pop() {
             events.push(ServiceEvent::NotAccepted { admission, count });
         }
+        for (source, words) in &self.heard {
+            let remark = |words| ServiceEvent::SourceRemark {
+                source: source.clone(),
+                words,
+            };
+            events.extend(words.try_iter().map(remark));
+        }
         while let Ok(event) = self.events.try_recv() {
             self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
             events.push(event);
         }
+        let replica = self.keeper.control().replica();
+        let panics = replica.map_or(&[][..], crate::engine::Engine::panics);
+        for panic in panics.iter().skip(self.given_up) {
+            events.push(ServiceEvent::NodeGivenUp(panic.to_string()));
+        }
+        self.given_up = panics.len();
         let status = self.progress.status();
         if status.is_degraded != self.is_degraded {
             self.is_degraded = status.is_degraded;
