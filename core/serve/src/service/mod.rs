@@ -17,6 +17,8 @@ mod sink_thread;
 mod sinks;
 mod source_thread;
 mod status;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
