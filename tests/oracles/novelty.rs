@@ -64,7 +64,7 @@ fn novelty_grows_with_what_lies_across_the_directions_of_the_fit() {
             "{found} instead of {expected}"
         );
     }
-    let gone = bench.tick(4.0, &[("temperature.one", 20.0)]);
+    let gone = bench.tick(10.0, &[("temperature.one", 20.0)]);
     assert!(gone.iter().all(|value| value.is_nan()), "{gone:?}");
 }
 
