@@ -37,15 +37,7 @@ fn place_of(word: &str) -> Option<usize> {
 }
 
 /// What a column of zones beside the times is called.
-const ZONE_NAMES: [&str; 7] = [
-    "zone",
-    "tz",
-    "timezone",
-    "time zone",
-    "utc offset",
-    "utc_offset",
-    "zeitzone",
-];
+const ZONE_NAMES: &str = "zone|tz|timezone|time zone|utc offset|utc_offset|zeitzone";
 
 /// How many nanoseconds stand for one sample, where a log only numbers them.
 const SAMPLE_NS: i64 = 1_000_000_000;
@@ -98,7 +90,7 @@ impl Clock {
         }
         let mut names = self.columns.names().iter();
         let in_name = names.find_map(|name| zone_in_name(name));
-        let is_zone = |name: &String| ZONE_NAMES.contains(&&*name.to_lowercase());
+        let is_zone = |name: &String| ZONE_NAMES.split('|').any(|of| of == name.to_lowercase());
         let beside = described.columns.iter().position(is_zone).and_then(|at| {
             let mut cells = described.rows.iter().map(|row| row.get(at));
             let first = cells.next()??;

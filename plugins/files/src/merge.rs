@@ -138,7 +138,7 @@ impl From<MergeError> for FileError {
 }
 
 /// Files as the graph reads them: one log, or several beside each other.
-pub(crate) enum Joint {
+pub enum Joint {
     /// One file after the other.
     One(Box<Recording>),
     /// Logs of different columns.
@@ -147,6 +147,9 @@ pub(crate) enum Joint {
 
 impl Joint {
     /// Opens each file once to see its columns, and joins or merges them.
+    ///
+    /// # Errors
+    /// As for [`Recording::join`], and where logs of different columns are not one recording.
     pub fn open(paths: &[PathBuf], layout: Layout, options: Options) -> Result<Self, FileError> {
         let logs = match paths {
             [_] | [] => Vec::new(),
@@ -162,6 +165,10 @@ impl Joint {
         Merge::open(paths, logs, &layout, &options).map(Self::Several)
     }
 
+    /// Goes on to what comes next, with `row` filled if it is a row.
+    ///
+    /// # Errors
+    /// As for [`Recording::next_into`], and where logs are not beside each other.
     pub fn next_into(&mut self, row: &mut Row) -> Result<Event, FileError> {
         match self {
             Self::One(recording) => recording.next_into(row),
@@ -303,7 +310,7 @@ pub(crate) fn logs_of(
 ///
 /// Rows of one time are one. Where times are dates, a segment of one log is one of all. Where they are not, segments are set beside
 /// each other in their order.
-pub(crate) struct Merge {
+pub struct Merge {
     logs: Vec<OpenLog>,
     order: Vec<String>,
     dated: bool,

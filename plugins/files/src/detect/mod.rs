@@ -1,6 +1,7 @@
 //! What `[table]` leaves open is found here, for the reader and for whoever writes a `[table]`: the format, where the table begins,
 //! what separates its cells, its units, and which layout its rows have. Not what the columns mean.
 
+mod apart;
 mod description;
 mod format;
 mod header;
@@ -8,6 +9,7 @@ mod long;
 mod times;
 mod units;
 
+pub use apart::apart;
 pub use description::Description;
 pub use format::Format;
 pub use long::LongFormat;
