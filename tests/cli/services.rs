@@ -143,7 +143,7 @@ fn a_service_gives_what_a_run_gives_and_its_journal_what_the_log_gives() {
     let state = scratch.path("line.state");
     let replayed = athermal(&[&"replay", &state, &"--check"]).ended(0);
     let words = "600 ticks stepped again, to the same bits";
-    assert!(replayed.err.contains(words), "{}", replayed.err);
+    assert!(replayed.told.contains(words), "{}", replayed.told);
 
     // The journal is a recording: what is diagnosed of it is what is diagnosed of the log.
     let (graph, log) = (scratch.path("graph.toml"), scratch.path("log.csv"));
@@ -227,13 +227,15 @@ fn a_second_service_on_one_state_is_refused_and_a_damaged_journal_too() {
     until_rows(&scratch.path("history.csv"), 50, &mut child);
     let second = athermal(&[&"serve", &scratch.path("line.toml")]).ended(3);
     assert!(
-        second.err.contains("another service keeps its state there"),
+        second
+            .told
+            .contains("another service keeps its state there"),
         "{}",
-        second.err
+        second.told
     );
     end(child);
     let state = athermal(&[&"replay", &scratch.path("nowhere")]).ended(2);
-    assert!(state.err.contains("there is no journal"), "{}", state.err);
+    assert!(state.told.contains("there is no journal"), "{}", state.told);
 }
 
 #[test]
