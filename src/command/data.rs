@@ -30,6 +30,13 @@ pub struct Data {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+/// How several files are read as one recording.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Reading {
     /// Take each file as a segment of its own, also where its times go on: windows, lags and filters start afresh with it
     #[arg(long)]
     segments: bool,
@@ -76,13 +83,11 @@ pub fn no_graph(reason: &'static str) -> impl TypedValueParser<Value = PathBuf> 
 impl Data {
     /// These files.
     #[must_use]
-    pub fn of(files: Vec<PathBuf>) -> Self {
+    pub fn of(files: Vec<PathBuf>, reading: Reading) -> Self {
         Self {
             files,
             lenient: false,
-            segments: false,
-            merge: false,
-            offsets: Vec::new(),
+            reading,
         }
     }
 
@@ -103,7 +108,7 @@ impl Data {
         let unknown = |(file, _): &&(PathBuf, Duration)| {
             self.named(file).chain(others.named(file)).next().is_none()
         };
-        match self.offsets.iter().find(unknown) {
+        match self.reading.offsets.iter().find(unknown) {
             Some((file, _)) => Err(Failure::Request(format!(
                 "--offset {}: this is none of the files of the data, which are {}",
                 file.display(),
@@ -148,9 +153,7 @@ impl Data {
         Self {
             files,
             lenient: self.lenient,
-            segments: self.segments,
-            merge: self.merge,
-            offsets: self.offsets.clone(),
+            reading: self.reading.clone(),
         }
     }
 
@@ -161,7 +164,7 @@ impl Data {
             let recording = Rc::new(JournalRecording::in_state(&journal));
             return Dataset::of(self.files[0].clone(), recording);
         }
-        let offsets = self.offsets.iter().flat_map(|(name, by)| {
+        let offsets = self.reading.offsets.iter().flat_map(|(name, by)| {
             let files = self.named(name);
             files.map(|file| (file.clone(), by.as_ns()))
         });
@@ -169,8 +172,8 @@ impl Data {
             self.files.clone(),
             Options {
                 lenient: self.lenient,
-                segments: self.segments,
-                merge: self.merge,
+                segments: self.reading.segments,
+                merge: self.reading.merge,
                 offsets: offsets.collect(),
                 ..Options::default()
             },
@@ -182,12 +185,12 @@ impl Data {
     pub fn words(&self) -> Vec<String> {
         let options = [
             (self.lenient, "--lenient"),
-            (self.segments, "--segments"),
-            (self.merge, "--merge"),
+            (self.reading.segments, "--segments"),
+            (self.reading.merge, "--merge"),
         ];
         let options = options.into_iter().filter(|(given, _)| *given);
         let options = options.map(|(_, option)| option.to_owned());
-        let offsets = self.offsets.iter().flat_map(|(file, by)| {
+        let offsets = self.reading.offsets.iter().flat_map(|(file, by)| {
             let offset = format!("{}={by}", file.display());
             ["--offset".to_owned(), quoted(&offset)]
         });

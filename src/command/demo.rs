@@ -13,7 +13,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::write_aside;
-use super::data::Data;
+use super::data::{Data, Reading};
 use super::fit::{fit_on, text_of};
 use super::simulate::write_recording;
 use crate::invocation::{command, program, quoted};
@@ -109,7 +109,7 @@ fn fit_model(
     terminal: &Terminal,
 ) -> Result<Model, Failure> {
     let mut model = Model::load(graph)?;
-    let data = Data::of(vec![train.to_owned()]);
+    let data = Data::of(vec![train.to_owned()], Reading::default());
     fit_on(&mut model, &data, &FitOptions::default(), terminal)?;
     write_aside(output, text_of(&model)?)?;
     Ok(model)
@@ -121,7 +121,7 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
         intervals: false,
     };
     let model = Model::load_for(model, wanted)?;
-    let dataset = Data::of(vec![test.to_owned()]).dataset();
+    let dataset = Data::of(vec![test.to_owned()], Reading::default()).dataset();
     let options = ScoreOptions {
         abs_truth_below: LIMIT.parse().ok(),
         ..ScoreOptions::default()

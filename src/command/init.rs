@@ -1,4 +1,4 @@
-//! `athermal init`: a starter graph for a log.
+//! `athermal init`: a starter graph for logs.
 
 use std::path::{Path, PathBuf};
 
@@ -7,29 +7,31 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
-use super::data::{Data, no_graph};
-use crate::invocation::{command, program, quoted};
+use super::data::{Data, Reading, no_graph};
+use crate::invocation::{command, quoted};
 use crate::starter::{NoStarter, Request, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
 
 /// Write a starter graph for a log of yours
 ///
-/// Looks at the names and values of a CSV or JSON lines file. It guesses what is a temperature, what drifts, and in which
+/// Looks at the names and values of CSV or JSON lines files. It guesses what is a temperature, what drifts, and in which
 /// units. It measures rates and gaps, and chooses windows by the drift against its standard error. Every guess is printed,
-/// and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
+/// and stands in the graph as a comment. The graph checks, fits and evaluates as it is. Files of different columns whose times
+/// overlap are merged by time, as `fit` does.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal init log.csv
   athermal init log.csv -o graph.toml
+  athermal init temperatures.csv positions.csv
   athermal init log.csv --time stamp --drifts probe1 probe2 -o -
   athermal init log.csv --time-format '%d.%m.%Y %H:%M:%S'
 
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
-    /// The log
-    #[arg(value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
-    data: PathBuf,
+    /// The log, or the files of several loggers
+    #[arg(required = true, value_name = "DATA", value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
+    data: Vec<PathBuf>,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
     output: PathBuf,
@@ -45,6 +47,8 @@ pub struct Init {
     /// Write over a graph that is there
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Init {
@@ -65,8 +69,10 @@ impl Init {
                 self.output.display()
             )));
         }
-        check_apart("--output", &self.output, [&*self.data])?;
-        let starter = starter(&self.data, &request).map_err(|error| match error {
+        let data = Data::of(self.data.clone(), self.reading.clone());
+        check_apart("--output", &self.output, data.paths())?;
+        data.check_offsets(&[])?;
+        let starter = starter(&data.dataset(), &request).map_err(|error| match error {
             NoStarter::File(error) => {
                 // There is no `--lenient` here that it could advise.
                 let reason = error.without_advice().to_string();
@@ -75,7 +81,7 @@ impl Init {
                     other => other,
                 }
             }
-            NoStarter::Unfit(why) => Failure::Request(format!("{}: {why}", self.data.display())),
+            NoStarter::Unfit(why) => Failure::Request(why),
         })?;
         let people = terminal.format == Format::Table;
         if people {
@@ -89,7 +95,7 @@ impl Init {
         }
         write_aside(&self.output, &starter.text)?;
         if people {
-            terminal.note(self.next());
+            terminal.note(self.next(&data));
         } else {
             let facts = json!({
                 "graph": self.output,
@@ -102,16 +108,16 @@ impl Init {
         Ok(Answer::Fine)
     }
 
-    fn next(&self) -> String {
-        let program = program();
-        let [graph, data] =
-            [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
-        let fit = command(&[&program, "fit", &graph, "--data", &data, "-o model.json"]);
-        let unseen = quoted(&Data::of(vec![self.data.clone()]).unseen());
-        let evaluate = format!("evaluate model.json --data {unseen}");
-        let evaluate = command(&[&program, &evaluate]);
+    fn next(&self, data: &Data) -> String {
+        let mut fit = data.words_with("fit", &self.output);
+        fit.push("-o model.json".to_owned());
+        let unseen = data.others(vec![data.unseen().into()]);
+        let evaluate = unseen.words_with("evaluate", Path::new("model.json"));
         format!(
-            "wrote {graph}; look it over, then fit it, and test it on another log:\n{fit}\n{evaluate}"
+            "wrote {}; look it over, then fit it, and test it on another log:\n{}\n{}",
+            quoted(&self.output.display().to_string()),
+            command(&fit),
+            command(&evaluate)
         )
     }
 }

@@ -1,7 +1,9 @@
 //! Decides which column of a log gives the time, or which two, and in which form.
 
 use athermal::core::time::{Duration, TimeColumns, TimeFormat};
-use athermal::files::{Description, NumberForm, TimeForm, is_time_of_day, zone_in_name, zone_of};
+use athermal::files::{
+    Description, NumberForm, TimeColumn, TimeForm, is_time_of_day, zone_in_name, zone_of,
+};
 
 use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
@@ -37,15 +39,7 @@ fn place_of(word: &str) -> Option<usize> {
 }
 
 /// What a column of zones beside the times is called.
-const ZONE_NAMES: [&str; 7] = [
-    "zone",
-    "tz",
-    "timezone",
-    "time zone",
-    "utc offset",
-    "utc_offset",
-    "zeitzone",
-];
+const ZONE_NAMES: &str = "zone|tz|timezone|time zone|utc offset|utc_offset|zeitzone";
 
 /// How many nanoseconds stand for one sample, where a log only numbers them.
 const SAMPLE_NS: i64 = 1_000_000_000;
@@ -55,6 +49,16 @@ impl Clock {
     #[must_use]
     pub fn counts_samples(&self) -> bool {
         matches!(self.form, TimeForm::Samples { .. })
+    }
+
+    /// How a reader reads it.
+    #[must_use]
+    pub fn column(&self) -> TimeColumn {
+        TimeColumn {
+            columns: self.columns.clone(),
+            form: self.form.clone(),
+            zone: self.zone.as_ref().and_then(|zone| zone.parse().ok()),
+        }
     }
 
     /// A length of time as this log's graph should write it.
@@ -98,7 +102,7 @@ impl Clock {
         }
         let mut names = self.columns.names().iter();
         let in_name = names.find_map(|name| zone_in_name(name));
-        let is_zone = |name: &String| ZONE_NAMES.contains(&&*name.to_lowercase());
+        let is_zone = |name: &String| ZONE_NAMES.split('|').any(|of| of == name.to_lowercase());
         let beside = described.columns.iter().position(is_zone).and_then(|at| {
             let mut cells = described.rows.iter().map(|row| row.get(at));
             let first = cells.next()??;

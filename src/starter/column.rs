@@ -5,7 +5,7 @@ use athermal::files::Description;
 use serde_json::{Value, json};
 
 use super::Request;
-use super::name::{POSITIONS, is_count, measures, unit_in, words};
+use super::name::{POSITIONS, is_among, is_count, measures, unit_in, words};
 
 /// What a column is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,48 +52,19 @@ enum Guess {
     Unused,
 }
 
-const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
-const TEMPERATURES: [&str; 4] = ["t", "temp", "temperature", "tc"];
-const FACTORS: [&str; 6] = ["scale", "gain", "factor", "ratio", "coefficient", "coeff"];
-const DRIVES: [&str; 18] = [
-    "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
-    "rpm", "bat", "batt", "battery", "batterie", "vbat", "supply", "akku",
-];
-const AMBIENT: [&str; 11] = [
-    "hum",
-    "rh",
-    "%rh",
-    "rh%",
-    "pressure",
-    "press",
-    "pres",
-    "baro",
-    "barometer",
-    "druck",
-    "rf",
-];
+const SET_POINTS: &str = "target setpoint set sp goal";
+const TEMPERATURES: &str = "t temp temperature tc";
+const FACTORS: &str = "scale gain factor ratio coefficient coeff";
+const DRIVES: &str = "drive voltage heater lamp power current duty pwm input speed rpm bat batt battery batterie vbat supply akku";
+const AMBIENT: &str = "hum rh %rh rh% pressure press pres baro barometer druck rf";
 /// What is an angle where its unit is a degree.
-const ANGLES: [&str; 13] = [
-    "tilt",
-    "angle",
-    "inc",
-    "incl",
-    "inclination",
-    "pitch",
-    "roll",
-    "yaw",
-    "rot",
-    "azimuth",
-    "theta",
-    "phi",
-    "winkel",
-];
-const MASSES: [&str; 6] = ["mass", "weight", "wt", "masse", "gewicht", "load"];
-const ACCELERATIONS: [&str; 4] = ["acc", "accel", "acceleration", "vib"];
+const ANGLES: &str = "tilt angle inc incl inclination pitch roll yaw rot azimuth theta phi winkel";
+const MASSES: &str = "mass weight wt masse gewicht load";
+const ACCELERATIONS: &str = "acc accel acceleration vib";
 /// What stands in brackets without being a unit: how a value was found among several.
-const STATISTICS: [&str; 6] = ["min", "max", "avg", "mean", "std", "raw"];
+const STATISTICS: &str = "min max avg mean std raw";
 /// The same within a word: `Luftfeuchte`, `airhumidity`, `Luftdruck`.
-const WITHIN: [&str; 4] = ["humid", "feucht", "luftdruck", "airpressure"];
+const WITHIN: &str = "humid feucht luftdruck airpressure";
 
 impl Column {
     /// What was guessed, for people.
@@ -181,7 +152,7 @@ impl Column {
         let measures = |what: &str| unit.as_ref().is_some_and(|unit| measures(unit, what));
         let is_position = |word: &&str| {
             let word = word.split('/').next().unwrap_or_default().to_lowercase();
-            POSITIONS.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit()))
+            is_among(POSITIONS, &word)
         };
         if measures("m") {
             0
@@ -237,16 +208,12 @@ fn guess(name: &str, below: &str) -> Column {
     let by_name = unit_in(name);
     let below = Unit::in_words(below);
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
-    let has = |known: &[&str]| {
-        lower
-            .iter()
-            .any(|word| known.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit())))
+    let has = |known: &str| lower.iter().any(|word| is_among(known, word));
+    let within = |parts: &str| {
+        let mut parts = parts.split(' ');
+        parts.any(|part| lower.iter().any(|word| word.contains(part)))
     };
-    let within = |parts: &[&str]| {
-        let contains = |word: &String| parts.iter().any(|part| word.contains(part));
-        lower.iter().any(contains)
-    };
-    let temp_named = has(&TEMPERATURES) || within(&["temp"]);
+    let temp_named = has(TEMPERATURES) || within("temp");
     // The degrees of a temperature are no angle.
     let is_of_temperature = |unit: &&Unit| {
         let mut known = ["K", "K/s", "V", "A", "Ohm"].into_iter();
@@ -260,10 +227,10 @@ fn guess(name: &str, below: &str) -> Column {
     let last = lower.last().map_or("", String::as_str);
     let by_quantity = match stated {
         "deg" | "°" | "Deg" if !temp_named => Some("deg"),
-        "g" if has(&ACCELERATIONS) => Some("[g]"),
-        "g" if name.contains('[') || has(&MASSES) => Some("g"),
-        _ if last == "deg" && has(&ANGLES) => Some("deg"),
-        _ if last == "g" && has(&MASSES) => Some("g"),
+        "g" if has(ACCELERATIONS) => Some("[g]"),
+        "g" if name.contains('[') || has(MASSES) => Some("g"),
+        _ if last == "deg" && has(ANGLES) => Some("deg"),
+        _ if last == "g" && has(MASSES) => Some("g"),
         _ => None,
     };
     let by_quantity = by_quantity.and_then(|unit| Unit::parse(unit).ok());
@@ -273,13 +240,13 @@ fn guess(name: &str, below: &str) -> Column {
     let is_code = |text: &str| {
         let letters = text.chars().any(char::is_alphabetic);
         let is_word = (2..=8).contains(&text.len()) && !text.contains(char::is_whitespace);
-        letters && is_word && !STATISTICS.contains(&&*text.to_lowercase())
+        letters && is_word && !is_among(STATISTICS, &text.to_lowercase())
     };
     let is_other = unit.is_none() && name.trim_end().ends_with(']') && is_code(stated);
     let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));
     let measures = |what: &str| unit.is_some_and(|unit| measures(unit, what));
     let is_number = unit.is_none_or(is_count);
-    let (guess, why) = if has(&SET_POINTS) {
+    let (guess, why) = if has(SET_POINTS) {
         (
             Guess::Unused,
             "a set point, which says what was asked for and not what was",
@@ -294,11 +261,11 @@ fn guess(name: &str, below: &str) -> Column {
         (Guess::Ambient, "a pressure")
     } else if temp_named {
         (Guess::Temperature, "by its name")
-    } else if has(&DRIVES) {
+    } else if has(DRIVES) {
         (Guess::Drive, "by its name")
-    } else if has(&AMBIENT) || within(&WITHIN) {
+    } else if has(AMBIENT) || within(WITHIN) {
         (Guess::Ambient, "by its name")
-    } else if is_number && !is_other && has(&POSITIONS) && !has(&FACTORS) {
+    } else if is_number && !is_other && has(POSITIONS) && !has(FACTORS) {
         (Guess::Position, "by its name")
     } else {
         (Guess::Other, "neither a temperature nor a length")
@@ -414,7 +381,7 @@ pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
             &[Position][..],
             format!(
                 "nothing in it drifts: {} may explain a drift, and there is no position or other quantity to be explained; log a \
-                 position beside, or name the column that drifts with --drifts",
+                 position beside, give a log of one as well, or name the column that drifts with --drifts",
                 causes.join(", ")
             ),
         ),

@@ -18,12 +18,14 @@ mod window;
 
 pub use dates::WITHOUT_ZONE;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use athermal::core::document::TableFormat;
+use athermal::core::document::{Arrangement, Pattern, TableBase, TableFormat};
 use athermal::core::time::TimeFormat;
-use athermal::files::{Description, FileError, Format, TimeForm};
+use athermal::files::{Dataset, Description, FileError, Format, TimeForm, apart};
 
+use clock::Clock;
 use column::Column;
 use serde_json::Value;
 use survey::Survey;
@@ -58,8 +60,15 @@ pub struct Starter {
 pub enum NoStarter {
     /// The file cannot be read.
     File(FileError),
-    /// It does not hold what a graph needs; the text says what, and what to do.
+    /// They do not hold what a graph needs; the text says which and what, and what to do.
     Unfit(String),
+}
+
+impl NoStarter {
+    fn of(data: &Dataset, why: impl std::fmt::Display) -> Self {
+        let names = data.paths().iter().map(|path| path.display().to_string());
+        Self::Unfit(format!("{}: {why}", names.collect::<Vec<_>>().join(", ")))
+    }
 }
 
 impl From<FileError> for NoStarter {
@@ -68,79 +77,156 @@ impl From<FileError> for NoStarter {
     }
 }
 
-/// Looks at a log and writes a graph for it.
+/// A file, as far as its first rows say what it is.
+struct Log {
+    name: String,
+    described: Description,
+    clock: Clock,
+}
+
+impl Log {
+    fn of(path: &Path, request: &Request, remarks: &mut Vec<String>) -> Result<Self, NoStarter> {
+        let name = path.display().to_string();
+        let unfit = |why: String| NoStarter::Unfit(format!("{name}: {why}"));
+        let mut described = Description::of(path, 500)?;
+        let long = described.long_format();
+        if let (Some(long), Format::JsonLines) = (&long, described.format) {
+            return Err(unfit(long.to_string()));
+        }
+        if let Some(why) = no_table(&described) {
+            return Err(unfit(why));
+        }
+        let (time, format) = (request.time.as_deref(), request.format.as_ref());
+        let clock = clock::find(&described, time, format).map_err(unfit)?;
+        let clock = undecided::decided(path, clock)?;
+        let times = clock.columns.names();
+        described.table.decimal = described.decimal(times);
+        if let Some(long) = &long {
+            described = described.of_long(path, long, times)?;
+            remarks.push(format!(
+                "a long layout: `{}` says of each row what its `{}` is; there are {} names",
+                long.names,
+                long.values,
+                described.columns.len() - times.len()
+            ));
+        }
+        let own_times = || own_times::refusal(&described, &clock);
+        let own_times = (time.is_none() && long.is_none()).then(own_times).flatten();
+        if let Some(why) = dropped::newest_first(&described, &clock).or(own_times) {
+            return Err(unfit(why));
+        }
+        Ok(Self {
+            name,
+            described,
+            clock,
+        })
+    }
+
+    /// Whether its time is read by a graph that declares this one.
+    fn is_found_by(&self, clock: &Clock) -> bool {
+        let own = &self.clock;
+        let is_form = match (&own.other, &clock.form) {
+            (Some(other), TimeForm::Format(form)) if other == form => true,
+            _ => own.form == clock.form,
+        };
+        let found = || athermal::files::other_time(Path::new(&self.name), &clock.column());
+        own.zone == clock.zone && own.columns == clock.columns && is_form
+            || own.zone.is_none()
+                && found().is_some_and(|of| of.columns == own.columns && of.form == own.form)
+    }
+}
+
+/// The clock of the graph: one of which rows have decided the form, where some have, and by which the others are found.
+fn one_clock(logs: &[Log]) -> Result<Clock, NoStarter> {
+    let misfit = |by: &&Log| logs.iter().find(|of| !of.is_found_by(&by.clock));
+    let mut decided: Vec<&Log> = logs.iter().collect();
+    decided.sort_by_key(|log| log.clock.other.is_some());
+    if let Some(log) = decided.iter().find(|log| misfit(log).is_none()) {
+        return Ok(Clock {
+            lacks_zone: logs.iter().any(|log| log.clock.lacks_zone),
+            ..log.clock.clone()
+        });
+    }
+    let two = decided.iter().take(1).copied().chain(misfit(&decided[0]));
+    let two = two.map(|log| format!("{} has {}", log.name, log.clock.remark()));
+    Err(NoStarter::Unfit(format!(
+        "a graph has one time, and in other files one column of dates that rise is found as it writes them, as RFC 3339 does, or in \
+         numbers since 1970: {}; write them alike",
+        two.collect::<Vec<_>>().join("; ")
+    )))
+}
+
+/// The layout of each file.
+fn tables(logs: &[Log]) -> TableBase {
+    let base = &logs[0].described.table;
+    if logs.iter().all(|log| log.described.table == *base) {
+        return TableBase {
+            base: base.clone(),
+            files: Vec::new(),
+        };
+    }
+    let file = |log: &Log| {
+        let name = Path::new(&log.name).file_name().unwrap_or_default();
+        (
+            Pattern::new(&name.to_string_lossy()),
+            log.described.table.clone(),
+        )
+    };
+    TableBase {
+        base: TableFormat::default(),
+        files: logs.iter().map(file).collect(),
+    }
+}
+
+/// Looks at logs and writes a graph for them.
 ///
 /// # Errors
-/// When the file cannot be read, or nothing in it drifts with something that could explain it.
-pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
-    let mut described = Description::of(path, 500)?;
-    let long = described.long_format();
-    if long.is_some() && described.format != Format::Csv {
-        return Err(NoStarter::Unfit(
-            long.map_or_else(String::new, |long| long.to_string()),
-        ));
-    }
-    if described
-        .columns
-        .iter()
-        .any(|name| name == "Name[2]" || name == "SymbolName[2]")
-    {
-        return Err(NoStarter::Unfit(TIME_BESIDE_EACH.to_owned()));
-    }
-    if described.lacks_names() {
-        return Err(NoStarter::Unfit(format!(
-            "its first line holds numbers, such as `{}`, and no names: write a line with the names of the columns above it, such as \
-             time_s,plate_degC,Z_nm",
-            described.columns[0]
-        )));
-    }
-    if let Some(why) = too_few(&described) {
-        return Err(NoStarter::Unfit(why));
-    }
+/// When a file cannot be read, they are not one recording, or nothing in them drifts with something that could explain it.
+pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> {
     let mut remarks = Vec::new();
-    let clock = clock::find(&described, request.time.as_deref(), request.format.as_ref())
-        .map_err(NoStarter::Unfit)?;
-    let clock = undecided::decided(path, clock)?;
-    remarks.push(clock.remark());
-    let decimal = described.decimal(clock.columns.names());
-    let is_long = long.is_some();
-    if let Some(long) = long {
-        described = described.of_long(path, &long, clock.columns.names())?;
-        remarks.push(format!(
-            "a long layout: `{}` says of each row what its `{}` is; there are {} names",
-            long.names,
-            long.values,
-            described.columns.len() - clock.columns.names().len()
-        ));
+    let logs = data.paths().iter();
+    let logs = logs.map(|path| Log::of(path, request, &mut remarks));
+    let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
+    let clock = one_clock(&logs)?;
+    remarks.insert(0, clock.remark());
+    let is_other =
+        |of: &Clock| of.columns != clock.columns || of.form != clock.form && of.other.is_none();
+    for log in logs.iter().filter(|log| is_other(&log.clock)) {
+        remarks.push(format!("{}: its {}", log.name, log.clock.remark()));
     }
-    let mut columns = column::columns(&described, clock.columns.names());
-    if let Some(why) = dropped::newest_first(&described, &clock) {
-        return Err(NoStarter::Unfit(why));
+    let times = logs.iter().flat_map(|log| log.clock.columns.names());
+    let times: Vec<String> = times.cloned().collect();
+    let columns_of = |log: &Log| (log.name.clone(), log.described.columns.clone());
+    let apart = apart(&logs.iter().map(columns_of).collect::<Vec<_>>(), &times);
+    let mut known: BTreeSet<String> = apart.keys().cloned().collect();
+    let columns = |log: &Log| column::columns(&log.described, log.clock.columns.names());
+    let columns = logs.iter().flat_map(columns);
+    let is_new = |of: &Column| of.name.is_empty() || known.insert(of.name.clone());
+    let mut columns: Vec<Column> = columns.filter(is_new).collect();
+    let mut tables = tables(&logs);
+    let mut survey = Survey::of(data, &clock, &tables, &columns)?;
+    let mut again = None;
+    for (log, path) in logs.iter().zip(data.paths()) {
+        let is_long = log.described.table.layout == Arrangement::Long;
+        let is_table = log.described.format == Format::Csv && !is_long;
+        if is_table && again.is_none() && !survey.dropped.is_empty() {
+            again = log.described.next_names(path, log.clock.columns.names())?;
+        }
     }
-    let own_times =
-        own_times::refusal(&described, &clock).filter(|_| request.time.is_none() && !is_long);
-    if let Some(why) = own_times {
-        return Err(NoStarter::Unfit(why));
-    }
-    let mut table = TableFormat {
-        decimal,
-        ..described.table.clone()
-    };
-    let mut survey = Survey::of(path, &clock, &table, &columns)?;
-    let may_have_more = !survey.dropped.is_empty() && described.format == Format::Csv && !is_long;
-    let again = match may_have_more {
-        true => described.next_names(path, clock.columns.names())?,
-        false => None,
-    };
-    let names = (&*described.columns, &*columns);
+    let names = columns
+        .iter()
+        .map(|column| &column.name)
+        .chain(apart.keys());
+    let names: Vec<&String> = names.collect();
     if again.is_none()
-        && let Some((in_segments, column)) = survey.by_segments(path, &clock, &table, names)
+        && let Some((in_segments, by_segments, column)) =
+            survey.by_segments(data, &clock, &tables, (&names, &columns))
     {
         remarks.push(format!(
             "segments: the times start again where `{column}` changes, {} in all",
-            in_segments.segments()
+            in_segments.segments
         ));
-        (survey, table.segment) = (in_segments, Some(column));
+        (survey, tables) = (in_segments, by_segments);
     }
     remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
@@ -151,13 +237,19 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
             names.join(", ")
         )
     }));
-    let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
+    let apart = apart
+        .iter()
+        .map(|(name, why)| format!("{name}: left out, {why}"));
+    let apart: Vec<String> = apart.collect();
+    dropped.extend(apart.iter().cloned());
+    let unfit = |why| NoStarter::of(data, [vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
     survey.take_changes(&mut columns, &clock);
     survey.leave_out_slow(&mut columns, &clock, request);
     survey.leave_out_faults(&mut columns);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
+    remarks.extend(apart);
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {
         TimeForm::Numbers { .. } => unfit(format!("{why}; {}", clock.remark())),
@@ -165,9 +257,9 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
     let columns_taken = columns.iter().map(Column::facts).collect();
-    table.lenient = survey.needs_lenience(&columns);
+    tables.base.lenient = survey.needs_lenience(&columns);
     Ok(Starter {
-        text: text::graph(path, (&clock, &table), &columns, &survey, &choice),
+        text: text::graph(data.paths(), (&clock, &tables), &columns, &survey, &choice),
         remarks,
         windows: choice.facts(&columns),
         columns: columns_taken,
@@ -178,8 +270,19 @@ pub fn starter(path: &Path, request: &Request) -> Result<Starter, NoStarter> {
 const TIME_BESIDE_EACH: &str = "each column has a time of its own beside it, under the name of an attribute, as TwinCAT Scope exports \
      them; export it with one time for all columns";
 
-/// Why a log has too few rows.
-fn too_few(described: &Description) -> Option<String> {
+/// Why a log is no table of many rows with one time.
+fn no_table(described: &Description) -> Option<String> {
+    let mut names = described.columns.iter();
+    if names.any(|name| name == "Name[2]" || name == "SymbolName[2]") {
+        return Some(TIME_BESIDE_EACH.to_owned());
+    }
+    if described.lacks_names() {
+        return Some(format!(
+            "its first line holds numbers, such as `{}`, and no names: write a line with the names of the columns above it, such as \
+             time_s,plate_degC,Z_nm",
+            described.columns[0]
+        ));
+    }
     let rows = match described.rows.len() {
         0 => "no row",
         1 => "a single row",

@@ -3,18 +3,13 @@
 use athermal::core::unit::Unit;
 
 /// What a position is called.
-pub(super) const POSITIONS: [&str; 10] = [
-    "pos",
-    "position",
-    "displacement",
-    "x",
-    "y",
-    "z",
-    "gap",
-    "offset",
-    "probe",
-    "deformation",
-];
+pub(super) const POSITIONS: &str = "pos position displacement x y z gap offset probe deformation";
+
+/// Whether a word, without a number at its end, is among these with blanks between them.
+pub(super) fn is_among(known: &str, word: &str) -> bool {
+    let word = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    known.split(' ').any(|of| of == word)
+}
 
 /// The parts of a column's name.
 pub fn words(name: &str) -> Vec<&str> {
@@ -109,7 +104,7 @@ fn inches(name: &str) -> Option<Unit> {
     let in_brackets = lower.ends_with("[in]") || lower.ends_with("(in)");
     let words = words(&lower);
     let (last, rest) = words.split_last()?;
-    let is_position = |word: &&str| POSITIONS.contains(&word.trim_end_matches(char::is_numeric));
+    let is_position = |word: &&str| is_among(POSITIONS, word);
     let is_unit = in_brackets || *last == "in" && rest.iter().any(is_position);
     is_unit.then(|| Unit::parse("[in_i]").ok())?
 }

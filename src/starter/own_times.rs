@@ -12,14 +12,7 @@ use super::texts::Texts;
 /// The clock of a server and that of what it serves differ by less than so many steps; the rest is another time.
 const STEPS: f64 = 3.0;
 /// A column of numbers is one of times where its name says so.
-const CALLED: [&str; 6] = [
-    "time",
-    "timestamp",
-    "datetime",
-    "zeit",
-    "uhrzeit",
-    "zeitstempel",
-];
+const CALLED: &str = "time timestamp datetime zeit uhrzeit zeitstempel";
 
 /// Why rows of a log have no one time.
 pub fn refusal(described: &Description, clock: &Clock) -> Option<String> {
@@ -40,7 +33,9 @@ pub fn refusal(described: &Description, clock: &Clock) -> Option<String> {
         let texts = Texts::of(described, index);
         let is_called = || {
             let lower = name.to_lowercase();
-            words(&lower).iter().any(|word| CALLED.contains(word))
+            words(&lower)
+                .iter()
+                .any(|word| CALLED.split(' ').any(|of| of == *word))
         };
         let other =
             clock::clock(described, &texts).filter(|other| match (&other.form, &clock.form) {

@@ -3,7 +3,7 @@
 use athermal_numerics::median;
 
 use super::column::{Column, Kind};
-use super::survey::{Series, Survey};
+use super::survey::Survey;
 use athermal_analysis::figures::{count, number};
 
 /// The share of all values from which on one may stand for none. A rarer one leaps, as that of a failed sensor.
@@ -25,7 +25,8 @@ impl Survey {
                 continue;
             };
             let of = count(series.values.len());
-            series.leave_out(value);
+            series.keep(|of| of != value);
+            series.placeholder = Some(value);
             let (low, high) = series.extremes();
             let then = if (low..=high).contains(&value) {
                 "leave such cells empty: a graph cannot know them from others"
@@ -38,14 +39,6 @@ impl Survey {
                 count(n)
             ));
         }
-    }
-}
-
-impl Series {
-    fn leave_out(&mut self, value: f64) {
-        let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
-        (self.time_s, self.values) = pairs.filter(|(_, of)| *of != value).unzip();
-        self.placeholder = Some(value);
     }
 }
 

@@ -1,10 +1,8 @@
 //! Decides what is measured of a log's columns: rates, gaps, extremes; not what they mean.
 
-use std::path::Path;
-
-use athermal::core::document::{TableBase, TableFormat};
+use athermal::core::document::TableBase;
 use athermal::files::{
-    CellFault, ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock,
+    CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -15,7 +13,7 @@ use super::column::{Column, Kind};
 use super::dropped;
 use athermal_analysis::figures::{count, counted};
 
-/// The values of a log, column by column.
+/// The values of a recording, column by column.
 #[derive(Debug)]
 pub struct Survey {
     /// For each column the instants in s, from the first row, and the values.
@@ -31,7 +29,7 @@ pub struct Survey {
     /// How many rows are out of order.
     out_of_order: u64,
     /// How many segments there are.
-    segments: u64,
+    pub segments: u64,
 }
 
 /// The values of one column.
@@ -92,10 +90,8 @@ const NO_VALUES: &str = "-|--|---|?|*|na|n/a|n.a.|k.a.|#n/a|#nv|#wert!|#value!|#
 impl Unreadable {
     /// Whether it is what stands for no value.
     fn is_none(&self) -> bool {
-        {
-            let found = self.found.to_lowercase();
-            NO_VALUES.split('|').any(|none| none == found)
-        }
+        let found = self.found.to_lowercase();
+        NO_VALUES.split('|').any(|none| none == found)
     }
 }
 
@@ -197,13 +193,11 @@ impl Series {
         finder.found()
     }
 
-    /// Leaves out the values outside of a range; how many these are.
-    fn keep_within(&mut self, (lowest, highest): (f64, f64)) -> u64 {
+    /// Leaves out all other values; how many these are.
+    pub fn keep(&mut self, is_kept: impl Fn(f64) -> bool) -> u64 {
         let before = self.values.len();
         let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
-        (self.time_s, self.values) = pairs
-            .filter(|(_, value)| (lowest..=highest).contains(value))
-            .unzip();
+        (self.time_s, self.values) = pairs.filter(|(_, value)| is_kept(*value)).unzip();
         (before - self.values.len()) as u64
     }
 
@@ -219,50 +213,38 @@ impl Series {
 }
 
 impl Survey {
-    /// Reads a log to its end. What cannot be read is passed over.
+    /// Reads the files to their end. What cannot be read is passed over.
     ///
     /// # Errors
-    /// When the file cannot be read, or has less than two rows.
+    /// When a file cannot be read, they are not one recording, or have less than two rows.
     pub fn of(
-        path: &Path,
+        data: &Dataset,
         clock: &Clock,
-        table: &TableFormat,
+        table: &TableBase,
         columns: &[Column],
     ) -> Result<Self, NoStarter> {
-        let layout = Layout {
-            time: TimeColumn {
-                columns: clock.columns.clone(),
-                form: clock.form.clone(),
-                zone: clock.zone.as_ref().and_then(|zone| zone.parse().ok()),
-            },
-            channels: columns
-                .iter()
-                .map(|column| ChannelColumn {
-                    column: column.name.clone(),
-                    optional: true,
-                })
-                .collect(),
-            table: TableBase {
-                base: table.clone(),
-                files: Vec::new(),
-            },
+        let channel = |column: &Column| ChannelColumn {
+            column: column.name.clone(),
+            optional: true,
         };
-        let options = Options {
-            lenient: true,
-            joins: true,
-            ..Options::default()
-        };
-        let mut reader = Reader::open(path, layout, options)?;
+        let mut recording = data.skim(Layout {
+            time: clock.column(),
+            channels: columns.iter().map(channel).collect(),
+            table: table.clone(),
+        })?;
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
         let (mut segments, mut before_s, mut begins_s) = (1, 0.0, 0.0);
-        while reader.next_into(&mut row)? {
-            if row.begins_segment
-                && let Some(first) = first.replace(row.time_ns)
-            {
-                let length_s = (last - first) as f64 / 1e9;
-                (segments, before_s) = (segments + 1, before_s + length_s);
-                begins_s += length_s + 2.0 * APART_S;
+        loop {
+            match recording.next_into(&mut row)? {
+                Event::Row => {}
+                Event::Segment => {
+                    let length_s = first.take().map_or(0.0, |of| (last - of) as f64 / 1e9);
+                    (segments, before_s) = (segments + 1, before_s + length_s);
+                    begins_s += length_s + 2.0 * APART_S;
+                    continue;
+                }
+                Event::End => break,
             }
             let first = *first.get_or_insert(row.time_ns);
             last = row.time_ns;
@@ -275,63 +257,72 @@ impl Survey {
                 }
             }
         }
-        for (series, bad) in series.iter_mut().zip(&reader.report().bad_cells_of) {
-            series.unreadable = bad.count;
-            series.first_unreadable = bad.first.as_ref().and_then(Unreadable::of);
+        let files = recording.reports();
+        let reports = || files.iter().map(|(_, report)| report);
+        for report in reports() {
+            for (series, bad) in series.iter_mut().zip(&report.bad_cells_of) {
+                series.unreadable += bad.count;
+                let first = series.first_unreadable.take();
+                let read = || bad.first.as_ref().and_then(Unreadable::of);
+                series.first_unreadable = first.or_else(read);
+            }
         }
         let duration_s = before_s + first.map_or(0.0, |first| (last - first) as f64 / 1e9);
         if rows < 2 || duration_s <= 0.0 {
-            let report = reader.report();
-            let first = report.refused_rows.first.as_ref();
-            let first = first.or(report.repeated_time.first.as_ref());
-            let first = first.or(report.refused_time.first.as_ref());
+            let counts =
+                reports().flat_map(|of| [&of.refused_rows, &of.repeated_time, &of.refused_time]);
+            let first = counts.filter_map(|of| of.first.as_ref()).next();
             let first = first.map_or_else(String::new, |error| format!("; {error}"));
-            return Err(NoStarter::Unfit(format!(
-                "it has less than two rows with a time{first}"
-            )));
+            return Err(NoStarter::of(
+                data,
+                format!("it has less than two rows with a time{first}"),
+            ));
         }
+        let dropped = files.iter().flat_map(|(file, report)| {
+            let remarks = dropped::remarks(report, clock).into_iter();
+            remarks.map(move |remark| (file, remark))
+        });
+        let dropped = dropped.map(|(file, remark)| match files.len() {
+            1 => remark,
+            _ => format!("{file}: {remark}"),
+        });
         Ok(Self {
             series,
             duration_s,
             rows,
-            dropped: dropped::remarks(reader.report(), clock),
-            has_broken_rows: reader.report().refused_rows.count > 0,
-            out_of_order: reader.report().refused_time.count,
+            dropped: dropped.collect(),
+            has_broken_rows: reports().any(|report| report.refused_rows.count > 0),
+            out_of_order: reports().map(|report| report.refused_time.count).sum(),
             segments,
         })
     }
 
-    /// How many segments there are.
-    #[must_use]
-    pub fn segments(&self) -> u64 {
-        self.segments
-    }
-
-    /// The same log in segments by a column that changes just where the times start again, with that column; none where nothing does, or
+    /// The same in segments by a column that changes just where the times start again, with that column; none where nothing does, or
     /// the times start again nowhere.
     pub fn by_segments(
         &self,
-        path: &Path,
+        data: &Dataset,
         clock: &Clock,
-        table: &TableFormat,
-        (names, columns): (&[String], &[Column]),
-    ) -> Option<(Self, String)> {
+        table: &TableBase,
+        (names, columns): (&[&String], &[Column]),
+    ) -> Option<(Self, TableBase, String)> {
         if self.out_of_order < RESTARTED {
             return None;
         }
         let times = clock.columns.names();
-        let names = names
-            .iter()
-            .filter(|name| !name.is_empty() && !times.contains(name));
+        let names = names.iter().copied();
+        let names = names.filter(|name| !name.is_empty() && !times.contains(name));
         let mut tried = names.take(CANDIDATES).filter_map(|name| {
-            let segment = Some(name.clone());
-            let table = TableFormat {
-                segment,
-                ..table.clone()
-            };
-            Some((Self::of(path, clock, &table, columns).ok()?, name.clone()))
+            let mut table = table.clone();
+            let files = table.files.iter_mut().map(|(_, table)| table);
+            for table in files.chain([&mut table.base]) {
+                table.segment = Some(name.clone());
+            }
+            let of = Self::of(data, clock, &table, columns).ok()?;
+            Some((of, table, name.clone()))
         });
-        tried.find(|(of, _)| of.out_of_order == 0 && of.segments > 1 && of.segments * 10 <= of.rows)
+        tried
+            .find(|(of, ..)| of.out_of_order == 0 && of.segments > 1 && of.segments * 10 <= of.rows)
     }
 
     /// Whether none of these has a gap that a window of this width does not bridge.
@@ -418,11 +409,8 @@ impl Survey {
             let Some(leaps) = series.leaps() else {
                 continue;
             };
-            let left_out = if is_temperature {
-                series.keep_within(beyond(leaps.usual))
-            } else {
-                0
-            };
+            let (lowest, highest) = beyond(leaps.usual);
+            let left_out = series.keep(|of| !is_temperature || (lowest..=highest).contains(&of));
             column.warn(match left_out {
                 0 if drifts => {
                     format!(

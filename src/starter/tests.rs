@@ -298,6 +298,11 @@ fn cases() -> Vec<Case> {
     ]
 }
 
+fn started(path: &Path) -> Result<Starter, NoStarter> {
+    let data = Dataset::new(vec![path.to_owned()], Options::default());
+    starter(&data, &Request::default())
+}
+
 #[test]
 fn each_kind_of_log_is_declared_and_read_to_the_same_bits_as_when_it_is_found() {
     for (nth, (name, bytes, keys)) in cases().into_iter().enumerate() {
@@ -307,8 +312,7 @@ fn each_kind_of_log_is_declared_and_read_to_the_same_bits_as_when_it_is_found() 
             "csv"
         };
         let log = Log::of(&format!("{nth}.{ending}"), &bytes);
-        let starter = starter(&log.0, &Request::default())
-            .unwrap_or_else(|error| panic!("{name}: {error:?}"));
+        let starter = started(&log.0).unwrap_or_else(|error| panic!("{name}: {error:?}"));
         for key in keys {
             assert!(
                 starter.text.lines().any(|line| line.starts_with(key)),
@@ -338,7 +342,7 @@ fn a_table_in_markdown_is_read_by_its_names() {
     let text: String = text.lines().map(|line| format!("| {line}\n")).collect();
     let text = with_line(&text, 1, "|---|---|---|");
     let log = Log::of("table.md", text.as_bytes());
-    let starter = starter(&log.0, &Request::default()).unwrap();
+    let starter = started(&log.0).unwrap();
     assert!(
         starter.text.contains("separator = \"|\""),
         "{}",
@@ -357,7 +361,7 @@ fn an_hour_of_24_is_that_of_the_next_day() {
         _ => format!("2026-03-01 {h:02}:{m:02}:{s:02}"),
     });
     let log = Log::of("24.csv", text.as_bytes());
-    let starter = starter(&log.0, &Request::default()).unwrap();
+    let starter = started(&log.0).unwrap();
     let lenient = starter.text.contains("lenient = true");
     let rows = rows(&log.0, layout(&plan(&starter.text)), lenient);
     assert!(rows.len() >= 1499, "{}", rows.len());
@@ -377,7 +381,7 @@ fn the_long_layout_of_an_archive_is_read() {
             .replace("01,03,", "01.03.")
     });
     let log = Log::of("archive.csv", text.as_bytes());
-    let starter = starter(&log.0, &Request::default()).unwrap();
+    let starter = started(&log.0).unwrap();
     for declared in [
         "layout = \"long\"",
         "name = \"VarName\"",

@@ -1,9 +1,9 @@
 //! Decides how the starter graph is written: every guess beside its reason, so that it can be corrected.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use athermal::core::document::{Arrangement, DecimalMark, TableFormat};
+use athermal::core::document::{Arrangement, DecimalMark, TableBase, TableFormat};
 use athermal::core::unit::Unit;
 
 use super::clock::Clock;
@@ -16,15 +16,19 @@ use athermal_analysis::figures::{count, number};
 
 /// The text of the graph.
 pub fn graph(
-    path: &Path,
-    (clock, table): (&Clock, &TableFormat),
+    paths: &[PathBuf],
+    (clock, tables): (&Clock, &TableBase),
     columns: &[Column],
     survey: &Survey,
     choice: &Choice,
 ) -> String {
-    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let names: Vec<String> = paths.iter().map(|path| file_name(path)).collect();
+    let file = match &*names {
+        [first, _, _, _, ..] => format!("{first} and {} more files", names.len() - 1),
+        few => few.join(", "),
+    };
     let file = file.replace(char::is_control, " ");
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = paths[0].file_stem().unwrap_or_default().to_string_lossy();
     let writer = Writer {
         clock,
         columns,
@@ -46,7 +50,11 @@ pub fn graph(
     let _ = writeln!(text, "name = {}", toml_string(&stem));
     writer.sets(&mut text);
     writer.time(&mut text);
-    lay_out(table, &mut text);
+    lay_out("[table]", &tables.base, &mut text);
+    for (name, (_, table)) in names.iter().zip(&tables.files) {
+        let heading = format!("[[table.files]]\nmatch = {}", toml_string(name));
+        lay_out(&heading, table, &mut text);
+    }
     writer.signals(&mut text);
     match &choice.levels {
         Some(why) => writer.levels(why, &mut text),
@@ -472,12 +480,18 @@ impl Writer<'_> {
     }
 }
 
-/// `[table]`, where the layout of the log is not the usual one.
-fn lay_out(table: &TableFormat, text: &mut String) {
+/// The name of a file without its folders.
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// `[table]` or what changes it for a file, where the layout of the log is not the usual one.
+fn lay_out(heading: &str, table: &TableFormat, text: &mut String) {
     if *table == TableFormat::default() {
         return;
     }
-    text.push_str("\n[table]\n");
+    let _ = writeln!(text, "\n{heading}");
     let mut key = |key: &str, value: Option<String>, comment: &str| {
         if let Some(value) = value {
             let _ = writeln!(text, "{}", beside(&format!("{key} = {value}"), comment));

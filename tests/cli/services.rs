@@ -227,7 +227,9 @@ fn a_second_service_on_one_state_is_refused_and_a_damaged_journal_too() {
     until_rows(&scratch.path("history.csv"), 50, &mut child);
     let second = athermal(&[&"serve", &scratch.path("line.toml")]).ended(3);
     assert!(
-        second.told.contains("another service keeps its state there"),
+        second
+            .told
+            .contains("another service keeps its state there"),
         "{}",
         second.told
     );

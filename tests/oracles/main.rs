@@ -12,6 +12,7 @@ mod defaults;
 mod estimators;
 mod in_sample;
 mod missing_truths;
+mod novelty;
 mod redundancy;
 mod reference_figures;
 mod scores_by_hand;

@@ -41,6 +41,7 @@ mod kalman;
 mod least_squares;
 mod non_negative;
 mod normal_equations;
+mod novelty;
 mod orthogonal;
 mod penalty;
 mod prediction_error;
@@ -76,6 +77,7 @@ pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
 };
 pub use non_negative::non_negative_least_squares;
+pub use novelty::Novelty;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
 pub use prediction_error::{
     Beginning, Fading, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,

@@ -19,7 +19,7 @@ use crate::solver::Solver;
 /// value taken is the last one at or before the instant asked for. A lag whose window overlaps the predicted one is an
 /// error. The answer changes with time alone, so the node runs at every tick.
 ///
-/// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it.
+/// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it, and so is `novelty`.
 /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
 /// newest truth, in the numbers of `rls`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,6 +75,10 @@ impl Estimator for Ar {
 
     fn learns(&self) -> Learns {
         self.solver.learns()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn has_std_dev(&self) -> bool {

@@ -20,7 +20,7 @@ use crate::solver::Solver;
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
 /// candidates like the features. The answer changes with time alone, so the node runs at every tick.
 ///
-/// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it.
+/// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it, and so is `novelty`.
 /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
 /// newest truth, in the numbers of `rls`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -87,6 +87,10 @@ impl Estimator for Arx {
 
     fn learns(&self) -> Learns {
         self.solver.learns()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn has_std_dev(&self) -> bool {

@@ -14,7 +14,7 @@ use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 use crate::folds::{Folds, tell_moved, tell_quiet};
 use crate::penalty::{best_of, means};
-use crate::regression::LinearPredictor;
+use crate::regression::{LinearPredictor, novelty_of};
 use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
@@ -24,6 +24,8 @@ use crate::unsolved::unsolved;
 /// means the same in all units; `ρ = l1_ratio`. Of features
 /// that hang together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against
 /// the *mean* of squares, that of ridge against their sum.
+///
+/// The port `novelty` shows how far the features are outside of those of the fit, as that of `linear` does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ElasticNet {
@@ -102,6 +104,10 @@ impl Estimator for ElasticNet {
 
     fn regressors(&self) -> Regressors {
         present_features()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
@@ -193,10 +199,11 @@ impl SparseTrainer {
 
     fn solve(&self, report: &mut TrainingReport) -> Result<LinearPredictor, NumericsError> {
         let gram = self.blocks.total();
-        let scales = Standardization::of(&gram).scales;
-        let how = self.settle(&gram, &scales, report)?;
+        let standard = Standardization::of(&gram);
+        let scales = &standard.scales;
+        let how = self.settle(&gram, scales, report)?;
         let all: Vec<usize> = (0..self.regressors.len()).collect();
-        let fit = how.solve(&gram, &all, &scales)?;
+        let fit = how.solve(&gram, &all, scales)?;
         tell_columns(&gram, |column| &self.regressors[column].name, report);
         report.figure("converged", fit.converged);
         if !fit.converged {
@@ -217,6 +224,7 @@ impl SparseTrainer {
             self.regressors.len()
         ));
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
+        let novelty = novelty_of(&self.blocks, &standard, &kept);
         Ok(LinearPredictor {
             regressors: kept
                 .iter()
@@ -225,6 +233,7 @@ impl SparseTrainer {
             coefficients: kept.iter().map(|&j| fit.coefficients[j]).collect(),
             intercept: fit.intercept,
             variance: None,
+            novelty,
         })
     }
 }

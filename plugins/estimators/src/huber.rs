@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
-use crate::regression::{LinearPredictor, rows_gone};
+use crate::regression::{LinearPredictor, novelty_of, rows_gone};
 use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
@@ -19,6 +19,8 @@ use crate::unsolved::unsolved;
 /// Minimises `Σ(σ + H((y − ŷ)/σ) σ) + α Σ w_j²` over the coefficients `w`, the intercept and the scale `σ`, with features and truth
 /// standardised and `H(z) = z²` up to `|z| = ε`, `2ε|z| − ε²` beyond (Huber 1981, section 7.7). It goes over its rows several
 /// times, so they must fit in memory (`fit --memory`).
+///
+/// The port `novelty` shows how far the features are outside of those of the fit, as that of `linear` does.
 ///
 /// A fit tells how many rows are outliers: those with errors beyond three standard deviations, which are 1.4826 times the median of
 /// the sizes of the errors (Hampel 1974); of normal errors 0.3 %.
@@ -53,6 +55,10 @@ impl Estimator for Huber {
 
     fn regressors(&self) -> Regressors {
         present_features()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
@@ -132,6 +138,7 @@ impl Trainer for RobustTrainer {
             coefficients: fit.coefficients,
             intercept: fit.intercept,
             variance: None,
+            novelty: novelty_of(&self.blocks, &standard, &all),
         };
         Ok(Trained {
             predictor: Box::new(predictor),

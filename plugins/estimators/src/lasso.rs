@@ -11,6 +11,8 @@ use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 ///
 /// Minimises `1/(2n) Σ(y − ŷ)² + α Σ|w_j|` over the coefficients `w`, the intercept free, with features and truth standardised
 /// (Tibshirani 1996), so that `α` means the same in all units. Note that `α` stands against the *mean* of squares, that of ridge against their sum.
+///
+/// The port `novelty` shows how far the features are outside of those of the fit, as that of `linear` does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Lasso {
@@ -26,6 +28,10 @@ impl Estimator for Lasso {
 
     fn regressors(&self) -> Regressors {
         present_features()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {

@@ -24,6 +24,12 @@ use crate::solver::Solver;
 /// (Draper and Smith 1998, section 3.1; for ridge, the posterior of Hastie, Tibshirani and Friedman 2009, section 3.4.1).
 /// It takes the data for more of the same: `conformal` measures how often an interval holds.
 ///
+/// The port `novelty` shows how far the features are outside of those of the fit, 1 at their edge, outside of which one row of a
+/// thousand lay. Larger values in a direction in which they varied in the fit hardly count, a new direction does: with the
+/// standardised features `z` of `p` columns, `n` rows and the eigenvectors `v` and eigenvalues `λ` of `ZᵀZ / n`, the twelve largest,
+/// it is the root of `(‖z‖² − Σ λ / (λ + 0.01) (vᵀz)²) / (‖z‖² + p)` over its 99.9 % quantile. A fit whose rows do not fit in memory
+/// has none, nor has an estimator that goes on learning.
+///
 /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
 /// newest truth, in the numbers of `rls`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -52,6 +58,10 @@ impl Estimator for Linear {
 
     fn learns(&self) -> Learns {
         self.solver.learns()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn has_std_dev(&self) -> bool {

@@ -6,8 +6,8 @@ use athermal_core::node::{
 };
 use athermal_core::node::{number, numbers};
 use athermal_numerics::{
-    Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, PredictionVariance, Sgd,
-    SgdOptions, Standardization,
+    Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, Novelty, PredictionVariance,
+    Sgd, SgdOptions, Standardization,
 };
 use serde::{Deserialize, Serialize};
 
@@ -151,6 +151,7 @@ impl LinearTrainer {
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
         let found = self.find(report)?;
+        let novelty = novelty_of(&self.blocks, &found.standard, &found.fit.columns);
         match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => {
                 let model = LinearPredictor {
@@ -162,6 +163,7 @@ impl LinearTrainer {
                     regressors: found.names,
                     coefficients: found.fit.coefficients.clone(),
                     intercept: found.fit.intercept,
+                    novelty,
                 };
                 Ok((model, None))
             }
@@ -176,7 +178,7 @@ impl LinearTrainer {
                 } else {
                     LearningRate::InvScaling { eta0, power }
                 };
-                self.descend(SgdOptions { alpha, rate }, epochs, found, report)
+                self.descend(SgdOptions { alpha, rate }, epochs, (found, novelty), report)
             }
         }
     }
@@ -186,7 +188,7 @@ impl LinearTrainer {
         &self,
         options: SgdOptions,
         epochs: usize,
-        found: Found,
+        (found, novelty): (Found, Option<Novelty>),
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
         let Found {
@@ -224,6 +226,7 @@ impl LinearTrainer {
             coefficients,
             intercept: sgd.intercept() + mean - shift,
             variance: None,
+            novelty,
         };
         let squared = rows.iter().map(|(x, y, _)| {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
@@ -286,6 +289,15 @@ impl Trainer for LinearTrainer {
     }
 }
 
+/// How far rows are from those of a fit by some of their columns, where its rows were kept and say so.
+pub(crate) fn novelty_of(
+    blocks: &GramBlocks,
+    standard: &Standardization,
+    columns: &[usize],
+) -> Option<Novelty> {
+    Novelty::of(&blocks.total(), standard, columns, blocks.rows()?)
+}
+
 /// Why stochastic gradients gave no model: their steps grew without bound.
 fn diverged(model: &LinearPredictor, rate: LearningRate) -> TrainingError {
     let (LearningRate::Constant { eta0 } | LearningRate::InvScaling { eta0, .. }) = rate;
@@ -330,6 +342,9 @@ pub struct LinearPredictor {
     /// How far a truth may be from its prediction, where theory says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) variance: Option<PredictionVariance>,
+    /// How far regressors are from those of the fit, where its rows say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) novelty: Option<Novelty>,
 }
 
 impl LinearPredictor {
@@ -369,6 +384,10 @@ impl Predictor for LinearPredictor {
                 mistakes.push(Mistake::at("rows", message));
             }
         }
+        if let Some(novelty) = &self.novelty {
+            let lists = [("novelty.means", novelty.width())];
+            mistakes.extend(Mistake::of_lengths(width, &lists));
+        }
         mistakes
     }
 
@@ -378,6 +397,11 @@ impl Predictor for LinearPredictor {
 
     fn linear(&self) -> Option<LinearForm<'_>> {
         Some(self.form())
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        let novelty = self.novelty.as_ref();
+        novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
     }
 
     fn std_dev(&self, regressors: &[f64]) -> f64 {

@@ -101,6 +101,18 @@ impl Dataset {
         &self.paths
     }
 
+    /// The rows of all files by a layout that no graph declares; what cannot be read is passed over.
+    ///
+    /// # Errors
+    /// As for [`Joint::open`].
+    pub fn skim(&self, layout: Layout) -> Result<Joint, FileError> {
+        let options = Options {
+            lenient: true,
+            ..self.options.clone()
+        };
+        Joint::open(&self.paths, layout, options)
+    }
+
     /// The files of each log, where these are several that are merged; else none.
     ///
     /// # Errors

@@ -52,13 +52,15 @@ mod writer;
 pub use begun::begun_columns;
 pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
-pub use detect::{Description, Format, LongFormat, NumberForm, zone_in_name, zone_of};
+pub use detect::{
+    Description, Format, LongFormat, NumberForm, apart, other_time, zone_in_name, zone_of,
+};
 pub use error::{Again, CellFault, FileError, MissingColumn, Place};
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
 pub use lines::STANDARD_INPUT;
-pub use merge::MergeError;
+pub use merge::{Joint, MergeError};
 pub use reader::{Options, Reader, Row};
 pub use recording::{Event, Recording};
 pub use stream::WithRevision;

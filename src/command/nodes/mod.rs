@@ -168,6 +168,11 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                     "the standard deviation of the truth about the prediction",
                     |spec| matches!(spec, Role::Estimator(of) if of.has_std_dev()),
                 ),
+                port(
+                    "novelty",
+                    "how far its regressors are outside of those of the fit, 1 at the edge",
+                    |spec| matches!(spec, Role::Estimator(of) if of.has_novelty()),
+                ),
             ];
             ports.into_iter().flatten().collect()
         }

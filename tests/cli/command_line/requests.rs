@@ -141,6 +141,7 @@ fn the_page_of_a_node_names_the_output_ports_that_it_has() {
     }
     // With stochastic gradients it goes on learning, and does not tell how sure it is.
     let ports = ports("linear");
+    assert!(ports.contains_key("novelty"));
     for port in ["learning", "std_dev"] {
         assert!(
             ports[port].ends_with(" (not with all parameters)"),

@@ -6,7 +6,7 @@ use super::instance::{Declared, Instance};
 use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
-use super::plan::{PlannedFit, PlannedRole, STD_DEV, TrainingLimits, TruthLink};
+use super::plan::{NOVELTY, PlannedFit, PlannedRole, STD_DEV, TrainingLimits, TruthLink};
 use super::problem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
@@ -133,6 +133,12 @@ impl Resolver<'_> {
         if estimator.has_std_dev() {
             ports.push(std_dev_of(&prediction));
         }
+        if estimator.has_novelty() {
+            ports.push(OutputPort {
+                name: NOVELTY,
+                channels: vec![about(&prediction, prediction.name.clone())],
+            });
+        }
         let behind = vec![behind; ports.len()];
         let role = PlannedRole::Estimator {
             fit: PlannedFit {
@@ -144,6 +150,7 @@ impl Resolver<'_> {
             every_tick: wanted.every_tick,
             learning,
             std_dev: None,
+            novelty: None,
         };
         self.add(instance, ports, role, behind, Some(truth))?;
         // Asked for later by whoever wants to know whether it needs a fit, and to fail here where it fails.

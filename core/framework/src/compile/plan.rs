@@ -197,6 +197,8 @@ pub enum PlannedRole {
         learning: Option<PlannedLearning>,
         /// The slot of its standard deviation, where somebody reads it.
         std_dev: Option<usize>,
+        /// The slot of the novelty of its regressors, where somebody reads it.
+        novelty: Option<usize>,
     },
     /// One prediction of several.
     Combiner {
@@ -333,6 +335,9 @@ impl PlannedNode {
 
 /// The port of the standard deviation of the truth about a prediction.
 pub(super) const STD_DEV: &str = "std_dev";
+
+/// The port of how far regressors are outside of those of the fit.
+pub(super) const NOVELTY: &str = "novelty";
 
 /// The port of the weights of votes.
 pub(super) const WEIGHTS: &str = "weights";

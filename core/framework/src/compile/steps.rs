@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::Wanted;
 use super::column_unit;
 use super::origins::Dependents;
-use super::plan::{Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHTS};
+use super::plan::{NOVELTY, Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHTS};
 use super::problem;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
@@ -98,6 +98,7 @@ fn mark_read(plan: &mut Plan, read: impl IntoIterator<Item = usize>, wanted: Wan
         };
         let weights = first(node.port(WEIGHTS), false);
         let std_dev = first(node.port(STD_DEV), wanted.intervals);
+        let novelty = first(node.port(NOVELTY), false);
         match &mut node.role {
             PlannedRole::Feature { wanted: ports, .. } => {
                 for (index, (name, slots)) in node.ports.iter().enumerate() {
@@ -106,8 +107,13 @@ fn mark_read(plan: &mut Plan, read: impl IntoIterator<Item = usize>, wanted: Wan
                 }
             }
             PlannedRole::Estimator {
-                std_dev: computed, ..
-            } => *computed = computed.or(std_dev),
+                std_dev: deviation,
+                novelty: outside,
+                ..
+            } => {
+                *deviation = deviation.or(std_dev);
+                *outside = outside.or(novelty);
+            }
             PlannedRole::Combiner {
                 std_devs, beside, ..
             } => {

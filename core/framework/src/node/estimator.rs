@@ -126,6 +126,11 @@ pub trait Estimator: Debug + Send + Sync {
         false
     }
 
+    /// Whether its fit says how far regressors are outside of its rows, in the port `novelty`: see [`Predictor::novelty`].
+    fn has_novelty(&self) -> bool {
+        false
+    }
+
     /// Whether a regressor that stays the same in all rows of a fit may say something, as it does in a model without a constant of
     /// its own. From any other it is left out, so that its predictions go on when the sensor behind it is dead.
     fn needs_constants(&self) -> bool {

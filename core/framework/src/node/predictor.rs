@@ -42,6 +42,12 @@ pub trait Predictor: InModel + Any + Debug + Send + Sync {
         f64::NAN
     }
 
+    /// How far these regressors are outside of the rows of the fit: 1 at their edge, more outside, NaN where it is not known. Only
+    /// asked of kinds that say [`Estimator::has_novelty`](super::Estimator::has_novelty).
+    fn novelty(&self, _regressors: &[f64]) -> f64 {
+        f64::NAN
+    }
+
     /// What it consists of, for people; none for one that says nothing of it.
     fn coefficients(&self) -> Option<Coefficients> {
         None

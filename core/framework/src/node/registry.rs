@@ -112,7 +112,7 @@ impl Kind {
     pub fn outputs(&self) -> Vec<&'static str> {
         match self.role {
             RoleName::Feature => (self.ports)().iter().map(|port| port.name).collect(),
-            RoleName::Estimator => vec!["prediction", "learning", "std_dev"],
+            RoleName::Estimator => vec!["prediction", "learning", "std_dev", "novelty"],
             RoleName::Combiner => vec![
                 "prediction",
                 "weights",

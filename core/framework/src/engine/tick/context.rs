@@ -115,6 +115,14 @@ impl TickContext<'_> {
             };
             self.slots.set(slot, known, stamp);
         }
+        if let Some(slot) = node.novelty {
+            let known = if value.is_nan() {
+                f64::NAN
+            } else {
+                estimate.novelty(row)
+            };
+            self.slots.set(slot, known, stamp);
+        }
     }
 
     #[inline]

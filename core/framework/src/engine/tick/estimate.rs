@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::gather::Gathered;
 use super::part::Part;
+use crate::channel::unless_infinite;
 use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
 use crate::engine::learning::Feedback;
 use crate::engine::learning::GatedLearner;
@@ -91,6 +92,7 @@ impl Estimate {
             gathers,
             learning,
             std_dev,
+            novelty,
             ..
         } = &node.role
         else {
@@ -119,7 +121,7 @@ impl Estimate {
         });
         Ok(Self {
             width: used.len(),
-            plain: std_dev.is_none(),
+            plain: std_dev.is_none() && novelty.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -259,6 +261,11 @@ impl Estimate {
             Some(learning) => learning.std_dev(row, now),
             None => self.predictor.std_dev(row),
         }
+    }
+
+    /// How far the row of this tick is outside of those of the fit; NaN where that is not known.
+    pub(crate) fn novelty(&self, row: &[f64]) -> f64 {
+        unless_infinite(self.predictor.novelty(row))
     }
 
     /// What goes on learning.

@@ -36,6 +36,8 @@ pub(crate) struct EstimateRunner {
     pub(crate) slot: usize,
     /// The slot of the standard deviation, where somebody reads it.
     pub(crate) std_dev: Option<usize>,
+    /// The slot of the novelty of its regressors, where somebody reads it.
+    pub(crate) novelty: Option<usize>,
 }
 
 impl NodeRunner {
@@ -139,6 +141,7 @@ fn runner(
                 gathers,
                 every_tick,
                 std_dev,
+                novelty,
                 ..
             },
             Role::Estimator(_),
@@ -158,6 +161,7 @@ fn runner(
                 trigger: gathers.first().copied().filter(|_| !every_tick),
                 slot: node.slots.start,
                 std_dev: *std_dev,
+                novelty: *novelty,
             })
         }
         (
