@@ -164,11 +164,11 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
     ];
     let build = "build --with path:. -o target/athermal";
     lines.push(command(&[&program(), build]));
-    let then = match role.is_live() {
+    let tries = match role.is_live() {
         true => "target/athermal serve",
         false => "target/athermal test",
     };
-    lines.push(command(&[then, &graph]));
+    lines.push(command(&[tries, &graph]));
     format!(
         "wrote {}, with {brings}; test it, {then}:\n{}",
         folder.display(),
