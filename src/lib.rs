@@ -24,6 +24,7 @@ pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 pub use athermal_run as run;
 pub use athermal_run::model::{Model, ModelError};
+pub use athermal_serve as serve;
 pub use athermal_trial as trial;
 
 #[cfg(feature = "analysis")]
@@ -60,6 +61,7 @@ extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
+use athermal_connectors as _;
 use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;

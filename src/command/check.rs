@@ -10,11 +10,11 @@ use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk, GraphFile};
 use athermal::core::engine::Fitted;
 use athermal::trial::{self, Trial};
+use athermal_serve::deployment::Deployment;
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
-use super::unread;
 use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
 use athermal_analysis::figures::counted;
 
@@ -87,6 +87,7 @@ pub(super) fn plan_and_tests(
 fn machine(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) -> Option<Model> {
     let (graph, plan) = graph_and_plan(path, sources, diagnostics)?;
     trial::declare(&graph, &plan, &Disk, sources, diagnostics);
+    Deployment::check(&graph, &plan, sources, diagnostics);
     let mut machine = Model {
         graph,
         plan: Arc::new(plan),
@@ -116,10 +117,7 @@ impl Check {
             let mut of_file = Diagnostics::new();
             let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
-            if let Some(machine) = machine {
-                unread::warn(terminal, path, &machine.graph);
-                fine.push((path, machine.plan));
-            }
+            fine.extend(machine.map(|machine| (path, machine.plan)));
         }
         if terminal.format == Format::Json {
             let mut facts = diagnostics.to_json(&sources);

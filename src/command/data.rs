@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use athermal::core::compile::Plan;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use athermal::run::model::DataCard;
+use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
@@ -22,7 +24,7 @@ use athermal_analysis::figures::{DATES_S, count, counted, instant};
 /// Recorded data.
 #[derive(Debug, Args)]
 pub struct Data {
-    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time
+    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
     #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     files: Vec<PathBuf>,
     /// Take cells and rows that cannot be read as missing, and count them
@@ -57,6 +59,12 @@ fn offset(text: &str) -> Result<(PathBuf, Duration), String> {
     };
     let length: Duration = length.parse().map_err(|error| format!("{error}"))?;
     Ok((file.into(), Duration::from_ns(sign * length.as_ns())))
+}
+
+/// The state folder of a service whose journal `journal:FOLDER` names.
+fn journal_of(path: &Path) -> Option<PathBuf> {
+    let folder = path.to_str()?.strip_prefix("journal:")?;
+    Some(PathBuf::from(folder))
 }
 
 /// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
@@ -152,6 +160,10 @@ impl Data {
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
+        if let Some(journal) = self.files.first().and_then(|path| journal_of(path)) {
+            let recording = Rc::new(JournalRecording::in_state(&journal));
+            return Dataset::of(self.files[0].clone(), recording);
+        }
         let offsets = self.reading.offsets.iter().flat_map(|(name, by)| {
             let files = self.named(name);
             files.map(|file| (file.clone(), by.as_ns()))
@@ -235,8 +247,20 @@ impl Data {
             let name = path.display().to_string();
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
-            DataCard::of(path, rows)
-                .map_err(|error| Failure::Outside(format!("cannot read {name}: {error}")))
+            let card = match journal_of(path) {
+                None => DataCard::of(path, rows),
+                Some(folder) => {
+                    JournalRecording::in_state(&folder)
+                        .content()
+                        .map(|(bytes, hash)| DataCard {
+                            path: name.clone(),
+                            rows,
+                            bytes,
+                            hash,
+                        })
+                }
+            };
+            card.map_err(|error| Failure::Outside(format!("cannot read {name}: {error}")))
         };
         self.files.iter().map(card).collect()
     }

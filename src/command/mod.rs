@@ -21,10 +21,12 @@ mod new;
 mod nodes;
 mod numbers;
 mod refused;
+mod replay;
 mod report;
 mod run;
 mod schema;
 mod scored;
+mod serve;
 mod show;
 mod simulate;
 mod test;
@@ -63,7 +65,7 @@ commands! {
     Demo(demo::Demo), Init(init::Init), Show(show::Show), Check(check::Check),
     Explain(explain::Explain), Diff(diff::Diff), Nodes(nodes::Nodes), Fit(fit::Fit),
     Evaluate(evaluate::Evaluate), Compare(compare::Compare), Diagnose(diagnose::Diagnose),
-    Report(report::Report), Run(run::Run), Simulate(simulate::Simulate),
+    Report(report::Report), Run(run::Run), Serve(serve::Serve), Replay(replay::Replay), Simulate(simulate::Simulate),
     Completions(completions::Completions), Test(test::Test), Schema(schema::Schema),
     New(new::New), Build(build::Build),
 }
@@ -72,6 +74,6 @@ impl Command {
     /// Whether reports beside the result are events for programs: the result is rows.
     #[must_use]
     pub fn writes_events(&self) -> bool {
-        matches!(self, Self::Run(_))
+        matches!(self, Self::Run(_) | Self::Serve(_))
     }
 }

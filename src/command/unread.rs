@@ -1,35 +1,22 @@
-//! A warning about sections of a machine file that no command reads yet.
+//! A warning about sections of a machine file that `athermal run` does not read.
 
 use std::path::Path;
 
 use athermal::core::document::GraphFile;
+use athermal_serve::deployment::SECTIONS;
 
 use crate::terminal::Terminal;
 
-/// The sections that `run` does not read: key, spelling, and what to do instead.
-const UNREAD: [(&str, &str, &str); 3] = [
-    ("source", "`[source]`", "give the input with `--input`"),
-    ("sinks", "`[sinks]`", "give the output with `--output`"),
-    (
-        "runtime",
-        "`[runtime]`",
-        "do without heartbeats, since every tick is a row",
-    ),
-];
-
 /// Warns of the sections of a machine file that are not read.
 pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
-    let written = |(key, ..): &&(&str, &str, &str)| graph.deployment.contains_key(*key);
-    let unread: Vec<_> = UNREAD.iter().filter(written).collect();
-    if unread.is_empty() {
-        return;
+    let written = |key: &&&str| graph.deployment.contains_key(**key);
+    let unread = SECTIONS.iter().filter(written);
+    let unread: Vec<_> = unread.map(|section| format!("`[{section}]`")).collect();
+    if !unread.is_empty() {
+        terminal.warning(format_args!(
+            "{0}: `athermal run` goes by its options alone and does not read {1}; `athermal serve {0}` does",
+            path.display(),
+            unread.join(", "),
+        ));
     }
-    let sections: Vec<_> = unread.iter().map(|(_, section, _)| *section).collect();
-    let instead: Vec<_> = unread.iter().map(|(.., instead)| *instead).collect();
-    terminal.warning(format_args!(
-        "{}: `athermal run` does not yet read {}: {}",
-        path.display(),
-        sections.join(", "),
-        instead.join("; ")
-    ));
 }

@@ -1,7 +1,9 @@
 //! Decides which column of a log gives the time, or which two, and in which form.
 
 use athermal::core::time::{Duration, TimeColumns, TimeFormat};
-use athermal::files::{Description, NumberForm, TimeForm, is_time_of_day, zone_in_name, zone_of};
+use athermal::files::{
+    Description, NumberForm, TimeColumn, TimeForm, is_time_of_day, zone_in_name, zone_of,
+};
 
 use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
@@ -47,6 +49,16 @@ impl Clock {
     #[must_use]
     pub fn counts_samples(&self) -> bool {
         matches!(self.form, TimeForm::Samples { .. })
+    }
+
+    /// How a reader reads it.
+    #[must_use]
+    pub fn column(&self) -> TimeColumn {
+        TimeColumn {
+            columns: self.columns.clone(),
+            form: self.form.clone(),
+            zone: self.zone.as_ref().and_then(|zone| zone.parse().ok()),
+        }
     }
 
     /// A length of time as this log's graph should write it.

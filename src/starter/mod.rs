@@ -121,31 +121,39 @@ impl Log {
             clock,
         })
     }
+
+    /// Whether its time is read by a graph that declares this one.
+    fn is_found_by(&self, clock: &Clock) -> bool {
+        let own = &self.clock;
+        let is_form = match (&own.other, &clock.form) {
+            (Some(other), TimeForm::Format(form)) if other == form => true,
+            _ => own.form == clock.form,
+        };
+        let found = || athermal::files::other_time(Path::new(&self.name), &clock.column());
+        own.zone == clock.zone && own.columns == clock.columns && is_form
+            || own.zone.is_none()
+                && found().is_some_and(|of| of.columns == own.columns && of.form == own.form)
+    }
 }
 
-/// The one clock of all files: that of which rows have decided the form, where some have.
+/// The clock of the graph: one of which rows have decided the form, where some have, and by which the others are found.
 fn one_clock(logs: &[Log]) -> Result<Clock, NoStarter> {
-    let decided = logs.iter().position(|log| log.clock.other.is_none());
-    let log = &logs[decided.unwrap_or(0)];
-    let clock = &log.clock;
-    let is_other = |of: &&Log| {
-        let is_form = of.clock.form == clock.form
-            || matches!((&of.clock.other, &clock.form), (Some(other), TimeForm::Format(form)) if other == form);
-        of.clock.columns != clock.columns || of.clock.zone != clock.zone || !is_form
-    };
-    match logs.iter().find(is_other) {
-        Some(other) => Err(NoStarter::Unfit(format!(
-            "a graph has one column of time in one form, and these differ: {} has {}; {} has {}; name and write both alike",
-            log.name,
-            clock.remark(),
-            other.name,
-            other.clock.remark()
-        ))),
-        None => Ok(Clock {
+    let misfit = |by: &&Log| logs.iter().find(|of| !of.is_found_by(&by.clock));
+    let mut decided: Vec<&Log> = logs.iter().collect();
+    decided.sort_by_key(|log| log.clock.other.is_some());
+    if let Some(log) = decided.iter().find(|log| misfit(log).is_none()) {
+        return Ok(Clock {
             lacks_zone: logs.iter().any(|log| log.clock.lacks_zone),
-            ..clock.clone()
-        }),
+            ..log.clock.clone()
+        });
     }
+    let two = decided.iter().take(1).copied().chain(misfit(&decided[0]));
+    let two = two.map(|log| format!("{} has {}", log.name, log.clock.remark()));
+    Err(NoStarter::Unfit(format!(
+        "a graph has one time, and in other files one column of dates that rise is found as it writes them, as RFC 3339 does, or in \
+         numbers since 1970: {}; write them alike",
+        two.collect::<Vec<_>>().join("; ")
+    )))
 }
 
 /// The layout of each file.
@@ -180,14 +188,19 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     let logs = logs.map(|path| Log::of(path, request, &mut remarks));
     let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
     let clock = one_clock(&logs)?;
-    let times = clock.columns.names();
     remarks.insert(0, clock.remark());
+    let is_other =
+        |of: &Clock| of.columns != clock.columns || of.form != clock.form && of.other.is_none();
+    for log in logs.iter().filter(|log| is_other(&log.clock)) {
+        remarks.push(format!("{}: its {}", log.name, log.clock.remark()));
+    }
+    let times = logs.iter().flat_map(|log| log.clock.columns.names());
+    let times: Vec<String> = times.cloned().collect();
     let columns_of = |log: &Log| (log.name.clone(), log.described.columns.clone());
-    let apart = apart(&logs.iter().map(columns_of).collect::<Vec<_>>(), times);
+    let apart = apart(&logs.iter().map(columns_of).collect::<Vec<_>>(), &times);
     let mut known: BTreeSet<String> = apart.keys().cloned().collect();
-    let columns = logs
-        .iter()
-        .flat_map(|log| column::columns(&log.described, times));
+    let columns = |log: &Log| column::columns(&log.described, log.clock.columns.names());
+    let columns = logs.iter().flat_map(columns);
     let is_new = |of: &Column| of.name.is_empty() || known.insert(of.name.clone());
     let mut columns: Vec<Column> = columns.filter(is_new).collect();
     let mut tables = tables(&logs);
@@ -197,7 +210,7 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
         let is_long = log.described.table.layout == Arrangement::Long;
         let is_table = log.described.format == Format::Csv && !is_long;
         if is_table && again.is_none() && !survey.dropped.is_empty() {
-            again = log.described.next_names(path, times)?;
+            again = log.described.next_names(path, log.clock.columns.names())?;
         }
     }
     let names = columns

@@ -2,7 +2,7 @@
 
 use athermal::core::document::TableBase;
 use athermal::files::{
-    CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, TimeColumn, has_clock,
+    CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -228,11 +228,7 @@ impl Survey {
             optional: true,
         };
         let mut recording = data.skim(Layout {
-            time: TimeColumn {
-                columns: clock.columns.clone(),
-                form: clock.form.clone(),
-                zone: clock.zone.as_ref().and_then(|zone| zone.parse().ok()),
-            },
+            time: clock.column(),
             channels: columns.iter().map(channel).collect(),
             table: table.clone(),
         })?;

@@ -8,10 +8,11 @@ use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Severity, Sources, codes, explain};
 use athermal::core::document::{Memory, declare, load};
 use athermal::trial;
+use athermal_serve::deployment::{Deployment, SECTIONS};
 
-/// Two crates with a node type of the same name, a type whose code is at fault, and what is wrong with a model beside the file: no
-/// graph alone shows these.
-const WITHOUT_FILE: [&str; 5] = ["A041", "A180", "A190", "A191", "A192"];
+/// Two crates with a node type of the same name, a type whose code is at fault, what is wrong with a model beside the file, and a kind of
+/// source that needs addresses, which no built-in one does: no graph alone shows these.
+const WITHOUT_FILE: [&str; 6] = ["A041", "A180", "A190", "A191", "A192", "A204"];
 
 fn check(text: &str) -> (Diagnostics, Sources) {
     let base = explain("A062").unwrap().right;
@@ -33,6 +34,12 @@ fn check(text: &str) -> (Diagnostics, Sources) {
     assert_eq!(plan.is_none(), diagnostics.has_errors());
     if let (Some(graph), Some(plan)) = (graph, plan) {
         trial::declare(&graph, &plan, &files, &mut sources, &mut diagnostics);
+        if SECTIONS
+            .iter()
+            .any(|section| graph.deployment.contains_key(*section))
+        {
+            Deployment::read(&graph, &plan, &sources, &mut diagnostics);
+        }
     }
     (diagnostics, sources)
 }

@@ -38,6 +38,7 @@ mod report;
 mod report_graphs;
 mod restarted_pipes;
 mod schema;
+mod services;
 mod several_loggers;
 mod shipped_graphs;
 mod starter_graphs;

@@ -320,18 +320,54 @@ fn parts_of_one_log_are_joined_and_a_column_of_two_logs_is_left_out() {
 }
 
 #[test]
-fn logs_whose_times_are_written_otherwise_are_refused_with_both() {
+fn a_log_whose_time_has_another_name_and_form_is_merged_by_its_dates() {
     let scratch = Scratch::new("init-times");
     let [temperatures, positions] = rows(dated);
     let names = "time,plate_degC,bed_degC";
     let one = scratch.file("one.csv", log(names, &temperatures, ""));
-    let other = scratch.file("other.csv", log("Timestamp,Z_um", &positions, ""));
+    let other = scratch.file("other.csv", log("time,Z_um", &positions, ""));
+    let (_, alike) = started(&scratch, &[], &[&one, &other]);
+    let german = |second: u32| {
+        let (hour, minute) = (second / 3600, second / 60 % 60);
+        format!("02.03.2026 {hour:02}:{minute:02}:{:02}", second % 60)
+    };
+    let second = |second: u32| (1_772_409_600 + second).to_string();
+    let otherwise: [(&str, &dyn Fn(u32) -> String); 4] = [
+        ("Timestamp", &dated),
+        ("Zeit", &german),
+        ("time", &german),
+        ("time_s", &second),
+    ];
+    for (name, write) in otherwise {
+        let [_, positions] = rows(write);
+        let other = log(&format!("{name},Z_um"), &positions, "");
+        let other = scratch.file("other.csv", other);
+        let (told, graph) = started(&scratch, &[], &[&one, &other]);
+        assert!(told.contains("its time: "), "{told}");
+        let of = |graph: &str| graph.split_once("[signals").unwrap().1.to_owned();
+        assert_eq!(of(&graph), of(&alike), "{name}");
+    }
+    let [_, from_zero] = rows(|second| second.to_string());
+    let other = scratch.file("other.csv", log("time_s,Z_um", &from_zero, ""));
     athermal(&[&"init", &one, &other, &"-o", &scratch.path("none.toml")])
         .ended(2)
+        .tells(&["other.csv counts its times and", "one.csv has dates; add"]);
+    let offset = ["--offset", "other.csv=1772409600s"];
+    let (_, graph) = started(&scratch, &offset, &[&one, &other]);
+    assert!(graph.contains(": 1,080 rows over 12 h"), "{graph}");
+    let [_, american] = rows(|second| format!("03/02/2026 {}", &dated(second)[11..19]));
+    let american = scratch.file("us.csv", log("Time,Z_um", &american, ""));
+    let [temperatures, _] = rows(german);
+    let one = scratch.file(
+        "one.csv",
+        log("Zeit,plate_degC,bed_degC", &temperatures, ""),
+    );
+    athermal(&[&"init", &one, &american, &"-o", &scratch.path("none.toml")])
+        .ended(2)
         .tells(&[
-            "one.csv has time: `time`, dates and times as in RFC 3339",
-            "other.csv has time: `Timestamp`",
-            "name and write both alike",
+            "one.csv has time: `Zeit`",
+            "us.csv has time: `Time`",
+            "write them alike",
         ]);
 }
 

@@ -15,8 +15,20 @@ const ENDS: Wait = Wait::from_secs(1);
 /// The state folder of a service. It is locked for as long as this lives; the lock goes with the process, however it ends.
 #[derive(Debug)]
 pub struct StateFolder {
-    path: PathBuf,
+    paths: StatePaths,
     _lock: File,
+}
+
+/// What is where in a state folder. Whoever only reads needs no lock.
+#[derive(Debug, Clone)]
+pub struct StatePaths(PathBuf);
+
+impl std::ops::Deref for StateFolder {
+    type Target = StatePaths;
+
+    fn deref(&self) -> &StatePaths {
+        &self.paths
+    }
 }
 
 impl StateFolder {
@@ -58,7 +70,7 @@ impl StateFolder {
             .and_then(|()| writeln!(file, "{id}"));
         noted.map_err(not_written(&lock))?;
         let folder = Self {
-            path: path.to_owned(),
+            paths: StatePaths::new(path),
             _lock: file,
         };
         for part in [folder.journal(), folder.checkpoints(), folder.models()] {
@@ -66,29 +78,37 @@ impl StateFolder {
         }
         Ok(folder)
     }
+}
+
+impl StatePaths {
+    /// Those of a folder.
+    #[must_use]
+    pub fn new(folder: &Path) -> Self {
+        Self(folder.to_owned())
+    }
 
     /// The folder.
     #[must_use]
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.0
     }
 
     /// Where the journal is.
     #[must_use]
     pub fn journal(&self) -> PathBuf {
-        self.path.join("journal")
+        self.0.join("journal")
     }
 
     /// Where checkpoints are.
     #[must_use]
     pub fn checkpoints(&self) -> PathBuf {
-        self.path.join("checkpoints")
+        self.0.join("checkpoints")
     }
 
     /// Where models are.
     #[must_use]
     pub fn models(&self) -> PathBuf {
-        self.path.join("models")
+        self.0.join("models")
     }
 
     /// Keeps a model by its revision, so that a checkpoint of it is of use.

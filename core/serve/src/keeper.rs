@@ -72,6 +72,12 @@ impl Keeper {
         Ok(self.control)
     }
 
+    /// After how many ticks, beats, breaks and freezes the oldest checkpoint was taken; none where there is none.
+    #[must_use]
+    pub fn oldest(&self) -> Option<u64> {
+        self.checkpoints.oldest().ok().flatten()
+    }
+
     /// The control of the graph.
     pub fn control(&mut self) -> &mut Control {
         &mut self.control
@@ -82,6 +88,8 @@ impl Keeper {
         let happenings = self.before + self.control.events();
         if let Some(replica) = self.control.replica()
             && happenings > self.last
+            // What a node that was given up had learned is not whole: the journal goes on from before.
+            && replica.panics().is_empty()
         {
             self.waiting = Some(Checkpoint::of(replica, happenings));
         }

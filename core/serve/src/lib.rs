@@ -12,6 +12,8 @@
 //!
 //! | layer | decides |
 //! |---|---|
+//! | [`connector`] | what a source and a sink implement, and how their kinds become known |
+//! | [`deployment`] | what a machine file says of them, and of time |
 //! | [`moment`] | time that the host's clock does not touch |
 //! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
 //! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
@@ -19,8 +21,11 @@
 //! | [`worker`] | the engine thread: samples in, ticks through the engine, decisions into the journal |
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
+//! | [`service`] | all of it at work, with its threads |
 
 pub mod checkpoint;
+pub mod connector;
+pub mod deployment;
 pub mod folder;
 pub mod journal;
 pub mod keeper;
@@ -28,10 +33,19 @@ pub mod moment;
 pub mod recovery;
 pub mod replay;
 pub mod sequencer;
+pub mod service;
+#[cfg(any(test, feature = "testkit"))]
+pub mod testkit;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, engine, time};
+use athermal_core::{channel, compile, diagnostic, document, engine, node, quantity, time, unit};
 
 #[cfg(test)]
 mod tests;
+
+/// What macros of this crate make use of.
+#[doc(hidden)]
+pub mod __private {
+    pub use {inventory, schemars, serde_json};
+}

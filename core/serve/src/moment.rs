@@ -1,6 +1,7 @@
 //! Monotonic time: what decides when something is done, and never what is computed.
 
 use std::ops::{Add, Sub};
+use std::time::Instant as Clock;
 
 use crate::time::Duration;
 
@@ -22,6 +23,24 @@ impl Moment {
     #[must_use]
     pub const fn as_ns(self) -> i64 {
         self.0
+    }
+}
+
+/// The monotonic clock of the program.
+#[derive(Debug, Clone, Copy)]
+pub struct MonotonicClock(Clock);
+
+impl MonotonicClock {
+    /// One that starts now.
+    #[must_use]
+    pub fn start() -> Self {
+        Self(Clock::now())
+    }
+
+    /// The moment now.
+    #[must_use]
+    pub fn now(&self) -> Moment {
+        Moment(i64::try_from(self.0.elapsed().as_nanos()).unwrap_or(i64::MAX))
     }
 }
 

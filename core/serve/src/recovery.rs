@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::{fmt, io};
 
+use athermal_run::live::Feed;
 use athermal_run::model::Model;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
+use crate::compile::Plan;
 use crate::engine::{Engine, EngineError, NodeCarry, StateTransfer};
-use crate::folder::StateFolder;
+use crate::folder::{StateFolder, StatePaths};
 use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
 use crate::replay::{Difference, Replay};
 use crate::sequencer::Timeline;
@@ -126,7 +128,8 @@ impl From<CheckpointError> for RecoveryError {
 }
 
 impl Recovered {
-    /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on.
+    /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on, by the plan that
+    /// runs.
     ///
     /// A checkpoint that cannot be used is passed over for an older one. The journal's damaged end is cut off. `look` sees each
     /// step that is made again, with how many ticks, beats, breaks and freezes there are then. `least` is up to where all sinks have
@@ -138,7 +141,35 @@ impl Recovered {
         folder: &StateFolder,
         checkpoints: &Checkpoints,
         model: &Model,
-        feed: &FeedNames,
+        feed: impl Fn(&Plan) -> FeedNames,
+        least: u64,
+        look: impl FnMut(u64, &Engine),
+    ) -> Result<Self, RecoveryError> {
+        Self::search((folder, true), checkpoints, Some(model), feed, least, look)
+    }
+
+    /// Steps all that a state folder has again, from as early on as it allows, and changes nothing in it. None where it has no journal.
+    /// `look` is as for [`find`](Self::find).
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    pub fn replay(
+        folder: &StatePaths,
+        look: impl FnMut(u64, &Engine),
+    ) -> Result<Option<Self>, RecoveryError> {
+        if Log::open(&folder.journal())?.is_empty() {
+            return Ok(None);
+        }
+        let checkpoints = Checkpoints::new(folder.checkpoints(), 1);
+        let feed = |plan: &Plan| FeedNames::new(&Feed::of(plan), Vec::new());
+        Self::search((folder, false), &checkpoints, None, feed, 0, look).map(Some)
+    }
+
+    fn search(
+        (folder, seals): (&StatePaths, bool),
+        checkpoints: &Checkpoints,
+        model: Option<&Model>,
+        feed: impl Fn(&Plan) -> FeedNames,
         least: u64,
         mut look: impl FnMut(u64, &Engine),
     ) -> Result<Self, RecoveryError> {
@@ -157,22 +188,32 @@ impl Recovered {
                     found = Some(of);
                     break;
                 }
-                Ok(of) if found.is_none() && !is_whole => found = Some(of),
+                Ok(of) if !is_whole => found = Some(of),
                 Ok(_) => {}
                 Err(error) => report.refused.push(error),
             }
         }
         if let Some((engine, model, happenings)) = found {
             report.start = Start::Checkpoint(happenings);
-            return Self::follow(folder, (engine, model), happenings, report, feed, &mut look);
+            return Self::follow(
+                (folder, seals),
+                (engine, model),
+                happenings,
+                report,
+                &feed,
+                &mut look,
+            );
         }
         let revision = first.as_ref().map(|begin| begin.revision.as_str());
-        let model = match revision {
-            Some(revision) if model.revision().as_deref() != Some(revision) => {
+        let given =
+            model.filter(|of| revision.is_none_or(|it| of.revision().as_deref() == Some(it)));
+        let model = match (given, revision) {
+            (Some(model), _) => model.clone(),
+            (None, revision) => {
+                let revision = revision.unwrap_or_default();
                 let of = folder.model(revision);
                 of.map_err(|error| no_model(revision, error))?
             }
-            _ => model.clone(),
         };
         report.start = match &first {
             None => Start::Nothing,
@@ -180,13 +221,14 @@ impl Recovered {
             Some(_) => Start::Cold,
         };
         let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
-        let engine = engine.map_err(RecoveryError::Unfit)?;
+        let mut engine = engine.map_err(RecoveryError::Unfit)?;
+        engine.isolate_panics();
         Self::follow(
-            folder,
+            (folder, seals),
             (engine, model),
             goes_back_to,
             report,
-            feed,
+            &feed,
             &mut look,
         )
     }
@@ -209,11 +251,11 @@ impl Recovered {
 
     /// Steps what the journal has behind so many ticks, beats, breaks and freezes.
     fn follow(
-        folder: &StateFolder,
+        (folder, seals): (&StatePaths, bool),
         (engine, mut model): (Engine, Model),
         from: u64,
         mut report: RecoveryReport,
-        feed: &FeedNames,
+        feed: impl Fn(&Plan) -> FeedNames,
         look: &mut impl FnMut(u64, &Engine),
     ) -> Result<Self, RecoveryError> {
         let mut log = Log::open_at(&folder.journal(), from)?;
@@ -247,12 +289,16 @@ impl Recovered {
                 _ => replay.pass_by(&record),
             }
         }
-        log.seal()?;
+        if seals {
+            log.seal()?;
+        }
         report.ahead = from.saturating_sub(seen);
         report.torn = log.torn().cloned();
         report.stepped = replay.stepped();
         report.difference = replay.difference();
-        let mut timeline = replay.feed().map(replay.timeline(), feed);
+        let engine = replay.engine();
+        let feed = feed(engine.plan());
+        let mut timeline = replay.feed().map(replay.timeline(), &feed);
         let engine = replay.into_engine();
         if report.ahead > 0 {
             timeline.not_before(engine.last().unwrap_or(Instant::MIN));
@@ -261,7 +307,7 @@ impl Recovered {
             engine,
             model,
             timeline,
-            feed: feed.clone(),
+            feed,
             event: log.event() + report.ahead,
             happenings: seen.max(from),
             report,
@@ -271,8 +317,8 @@ impl Recovered {
 
 /// An engine that goes on from a checkpoint, the model of it, and how far it is.
 fn usable(
-    folder: &StateFolder,
-    given: &Model,
+    folder: &StatePaths,
+    given: Option<&Model>,
     checkpoint: Checkpoint,
     goes_back_to: u64,
 ) -> Result<(Engine, Model, u64), CheckpointError> {
@@ -288,14 +334,17 @@ fn usable(
     if happenings < goes_back_to {
         return Err(refused("the journal no longer goes back to it".to_owned()));
     }
-    let model = if given.revision().as_deref() == Some(&revision) {
-        given.clone()
-    } else {
-        let model = folder.model(&revision);
-        model.map_err(|error| refused(error.to_string()))?
+    let given = given.filter(|of| of.revision().as_deref() == Some(&revision));
+    let model = match given {
+        Some(given) => given.clone(),
+        None => {
+            let model = folder.model(&revision);
+            model.map_err(|error| refused(error.to_string()))?
+        }
     };
     let engine = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut engine = engine.map_err(|error| refused(error.to_string()))?;
+    engine.isolate_panics();
     let restored = engine.restore(&snapshot);
     restored.map_err(|error| refused(error.to_string()))?;
     Ok((engine, model, happenings))
@@ -312,6 +361,7 @@ fn no_model(revision: &str, error: impl fmt::Display) -> RecoveryError {
 fn swap(replay: &mut Replay, model: &Model) -> Result<Vec<NodeCarry>, RecoveryError> {
     let next = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut next = next.map_err(RecoveryError::Unfit)?;
+    next.isolate_panics();
     let before = replay.engine();
     let transfer = StateTransfer::between(before, &next, false);
     let carry = next.adopt(&before.state(), &transfer, false);

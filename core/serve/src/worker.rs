@@ -28,6 +28,8 @@ pub struct Output<'a> {
     pub behind: Duration,
     /// It may leave once so many records are written; see [`Progress::wait_written`](crate::journal::Progress::wait_written).
     pub records: u64,
+    /// How many ticks, beats, breaks and freezes there are then.
+    pub happenings: u64,
     /// The outputs, and the graph that made them.
     pub stepped: Stepped<'a>,
 }
@@ -184,6 +186,7 @@ impl Worker {
             is_beat,
             behind: newest.map_or(Duration::ZERO, |newest| newest - at),
             records,
+            happenings: self.recorder.happenings(),
             stepped,
         });
         Ok(Some(()))

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
@@ -64,10 +65,11 @@ pub fn layout(plan: &Plan) -> Layout {
     }
 }
 
-/// One or more files as a data set.
-#[derive(Debug)]
+/// One or more files as a data set, or a recording of another kind.
 pub struct Dataset {
     paths: Vec<PathBuf>,
+    /// What is read instead of the paths, which then name it.
+    other: Option<Rc<dyn recording::Recording>>,
     options: Options,
     reports: RefCell<Vec<(String, Report)>>,
 }
@@ -78,8 +80,18 @@ impl Dataset {
     pub fn new(paths: Vec<PathBuf>, options: Options) -> Self {
         Self {
             paths,
+            other: None,
             options,
             reports: RefCell::new(Vec::new()),
+        }
+    }
+
+    /// A recording that is no file, by the name that it is given by.
+    #[must_use]
+    pub fn of(name: PathBuf, recording: Rc<dyn recording::Recording>) -> Self {
+        Self {
+            other: Some(recording),
+            ..Self::new(vec![name], Options::default())
         }
     }
 
@@ -106,6 +118,9 @@ impl Dataset {
     /// # Errors
     /// As for reading them.
     pub fn loggers(&self, plan: &Plan) -> Result<Vec<Vec<PathBuf>>, FileError> {
+        if self.other.is_some() {
+            return Ok(Vec::new());
+        }
         let mut logs = merge::logs_of(&self.paths, &layout(plan), &self.options)?;
         let place = |files: &Vec<PathBuf>| self.paths.iter().position(|path| files.contains(path));
         logs.sort_by_key(place);
@@ -139,11 +154,41 @@ impl Dataset {
 
 impl recording::Recording for Dataset {
     fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
+        if let Some(other) = &self.other {
+            return Ok(Box::new(Other {
+                source: other.open(plan)?,
+                name: self.paths[0].display().to_string(),
+                report: Report::default(),
+                reports: &self.reports,
+            }));
+        }
         let recording = Joint::open(&self.paths, layout(plan), self.options.clone())?;
         Ok(Box::new(Reading {
             recording,
             reports: &self.reports,
         }))
+    }
+}
+
+/// A recording that is no file.
+struct Other<'a> {
+    source: Box<dyn Source + 'a>,
+    name: String,
+    report: Report,
+    reports: &'a RefCell<Vec<(String, Report)>>,
+}
+
+impl Source for Other<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
+        let next = self.source.next(samples)?;
+        match next {
+            Some(recording::Event::Row(_)) => self.report.rows += 1,
+            Some(recording::Event::Segment) => {}
+            None => {
+                *self.reports.borrow_mut() = vec![(self.name.clone(), self.report.clone())];
+            }
+        }
+        Ok(next)
     }
 }
 

@@ -31,6 +31,62 @@ impl TimeColumn {
     }
 }
 
+impl TimeColumn {
+    /// An instant in this form, so that it reads back; empty where that is a decimal number of seconds, as [`Writer`](crate::Writer)
+    /// writes by itself. A date without an offset is one by the clock of the zone.
+    #[must_use]
+    pub fn write(&self, at: Instant) -> String {
+        match &self.form {
+            form if *form == TimeForm::SECONDS => String::new(),
+            TimeForm::Numbers { ns_per_unit } => number(i128::from(at.as_ns()), *ns_per_unit),
+            TimeForm::Samples { step_ns } => number(i128::from(at.as_ns()), *step_ns),
+            TimeForm::Since {
+                ns_per_unit,
+                origin_ns,
+            } => number(i128::from(at.as_ns()) + origin_ns, *ns_per_unit),
+            TimeForm::Elapsed => {
+                let seconds = at.as_ns().unsigned_abs();
+                let (minutes, ns) = (seconds / 60_000_000_000, seconds % 60_000_000_000);
+                let sign = if at.as_ns() < 0 { "-" } else { "" };
+                let (hours, minutes) = (minutes / 60, minutes % 60);
+                let (seconds, ns) = (ns / 1_000_000_000, ns % 1_000_000_000);
+                let text = format!("{sign}{hours}:{minutes:02}:{seconds:02}.{ns:09}");
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            }
+            TimeForm::Rfc3339 => rfc3339(at),
+            TimeForm::Format(format) => {
+                let written = format.write(at, self.zone.as_ref());
+                written.unwrap_or_else(|| rfc3339(at))
+            }
+        }
+    }
+}
+
+fn rfc3339(at: Instant) -> String {
+    let at = Timestamp::from_nanosecond(i128::from(at.as_ns()));
+    at.map_or_else(|_| String::new(), |at| at.to_string())
+}
+
+/// A quotient in decimals, exact up to 18 of them.
+fn number(ns: i128, unit: i64) -> String {
+    let unit = i128::from(unit.max(1));
+    let sign = if ns < 0 { "-" } else { "" };
+    let (whole, mut rest) = (ns.abs() / unit, ns.abs() % unit);
+    let mut text = format!("{sign}{whole}");
+    if rest > 0 {
+        text.push('.');
+        for _ in 0..18 {
+            rest *= 10;
+            text.push_str(&(rest / unit).to_string());
+            rest %= unit;
+            if rest == 0 {
+                break;
+            }
+        }
+    }
+    text
+}
+
 impl TimeForm {
     /// The instant in ns that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits. A date and
     /// time that has no offset is one of UTC.

@@ -52,7 +52,9 @@ mod writer;
 pub use begun::begun_columns;
 pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
-pub use detect::{Description, Format, LongFormat, NumberForm, apart, zone_in_name, zone_of};
+pub use detect::{
+    Description, Format, LongFormat, NumberForm, apart, other_time, zone_in_name, zone_of,
+};
 pub use error::{Again, CellFault, FileError, MissingColumn, Place};
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};

@@ -9,7 +9,8 @@ use crate::error::quoted;
 use crate::joined;
 use crate::recording::is_dated;
 use crate::{
-    ChannelColumn, Event, FileError, Layout, MissingColumn, Options, Reader, Recording, Report, Row,
+    ChannelColumn, Event, FileError, Layout, MissingColumn, Options, Reader, Recording, Report,
+    Row, other_time,
 };
 
 /// Why files are not one recording.
@@ -31,8 +32,10 @@ pub enum MergeError {
     },
     /// Files have different columns, and times that are no dates.
     Undated {
-        /// A file of each log.
+        /// A file of each log; the first has no dates.
         files: [String; 2],
+        /// Whether the second has.
+        is_dated: bool,
     },
     /// `--merge` was given for files of the same columns.
     SameColumns {
@@ -91,6 +94,15 @@ impl fmt::Display for MergeError {
             ),
             Self::Undated {
                 files: [one, other],
+                is_dated: true,
+            } => write!(
+                f,
+                "{one} counts its times and {other} has dates; add the instant at which the one began, in seconds since 1970: \
+                 `--offset {one}=1772409600s`"
+            ),
+            Self::Undated {
+                files: [one, other],
+                is_dated: false,
             } => write!(
                 f,
                 "{one} and {other} have different columns, and their times are no dates; give `--merge` if both count from the same instant"
@@ -151,6 +163,7 @@ impl Joint {
     /// # Errors
     /// As for [`Recording::join`], and where logs of different columns are not one recording.
     pub fn open(paths: &[PathBuf], layout: Layout, options: Options) -> Result<Self, FileError> {
+        let options = with_times(paths, &layout, options);
         let logs = match paths {
             [_] | [] => Vec::new(),
             _ if paths.iter().any(|path| path == Path::new("-")) => {
@@ -183,6 +196,14 @@ impl Joint {
             Self::Several(merge) => merge.reports(),
         }
     }
+}
+
+/// The same with the times of those files that have another than the layout says.
+fn with_times(paths: &[PathBuf], layout: &Layout, mut options: Options) -> Options {
+    let of_several = paths.iter().filter(|_| paths.len() > 1);
+    let times = of_several.filter_map(|path| Some((path.clone(), other_time(path, &layout.time)?)));
+    options.times = times.collect();
+    options
 }
 
 /// What a file has of what is wanted.
@@ -299,7 +320,7 @@ pub(crate) fn logs_of(
 ) -> Result<Vec<Vec<PathBuf>>, FileError> {
     let logs = match paths {
         [] | [_] => Vec::new(),
-        _ => logs(paths, layout, options)?,
+        _ => logs(paths, layout, &with_times(paths, layout, options.clone()))?,
     };
     let several = (logs.len() > 1).then_some(logs);
     let files = several.into_iter().flatten().map(|log| log.paths);
@@ -383,11 +404,20 @@ impl Merge {
             log.fill()?;
             open.push(log);
         }
-        let mut rows = open.iter().filter_map(|log| log.row.as_ref());
-        let dated = rows.all(|row| is_dated(layout, row.time_ns));
+        let is_dated = |log: &OpenLog| {
+            let row = log.row.as_ref();
+            row.is_none_or(|row| is_dated(log.recording.form(), row.time_ns))
+        };
+        let (dates, counts): (Vec<_>, Vec<_>) = open.iter().partition(|log| is_dated(log));
+        let dated = counts.is_empty();
         if !dated && !options.merge {
-            let files = [open[0].name.clone(), open[1].name.clone()];
-            return Err(MergeError::Undated { files }.into());
+            let is_dated = !dates.is_empty();
+            let files = [
+                counts[0],
+                dates.first().unwrap_or(&counts[counts.len() - 1]),
+            ]
+            .map(|log| log.name.clone());
+            return Err(MergeError::Undated { files, is_dated }.into());
         }
         Ok(Self {
             logs: open,

@@ -38,6 +38,8 @@ pub struct Options {
     pub merge: bool,
     /// What is added to the times of files, in ns.
     pub offsets: Vec<(PathBuf, i64)>,
+    /// The time of files that have another than the layout says.
+    pub times: Vec<(PathBuf, TimeColumn)>,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.
@@ -141,11 +143,14 @@ impl Reader {
     /// As for [`Reader::open`].
     pub fn open_through(
         path: impl AsRef<Path>,
-        layout: Layout,
+        mut layout: Layout,
         options: Options,
         through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
+        if let Some((_, time)) = options.times.iter().find(|(file, _)| file == path) {
+            layout.time = time.clone();
+        }
         let format = options.format.or_else(|| Format::of_file(path));
         let options = Options { format, ..options };
         let table = layout.table_of(path).clone();

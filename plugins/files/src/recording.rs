@@ -119,6 +119,12 @@ impl Recording {
         }
     }
 
+    /// How the times of the file that is read are written.
+    pub(crate) fn form(&self) -> &TimeForm {
+        let current = self.current.as_ref();
+        current.map_or(&self.layout.time.form, |(_, of)| &of.layout().time.form)
+    }
+
     /// The files read to their end so far, in the order of reading, and what was met in each.
     pub fn reports(&self) -> &[(String, Report)] {
         &self.reports
@@ -129,7 +135,7 @@ impl Recording {
         self.last_ns = Some(now);
         let first = self.period.as_ref().map_or(now, |period| *period.start());
         self.period = Some(first..=now);
-        if is_dated(&self.layout, now) {
+        if is_dated(self.form(), now) {
             for (rows, (_, period)) in self.within.iter_mut().zip(&self.periods) {
                 *rows += u64::from(period.contains(&now));
             }
@@ -164,8 +170,8 @@ pub(crate) fn offset_of(path: &Path, options: &Options) -> i64 {
 }
 
 /// Whether an instant is the same in all files, and not counted from the beginning of its own.
-pub(crate) fn is_dated(layout: &Layout, time_ns: i64) -> bool {
-    match layout.time.form {
+pub(crate) fn is_dated(form: &TimeForm, time_ns: i64) -> bool {
+    match form {
         TimeForm::Rfc3339 | TimeForm::Format(_) => true,
         TimeForm::Numbers { .. } | TimeForm::Since { .. } => time_ns >= DATED_NS,
         TimeForm::Samples { .. } | TimeForm::Elapsed => false,
@@ -180,11 +186,13 @@ fn in_order(
 ) -> Result<Vec<PathBuf>, FileError> {
     let mut row = Row::default();
     let mut as_given = Vec::with_capacity(paths.len());
+    let mut all_dated = true;
     for path in paths {
         let mut reader = Reader::open(&path, layout.clone(), options.clone())?;
         let offset_ns = offset_of(&path, options);
         let start = reader.next_into(&mut row)?;
         let start = start.then(|| row.time_ns.saturating_add(offset_ns));
+        all_dated &= start.is_none_or(|start| is_dated(&reader.layout().time.form, start));
         as_given.push((start, path));
     }
     let mut by_time = as_given.clone();
@@ -193,8 +201,7 @@ fn in_order(
     let all_differ = starts().zip(starts().skip(1)).all(|(one, next)| one < next);
     let one_clock = by_time != as_given
         && all_differ
-        && (starts().all(|start| is_dated(layout, start))
-            || follow_each_other(&by_time, layout, options)?);
+        && (all_dated || follow_each_other(&by_time, layout, options)?);
     let files = if one_clock { by_time } else { as_given };
     Ok(files.into_iter().map(|(_, path)| path).collect())
 }

@@ -2,9 +2,9 @@
 
 mod reports;
 mod sensor_words;
-mod stop;
+pub(super) mod stop;
 mod swap;
-mod swap_words;
+pub(super) mod swap_words;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -33,6 +33,12 @@ pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     Box::new(Pieces::new(pieces))
 }
 
+/// Notes signals to stop, for whoever looks at [`is_stopped`]. A second one ends the program at once.
+pub fn listen_for_the_end() {
+    let (give, _) = sync_channel(1);
+    let _ = listen(give);
+}
+
 /// Ends the input at the first signal; whether signals can be listened to.
 #[cfg(unix)]
 fn listen(give: SyncSender<Piece>) -> bool {

@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use athermal::Duration;
-use athermal::core::engine::Carry;
+use athermal::core::engine::{Carry, NodeCarry};
 use athermal::run::live::session::{Refusal, WatchedGraph};
 use athermal::run::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
@@ -59,15 +59,7 @@ fn staged(path: &Path, staged: &Staged) -> Message {
         staged.revision(),
         all.len()
     );
-    for node in all {
-        let (word, why) = match &node.outcome {
-            Carry::Carried => continue,
-            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
-            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
-            Carry::Cold { reason } => ("cold", reason.clone()),
-        };
-        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
-    }
+    text += &nodes(all);
     let (past, endless) = staged.endless();
     if !endless.is_empty() {
         let _ = write!(
@@ -88,6 +80,29 @@ fn staged(path: &Path, staged: &Staged) -> Message {
     let facts =
         json!({ "graph": path.display().to_string(), "revision": staged.revision(), "nodes": all });
     Message::new("staged", facts, text)
+}
+
+/// What becomes of the nodes that do not go on as they were, a line each.
+fn nodes(all: &[NodeCarry]) -> String {
+    let mut text = String::new();
+    for node in all {
+        let (word, why) = match &node.outcome {
+            Carry::Carried => continue,
+            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
+            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
+            Carry::Cold { reason } => ("cold", reason.clone()),
+        };
+        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
+    }
+    text
+}
+
+/// What becomes of the nodes of a graph that was given at the start of a service.
+pub fn carry(terminal: &Terminal, all: &[NodeCarry]) {
+    let text = nodes(all);
+    if !text.is_empty() {
+        terminal.note(text.trim_start());
+    }
 }
 
 /// How a graph did in the shadow of what runs.

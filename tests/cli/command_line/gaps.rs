@@ -50,23 +50,31 @@ path = "/dev/ttyUSB0"
 [sinks]
 file = "out.csv"
 "a b" = { path = "out.csv" }
-[runtime]
-heartbeat = 1
-hartbeat = "1s"
 "#;
     let expected = [
+        (18, "a graph file has no key \"source\""),
         (21, "expected a table for \"file\""),
         (22, "\"a b\" cannot be the name of a sink"),
-        (24, "expected a duration"),
-        (25, "no key \"hartbeat\""),
     ];
     assert_told("command-line-deployment", &text, &expected);
-    let text = text.replace("heartbeat = 1\nhartbeat = \"1s\"", "heartbeat = \"0s\"");
-    let expected = [&expected[..2], &[(24, "greater than 0")]].concat();
-    assert_told("command-line-heartbeat", &text, &expected);
-    let text = "schema = 1\nsource = \"a.csv\"\nruntime = 3\nmodel = 4\n";
+    let (graph, _) = text.split_once("[source]").unwrap();
+    let text = format!("{graph}[runtime]\nheartbeat = 1\nhartbeat = \"1s\"\n");
+    let unused = (4, "no output depends on the signal");
     let expected = [
-        (2, "expected a table for \"source\""),
+        unused,
+        (19, "expected a duration"),
+        (20, "no key \"hartbeat\""),
+    ];
+    assert_told("command-line-runtime", &text, &expected);
+    let text = text.replace("heartbeat = 1\nhartbeat = \"1s\"", "heartbeat = \"0s\"");
+    assert_told(
+        "command-line-heartbeat",
+        &text,
+        &[unused, (19, "greater than 0")],
+    );
+    let text = "schema = 1\nsources = \"a.csv\"\nruntime = 3\nmodel = 4\n";
+    let expected = [
+        (2, "expected a table for \"sources\""),
         (3, "expected a table for \"runtime\""),
         (4, "expected a text in quotes for \"model\""),
     ];

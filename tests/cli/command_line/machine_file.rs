@@ -4,19 +4,18 @@
 use super::{PLAIN, desk};
 use crate::workbench::{Scratch, athermal};
 
-const TOLD: &str = "does not yet read";
+const TOLD: &str = "does not read";
 
 #[test]
 fn run_tells_once_which_sections_of_a_machine_file_it_does_not_read() {
     let (scratch, plain, data, _) = desk("machine-file");
     let text = "extends = \"plain.toml\"\nschema = 1\n\
-                [source]\ntopic = \"a\"\n[sinks.log]\n[runtime]\nheartbeat = \"1s\"\n";
+                [sources.a]\n[sinks.log]\n[runtime]\nheartbeat = \"1s\"\n";
     let machine = scratch.file("machine.toml", text);
     let ran = athermal(&[&"run", &machine, &"--input", &data]).ended(0);
     ran.tells(&[
         "warning: ",
-        "machine.toml: `athermal run` does not yet read `[source]`, `[sinks]`, `[runtime]`: give the input with `--input`; \
-         give the output with `--output`; do without heartbeats, since every tick is a row",
+        "machine.toml: `athermal run` goes by its options alone and does not read `[sources]`, `[sinks]`, `[runtime]`; `athermal serve",
     ]);
     assert_eq!(ran.told.matches(TOLD).count(), 1, "{}", ran.told);
     let quiet = athermal(&[&"run", &plain, &"--input", &data]).ended(0);

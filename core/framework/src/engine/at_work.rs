@@ -1,5 +1,6 @@
 //! Names the node in whose code a panic came about: the panic itself knows only a place in the source.
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use crate::compile::{Plan, PlannedNode};
@@ -35,9 +36,16 @@ impl AtWork {
 /// Where that panics: with a [`NodePanic`] that names the node at work.
 #[inline]
 pub(crate) fn naming<T>(plan: &Plan, when: When, work: impl FnOnce(&mut AtWork) -> T) -> T {
+    caught(work).unwrap_or_else(|(node, panic)| go_on(plan.nodes.get(node), when, panic))
+}
+
+/// Does what takes the code of nodes; a panic comes back with the number of the node at work.
+#[inline]
+pub(crate) fn caught<T>(
+    work: impl FnOnce(&mut AtWork) -> T,
+) -> Result<T, (usize, Box<dyn Any + Send>)> {
     let mut at_work = AtWork(usize::MAX);
-    catch_unwind(AssertUnwindSafe(|| work(&mut at_work)))
-        .unwrap_or_else(|panic| go_on(plan.nodes.get(at_work.0), when, panic))
+    catch_unwind(AssertUnwindSafe(|| work(&mut at_work))).map_err(|panic| (at_work.0, panic))
 }
 
 /// The same for the code of one node, by its number.
@@ -49,11 +57,24 @@ pub fn naming_one<T>(plan: &Plan, node: usize, when: When, work: impl FnOnce() -
 }
 
 #[cold]
-fn go_on(node: Option<&PlannedNode>, when: When, panic: Box<dyn std::any::Any + Send>) -> ! {
+fn go_on(node: Option<&PlannedNode>, when: When, panic: Box<dyn Any + Send>) -> ! {
+    match named(node, when, panic) {
+        Ok(panic) => resume_unwind(Box::new(panic)),
+        Err(panic) => resume_unwind(panic),
+    }
+}
+
+/// A panic with its node; as it is where it knows one already, or there is none.
+#[cold]
+pub(crate) fn named(
+    node: Option<&PlannedNode>,
+    when: When,
+    panic: Box<dyn Any + Send>,
+) -> Result<NodePanic, Box<dyn Any + Send>> {
     let Some(node) = node.filter(|_| !panic.is::<NodePanic>()) else {
-        resume_unwind(panic)
+        return Err(panic);
     };
-    resume_unwind(Box::new(NodePanic {
+    Ok(NodePanic {
         node: node.instance(),
         when: match when {
             When::Tick(now) => format!("at {now} s"),
@@ -62,5 +83,5 @@ fn go_on(node: Option<&PlannedNode>, when: When, panic: Box<dyn std::any::Any + 
         },
         author: node.kind.author(),
         message: panic_message(&*panic).to_owned(),
-    }))
+    })
 }

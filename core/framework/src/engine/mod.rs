@@ -7,6 +7,7 @@ mod at_work;
 mod error;
 #[cfg(feature = "testkit")]
 mod idle;
+mod isolation;
 mod learning;
 mod sample_range;
 mod state;
@@ -27,7 +28,8 @@ pub use tick::{Cursor, History};
 #[cfg(feature = "testkit")]
 pub use idle::Answer;
 
-pub(crate) use at_work::naming;
+pub(crate) use at_work::{caught, naming};
+use isolation::Isolation;
 use tick::Gathered;
 
 use crate::channel::Extremes;
@@ -68,6 +70,7 @@ pub struct Engine {
     fed_back: Vec<(usize, usize)>,
     /// Whether learning has been frozen on command.
     frozen: bool,
+    isolation: Isolation,
     /// Room for the regressors of any estimator.
     row: Vec<f64>,
     /// The lowest and highest sample that count, of each source.
@@ -115,6 +118,7 @@ impl Engine {
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
+            isolation: Isolation::default(),
             outputs: OutputSlots::new(&plan),
             ranges: plan.sources.iter().map(|source| source.range).collect(),
             fitted: fitted.clone(),
@@ -162,7 +166,16 @@ impl Engine {
         self.last = time;
         self.slots.tick += 1;
         self.take_in(time, samples);
-        naming(&self.plan, When::Tick(time), |at_work| {
+        self.run_nodes(time);
+        self.remember(time);
+        self.outputs.put_out(&self.slots, time);
+        Ok(self.outputs.values())
+    }
+
+    /// Runs the nodes in order. One that panics is given up where the engine isolates nodes, and the rest goes on.
+    fn run_nodes(&mut self, time: Instant) {
+        let mut nth = 0;
+        while let Err((node, panic)) = caught(|at_work| {
             let nodes = &mut *self.nodes;
             let mut context = TickContext {
                 now: time,
@@ -172,7 +185,8 @@ impl Engine {
                 frozen: self.frozen,
                 at_work,
             };
-            for work in &mut self.work {
+            while let Some(work) = self.work.get_mut(nth) {
+                nth += 1;
                 match work {
                     Work::Step(Step::Gather(gather)) => {
                         context.gathered[*gather].read(context.slots, &self.histories, time);
@@ -186,12 +200,12 @@ impl Engine {
                         context.capture(&mut nodes[*node]);
                     }
                     Work::Bank(bank) => bank.run(&mut context, nodes),
+                    Work::Nothing => {}
                 }
             }
-        });
-        self.remember(time);
-        self.outputs.put_out(&self.slots, time);
-        Ok(self.outputs.values())
+        }) {
+            self.give_up(node, panic);
+        }
     }
 
     /// The instant of the last tick; none before the first.
@@ -405,19 +419,27 @@ impl Engine {
                 feedback.observe(self.slots.values[slot], self.slots.given[slot].stamp, now);
             }
         }
-        for &(node, slot) in &self.truths {
-            if !self.slots.fresh(slot) {
-                continue;
-            }
-            let truth = self.slots.values[slot];
-            match &mut self.nodes[node] {
-                NodeRunner::Vote(vote) => vote.observe(truth, now),
-                other => {
-                    if let Some(learning) = other.learning() {
-                        learning.observe(truth, now, &self.gathered, !self.frozen);
+        let mut nth = 0;
+        while let Err((node, panic)) = caught(|at_work| {
+            while let Some(&(node, slot)) = self.truths.get(nth) {
+                nth += 1;
+                if !self.slots.fresh(slot) {
+                    continue;
+                }
+                at_work.is(node);
+                let truth = self.slots.values[slot];
+                match &mut self.nodes[node] {
+                    NodeRunner::Vote(vote) => vote.observe(truth, now),
+                    other => {
+                        if let Some(learning) = other.learning() {
+                            learning.observe(truth, now, &self.gathered, !self.frozen);
+                        }
                     }
                 }
             }
+        }) {
+            nth -= 1;
+            self.give_up(node, panic);
         }
     }
 

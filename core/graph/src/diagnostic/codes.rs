@@ -24,7 +24,8 @@ pub struct Code {
 inventory::collect!(Code);
 
 /// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for
-/// their tests, A110 for learning while they run, A180 for mistakes in the code of a node's kind, from A190 for the models that they name.
+/// their tests, A110 for learning while they run, A180 for mistakes in the code of a node's kind, from A190 for the models that they name, from A200 for what a machine file says of a
+/// service.
 pub fn codes() -> &'static [Code] {
     static CODES: OnceLock<Vec<Code>> = OnceLock::new();
     CODES.get_or_init(|| {

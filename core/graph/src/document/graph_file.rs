@@ -36,7 +36,7 @@ pub struct GraphFile {
     pub outputs: Vec<OutputDecl>,
     /// The list under `[[tests]]`, as it stands.
     pub tests: Option<Value>,
-    /// The deployment sections `source`, `sinks`, `runtime` and `model`, as they stand.
+    /// The sections of a machine file, such as `sources`, `sinks`, `runtime` and `model`, as they stand.
     pub deployment: IndexMap<String, Value>,
     /// The merged tree before expansion; what a model stores.
     pub tree: Value,

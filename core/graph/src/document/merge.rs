@@ -6,10 +6,18 @@ use super::problem;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Names};
 
+/// Sections of what has names, and what each name is of.
+const NAMED: [(&str, &str); 4] = [
+    ("nodes", "node"),
+    ("outputs", "output"),
+    ("sources", "source"),
+    ("sinks", "sink"),
+];
+
 /// Lays `over` on `base`: tables merge key by key, all else replaces.
 ///
-/// Under `nodes`, `false` removes an inherited node, and a node of another `type` (or `module`) replaces the inherited one whole.
-/// Under `outputs`, `false` removes an inherited output. The names of nodes that are removed are added to `removed`.
+/// Under `nodes`, `sources` and `sinks`, `false` removes what is inherited, and one of another `type` (or `module`) replaces the inherited
+/// one whole. Under `outputs`, `false` removes an inherited output. The names of nodes that are removed are added to `removed`.
 pub(super) fn merge(
     base: Option<Table>,
     over: Table,
@@ -18,7 +26,7 @@ pub(super) fn merge(
 ) -> Table {
     let mut merged = base.unwrap_or_default();
     for (key, entry) in over {
-        if key == "nodes" || key == "outputs" {
+        if NAMED.iter().any(|(section, _)| *section == key) {
             merge_named(&mut merged, key, entry, removed, diagnostics);
         } else if key == "modules" {
             merge_modules(&mut merged, key, entry, diagnostics);
@@ -72,7 +80,7 @@ fn both(merged: &mut Table, key: String, entry: Entry) -> Option<(&mut Table, Ta
     }
 }
 
-/// Nodes, or outputs.
+/// Nodes, outputs, sources or sinks.
 fn merge_named(
     merged: &mut Table,
     key: String,
@@ -80,7 +88,10 @@ fn merge_named(
     removed: &mut Vec<String>,
     diagnostics: &mut Diagnostics,
 ) {
-    let role = if key == "nodes" { "node" } else { "output" };
+    let mut sections = NAMED.iter();
+    let role = sections
+        .find(|(section, _)| *section == key)
+        .map_or("node", |(_, role)| role);
     let Some((inherited, named)) = both(merged, key, entry) else {
         return;
     };
@@ -99,7 +110,7 @@ fn merge_named(
             } else if role == "node" {
                 removed.push(name);
             }
-        } else if role == "node"
+        } else if role != "output"
             && inherited
                 .get(&name)
                 .is_some_and(|old| is_another_kind(old, &over.value))

@@ -21,6 +21,7 @@ pub use declare::declare;
 pub use declare::is_name;
 pub use declare::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use declare::{TIME_UNITS, is_misspelt, known_keys};
+pub use declare::{fill_placeholders, placeholders};
 pub use decode::decode;
 pub use decode::decode_beside;
 pub use foreign_syntax::ForeignSyntax;

@@ -3,9 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
+use jiff::Timestamp;
 use jiff::civil::{DateTime, date};
 use jiff::fmt::strtime::{self, BrokenDownTime};
 use jiff::tz::{Offset, TimeZone};
+
+use super::{Instant, Zone};
 
 /// How dates and times are written, in the letters of `strptime` (POSIX.1-2017, and `%f` for fractions of a second):
 /// `%d.%m.%Y %H:%M:%S`.
@@ -29,6 +32,14 @@ impl TimeFormat {
         let offset = parts.offset().unwrap_or(Offset::UTC);
         let civil = parts.to_datetime().ok()?;
         Some(offset.to_timestamp(civil).ok()?.as_nanosecond())
+    }
+
+    /// An instant in this form, by the clock of a zone, or of UTC without; none beyond the years that have four digits.
+    #[must_use]
+    pub fn write(&self, at: Instant, zone: Option<&Zone>) -> Option<String> {
+        let at = Timestamp::from_nanosecond(i128::from(at.as_ns())).ok()?;
+        let zone = zone.map_or(TimeZone::UTC, Zone::time_zone);
+        strtime::format(&self.0, &at.to_zoned(zone)).ok()
     }
 
     /// Whether times of this format have their offset from UTC.

@@ -43,6 +43,10 @@ impl Zone {
         &self.name
     }
 
+    pub(super) fn time_zone(&self) -> TimeZone {
+        self.zone.clone()
+    }
+
     /// The instant of a time by this clock, given as if the clock were one of UTC. A time that comes twice, since the clock was set
     /// back, is the first of the two until it would not be after `last`, the instant before it that is known with the time from one
     /// to the next in ns; then it is the one that is nearer to the next.

@@ -96,7 +96,15 @@ pub enum Notice {
 }
 
 /// The two ends of an engine of which there is a replica.
-pub(super) fn pair(engine: Engine, replica: Engine, options: LiveOptions) -> (Stepper, Control) {
+pub(super) fn pair(
+    mut engine: Engine,
+    mut replica: Engine,
+    options: LiveOptions,
+) -> (Stepper, Control) {
+    if options.isolates {
+        engine.isolate_panics();
+        replica.isolate_panics();
+    }
     let running = Arc::clone(engine.plan());
     let mut feed = Feed::of(&running);
     for channel in &options.channels {
@@ -180,6 +188,9 @@ impl Control {
         let mut live = LiveEngine::new(engine, &self.feed, 0)
             .map_err(|channels| StageError::MissingChannels { channels })?;
         live.engine.freeze(self.frozen);
+        if self.options.isolates {
+            live.engine.isolate_panics();
+        }
         let mut warmed = false;
         let slots: Vec<usize> = model
             .plan

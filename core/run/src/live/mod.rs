@@ -57,6 +57,8 @@ pub struct LiveOptions {
     pub memory: usize,
     /// How long a replaced graph is kept warm, so that it can be taken back.
     pub keep_warm: Duration,
+    /// Whether a node that panics is given up, so that the graph goes on without it.
+    pub isolates: bool,
     /// Channels that samples are given for, beyond those that the graph reads: what later graphs may read.
     pub channels: Vec<Feed>,
 }
@@ -68,6 +70,7 @@ impl Default for LiveOptions {
             retain: Duration::from_ns(3_600_000_000_000),
             memory: 256 << 20,
             keep_warm: Duration::from_ns(3_600_000_000_000),
+            isolates: false,
             channels: Vec::new(),
         }
     }

@@ -1,5 +1,6 @@
 //! All files of a journal, read in order.
 
+use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -43,6 +44,27 @@ pub struct Gap {
     pub from: u64,
     /// How many.
     pub records: u64,
+}
+
+impl fmt::Display for Torn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { damage, bytes } = self;
+        write!(
+            f,
+            "{damage}; its last {bytes} bytes are left out, which had not been synced"
+        )
+    }
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { from, records } = self;
+        let to = from + records.saturating_sub(1);
+        write!(
+            f,
+            "the journal lacks the records {from} to {to}, which could not be written"
+        )
+    }
 }
 
 impl Log {

@@ -91,6 +91,19 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// How many there were of what became of a sample.
+    #[must_use]
+    pub fn of(&self, admission: Admission) -> u64 {
+        match admission {
+            Admission::Accepted(_) => self.accepted,
+            Admission::Late(_) => self.late,
+            Admission::Twice(_) => self.twice,
+            Admission::Refused(_, Refusal::Future { .. }) => self.future,
+            Admission::Refused(_, Refusal::Clock { .. }) => self.clock,
+            Admission::Refused(_, Refusal::NoChannel) | Admission::Held => 0,
+        }
+    }
+
     pub(super) fn count(&mut self, admission: Admission) {
         match admission {
             Admission::Accepted(_) => self.accepted += 1,

@@ -16,7 +16,7 @@
 //! 1. Its source's clock is judged ([`ClockRule`]).
 //! 2. Not after its channel's last stamp, or waiting already: **twice**.
 //! 3. Not after the last tick: **late**, or within the channel's `late` given to the next tick.
-//! 4. Further than `future` ahead of the newest stamp and the time since: **refused**.
+//! 4. Further than `future` ahead of the newest stamp and the time since: **refused**, unless its source gives stamps in order.
 //! 5. Else it is **accepted**, and waits.
 
 mod decision;
@@ -149,6 +149,13 @@ impl Sequencer {
         self.count(sample, admission)
     }
 
+    /// Whether samples of a source are held until the offset of its clock is known.
+    #[must_use]
+    pub fn holds(&self, source: usize) -> bool {
+        let clock = self.clocks.get(source);
+        clock.is_some_and(|clock| clock.due().is_some())
+    }
+
     /// The times of what follows may start again. What waits is to be taken with [`finish`](Self::finish) before.
     pub fn segment(&mut self) {
         self.timeline.segment(true);
@@ -273,7 +280,9 @@ impl Sequencer {
         if is_late && (is_too_late() || self.timeline.len() >= self.rules.most) {
             return Admission::Late(sample);
         }
-        if let Some(newest) = self.newest(now) {
+        let source = self.rules.sources.get(self.rules.channels[channel].source);
+        let is_in_order = source.is_some_and(|source| source.is_in_order);
+        if !is_in_order && let Some(newest) = self.newest(now) {
             let ahead = sample.stamp - newest;
             if ahead > self.rules.future {
                 return Admission::Refused(sample, Refusal::Future { ahead });

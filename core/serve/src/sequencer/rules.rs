@@ -46,6 +46,8 @@ pub struct SourceRules {
     pub silent: Duration,
     /// How its clock is judged; not at all without.
     pub clock: Option<ClockRule>,
+    /// Whether its stamps come in order, as in a recording: then a gap is no stamp from the future.
+    pub is_in_order: bool,
 }
 
 impl Default for SourceRules {
@@ -53,6 +55,7 @@ impl Default for SourceRules {
         Self {
             silent: Duration::from_ns(30_000_000_000),
             clock: None,
+            is_in_order: false,
         }
     }
 }

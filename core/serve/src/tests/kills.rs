@@ -55,7 +55,14 @@ fn child() {
     };
     fs::write(path.join("starts"), "").unwrap();
     let names = feed(&model);
-    let found = Recovered::find(&folder, &checkpoints, &model, &names, least, again);
+    let found = Recovered::find(
+        &folder,
+        &checkpoints,
+        &model,
+        |_| names.clone(),
+        least,
+        again,
+    );
     let recovered = found.unwrap();
     assert!(recovered.report.difference.is_none());
     assert_eq!(

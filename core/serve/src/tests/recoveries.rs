@@ -55,7 +55,7 @@ fn recover(path: &Path, model: &Model) -> (StateFolder, Recovered, Outputs) {
         &folder,
         &checkpoints(&folder),
         model,
-        &feed(model),
+        |_| feed(model),
         u64::MAX,
         look,
     )
@@ -209,7 +209,7 @@ fn what_a_sink_lacks_is_stepped_again_from_an_older_checkpoint_or_the_beginning(
         &folder,
         &checkpoints(&folder),
         &model,
-        &feed(&model),
+        |_| feed(&model),
         7,
         look,
     )
@@ -314,7 +314,7 @@ fn a_damaged_journal_is_refused_and_left_as_it_is() {
         &folder,
         &checkpoints(&folder),
         &model,
-        &feed(&model),
+        |_| feed(&model),
         0,
         |_, _| (),
     );

@@ -95,7 +95,7 @@ fn a_journal_is_a_recording_of_its_ticks() {
         recorder, outputs, ..
     } = line;
     recorder.finish();
-    let recording = JournalRecording::new(&folder.0).unwrap();
+    let recording = JournalRecording::in_state(&folder.0);
     let (mut fresh, mut again) = (engine(&model), Vec::new());
     let mut breaks = 0;
     let passed = pass(&mut fresh, &recording, |engine, event, _| match event {
@@ -106,7 +106,8 @@ fn a_journal_is_a_recording_of_its_ticks() {
     assert_eq!(again, outputs);
     assert_eq!(breaks, 2);
     let empty = Folder::new();
-    let refused = JournalRecording::new(&empty.0).unwrap_err().to_string();
+    let recording = JournalRecording::in_state(&empty.0);
+    let refused = recording.open(&model.plan).err().unwrap().to_string();
     assert!(refused.ends_with("there is no journal in this folder"));
 }
 
@@ -119,12 +120,12 @@ fn a_graph_that_reads_other_channels_takes_what_there_is() {
     recorder.finish();
     let graph = folder.0.join("other.toml");
     let text = "schema = 1\n\
-        signals.temperature = { unit = \"Cel\", channels = [\"outside\", \"room\"], max_age = \"3s\" }\n\
+        signals.temperature = { unit = \"Cel\", channels = [\"outside\", \"room\"], optional = [\"outside\"], max_age = \"3s\" }\n\
         nodes.trend = { type = \"slope\", inputs.signal = \"temperature\", windows = [\"2s\"] }\n\
         outputs.trend = \"trend\"\n";
     std::fs::write(&graph, text).unwrap();
     let other = Model::load(&graph).unwrap();
-    let recording = JournalRecording::new(&folder.0).unwrap();
+    let recording = JournalRecording::in_state(&folder.0);
     let mut source = recording.open(&other.plan).unwrap();
     let mut samples = Samples::default();
     let mut known = 0;

@@ -93,3 +93,19 @@ fn a_panic_names_the_node_and_the_tick() {
          from athermal-testkit 0.1.0"
     );
 }
+
+#[test]
+fn a_node_that_panics_is_given_up_where_that_is_asked_for_and_the_others_go_on() {
+    let mut engine = engine(GRAPH);
+    engine.isolate_panics();
+    let mut given = Vec::new();
+    for (second, [x, y]) in [(1, [0.1, 0.5]), (2, [0.2, 1.5]), (3, [0.3, 0.5])] {
+        let now = Instant::from_ns(second * 1_000_000_000);
+        given.push(engine.step(now, &[x, y]).unwrap().to_vec());
+    }
+    assert_eq!(given[0], [0.1, 0.5]);
+    assert!(given[1][0] == 0.2 && given[1][1].is_nan(), "{given:?}");
+    assert!(given[2][0] == 0.3 && given[2][1].is_nan(), "{given:?}");
+    let panics: Vec<_> = engine.panics().iter().map(|of| &*of.node).collect();
+    assert_eq!(panics, ["passed.Y"]);
+}

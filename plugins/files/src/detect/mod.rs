@@ -6,6 +6,7 @@ mod description;
 mod format;
 mod header;
 mod long;
+mod other_time;
 mod times;
 mod units;
 
@@ -13,6 +14,7 @@ pub use apart::apart;
 pub use description::Description;
 pub use format::Format;
 pub use long::LongFormat;
+pub use other_time::other_time;
 pub use times::{NumberForm, zone_in_name, zone_of};
 
 pub(crate) use format::begins_json_array;

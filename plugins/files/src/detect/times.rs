@@ -12,7 +12,7 @@ pub struct NumberForm {
     pub ns: i64,
     /// How far before 1970 it counts from, in ns, where that is its own.
     origin_ns: i128,
-    /// What it is called in the names of columns, in small letters.
+    /// What it is called in the names of columns, in small letters; the longer words also with an `s` behind them.
     words: &'static str,
     /// From 1990 to 2100, for numbers that count from a known beginning.
     plausible: Option<(f64, f64)>,
@@ -41,37 +41,12 @@ const D: i64 = 86_400_000_000_000;
 
 /// All forms; of several that numbers fit by their size, the first is the likeliest.
 const NUMBER_FORMS: [NumberForm; 15] = [
-    form("ns", 1, "ns nsec nanos nanosecond nanoseconds", "ns"),
-    form(
-        "us",
-        1_000,
-        "us µs μs usec micros microsecond microseconds",
-        "µs",
-    ),
-    form(
-        "ms",
-        1_000_000,
-        "ms msec msecs millis millisecond milliseconds",
-        "ms",
-    ),
-    form(
-        "s",
-        1_000_000_000,
-        "s sec secs second seconds sek sekunde sekunden",
-        "s",
-    ),
-    form(
-        "min",
-        60_000_000_000,
-        "min mins minute minutes minuten",
-        "min",
-    ),
-    form(
-        "h",
-        3_600_000_000_000,
-        "h hr hrs hour hours std stunde stunden",
-        "h",
-    ),
+    form("ns", 1, "ns nsec nanos nanosecond", "ns"),
+    form("us", 1_000, "us µs μs usec micros microsecond", "µs"),
+    form("ms", 1_000_000, "ms msec millis millisecond", "ms"),
+    form("s", 1_000_000_000, "s sec second sek sekunde sekunden", "s"),
+    form("min", 60_000_000_000, "min minute minuten", "min"),
+    form("h", 3_600_000_000_000, "h hr hour std stunde stunden", "h"),
     form("d", D, "d days tage", "days"),
     since(
         form("jd", D, "jd hjd bjd julian juliandate", "Julian days"),
@@ -148,7 +123,9 @@ impl NumberForm {
     #[must_use]
     pub fn of_unit(text: &str) -> Option<&'static Self> {
         let text = text.to_lowercase();
-        let is_such = |form: &&Self| form.words.split(' ').any(|word| word == text);
+        let singular = text.strip_suffix('s').filter(|of| of.len() > 1);
+        let is_it = |word| word == text || Some(word) == singular;
+        let is_such = |form: &&Self| form.words.split(' ').any(is_it);
         NUMBER_FORMS
             .iter()
             .find(is_such)
@@ -195,30 +172,19 @@ impl NumberForm {
 }
 
 /// Words for zones, with their offsets; those that name several are none.
-const ZONES: [(&str, &str); 15] = [
-    ("UTC", "UTC"),
-    ("GMT", "UTC"),
-    ("CET", "+01:00"),
-    ("MEZ", "+01:00"),
-    ("CEST", "+02:00"),
-    ("MESZ", "+02:00"),
-    ("EET", "+02:00"),
-    ("EEST", "+03:00"),
-    ("EDT", "-04:00"),
-    ("CDT", "-05:00"),
-    ("MDT", "-06:00"),
-    ("MST", "-07:00"),
-    ("PDT", "-07:00"),
-    ("PST", "-08:00"),
-    ("JST", "+09:00"),
-];
+const ZONES: &str = "UTC=UTC GMT=UTC CET=+01:00 MEZ=+01:00 CEST=+02:00 MESZ=+02:00 EET=+02:00 EEST=+03:00 EDT=-04:00 \
+     CDT=-05:00 MDT=-06:00 MST=-07:00 PDT=-07:00 PST=-08:00 JST=+09:00";
+
+fn zones() -> impl Iterator<Item = (&'static str, &'static str)> {
+    ZONES.split(' ').filter_map(|of| of.split_once('='))
+}
 
 /// The zone that a text states, as a graph file writes it: `GMT-07:00`, `UTC+1`, `CET`, `+0100`.
 #[must_use]
 pub fn zone_of(text: &str) -> Option<String> {
     let text = text.trim();
-    if let Some((_, zone)) = ZONES.iter().find(|(word, _)| *word == text) {
-        return Some((*zone).to_owned());
+    if let Some((_, zone)) = zones().find(|(word, _)| *word == text) {
+        return Some(zone.to_owned());
     }
     let offset = text
         .strip_prefix("UTC")
@@ -246,7 +212,7 @@ pub fn zone_in_name(name: &str) -> Option<String> {
     let parts = name.split([' ', ',', ';', '(', ')', '[', ']', '_']);
     let words = ["UTC", "GMT"];
     let mut parts = parts.filter(|part| {
-        let is_word = ZONES.iter().any(|(word, _)| word == part);
+        let is_word = zones().any(|(word, _)| word == *part);
         is_word || words.iter().any(|word| part.starts_with(word))
     });
     parts.find_map(zone_of)

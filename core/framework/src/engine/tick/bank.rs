@@ -19,6 +19,8 @@ pub(crate) enum Work {
     Step(Step),
     /// Several steps of the plan that follow each other.
     Bank(Box<Bank>),
+    /// What was given up after a panic.
+    Nothing,
 }
 
 /// The steps of a plan, in which linear estimators that follow each other and share their first regressors, or each have a few of
@@ -146,6 +148,11 @@ struct Member {
 }
 
 impl Bank {
+    /// Whether a node is one of it.
+    pub(crate) fn has(&self, node: usize) -> bool {
+        self.members.iter().any(|member| member.node == node)
+    }
+
     fn new(members: &[Linear<'_>]) -> Self {
         let shared = members[0].shared.cloned();
         let at_once = shared.as_ref().map_or(0, |part| part.len() / 4 * 4);

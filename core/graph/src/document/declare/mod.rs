@@ -20,12 +20,13 @@ use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
 #[cfg(feature = "testkit")]
 pub use names::is_name;
+pub use placeholder::{fill as fill_placeholders, names as placeholders};
 use reading::text;
 pub use reading::{is_misspelt, known_keys};
 pub use table::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use time_base::UNITS as TIME_UNITS;
 
-const SECTIONS: [&str; 16] = [
+const SECTIONS: [&str; 20] = [
     "schema",
     "name",
     "description",
@@ -38,10 +39,14 @@ const SECTIONS: [&str; 16] = [
     "nodes",
     "outputs",
     "tests",
-    deployment::SOURCE,
+    deployment::SOURCES,
     deployment::SINKS,
-    deployment::RUNTIME,
     deployment::MODEL,
+    deployment::TABLES[0],
+    deployment::TABLES[1],
+    deployment::TABLES[2],
+    deployment::TABLES[3],
+    deployment::TABLES[4],
 ];
 
 /// Sections that say which names there are.
@@ -102,7 +107,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
             },
         );
     }
-    let deployment = deployment::declare(root, sample, diagnostics);
+    let deployment = deployment::declare(root, diagnostics);
     let mut naming = NAMING.iter().filter_map(|section| root.get(section));
     let whole = naming.all(|section| section.as_table().is_some());
     if expanded.cut || !whole {

@@ -1,7 +1,7 @@
 //! `{axis}` in texts: which placeholders a text has, and the member in their place; choices like `{a,b}` are left alone.
 
 /// The names in braces without a comma, in order.
-pub(super) fn names(text: &str) -> impl Iterator<Item = &str> {
+pub fn names(text: &str) -> impl Iterator<Item = &str> {
     pieces(text).filter_map(|piece| match piece {
         Piece::Placeholder(name) => Some(name),
         Piece::Plain(_) => None,
@@ -9,7 +9,7 @@ pub(super) fn names(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The text with each known placeholder replaced by its member.
-pub(super) fn fill(text: &str, members: &[(&str, &str)]) -> String {
+pub fn fill(text: &str, members: &[(&str, &str)]) -> String {
     if !text.contains('{') {
         return text.to_owned();
     }

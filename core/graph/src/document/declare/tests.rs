@@ -155,11 +155,12 @@ fn a_range_is_given_in_the_unit_of_its_signal() {
 
 #[test]
 fn deployment_sections_are_handed_on_as_they_stand() {
-    let graph =
-        graph("model = \"m.json\"\n[source]\nx = 1\n[sinks.a]\ny = 2\n[[tests]]\nname = \"t\"");
+    let graph = graph(
+        "model = \"m.json\"\n[sources.b]\nx = 1\n[sinks.a]\ny = 2\n[alarms]\nz = 3\n[[tests]]\nname = \"t\"",
+    );
     assert_eq!(
         graph.deployment.keys().collect::<Vec<_>>(),
-        ["source", "sinks", "model"]
+        ["sources", "sinks", "model", "alarms"]
     );
     assert_eq!(
         graph.tests.map(|tests| tests.to_json()),

@@ -152,14 +152,14 @@ problem! {
 problem! {
     /// `nodes.NAME = false` or `outputs.NAME = false` without one of that name that is inherited.
     A019 NothingToRemove {
-        /// `node` or `output`.
+        /// `node`, `output`, `source` or `sink`.
         role: &'static str,
         name: String,
         inherited: Arc<Names>,
     }
     error: "nothing to remove",
-    explanation: "`nodes.NAME = false` removes an inherited node and `outputs.NAME = false` an inherited output, and there is none of \
-        that name.",
+    explanation: "`nodes.NAME = false` removes an inherited node, and so with `outputs`, `sources` and `sinks`: there is none of that \
+        name.",
     message: format!("there is no inherited {role} \"{name}\" to remove"),
     label: "",
     help: nearest_of_many(name, inherited, &format!("the inherited {role}s are"))

@@ -109,7 +109,7 @@ fn false_removes_an_inherited_output() {
 
 #[test]
 fn a_path_starts_at_the_file_in_which_it_stands() {
-    let base = "schema = 1\nsource = { path = \"data.csv\" }";
+    let base = "schema = 1\nsources.a = { path = \"data.csv\" }";
     let middle = "schema = 1\nextends = \"types/base.toml\"";
     let files = [
         ("site/a.toml", "schema = 1\nextends = \"../middle.toml\""),
@@ -117,10 +117,10 @@ fn a_path_starts_at_the_file_in_which_it_stands() {
         ("types/base.toml", base),
     ];
     let Outcome { graph, sources, .. } = read(&files);
-    let source = &graph.expect("the chain has no mistake").deployment["source"];
-    let path = source
-        .as_table()
-        .and_then(|table| table.get("path"))
+    let sources_table = &graph.expect("the chain has no mistake").deployment["sources"];
+    let inner = |table: &Value, key| table.as_table().and_then(|of| of.get(key)).cloned();
+    let path = inner(sources_table, "a")
+        .and_then(|source| inner(&source, "path"))
         .expect("the source has a path");
     let resolved = sources.resolve(path.place, path.as_text().expect("the path is a text"));
     assert_eq!(resolved, Path::new("site/../types/data.csv"));
@@ -224,13 +224,13 @@ fn brackets_and_dotted_keys_nested_by_the_thousand_are_refused() {
 
 #[test]
 fn json_holds_a_tree_exactly() {
-    let text = "schema = 1\n[source]\nwhole = 9007199254740993\nthird = 0.3333333333333333\none = 1.0\nsmall = 5e-324\n\
+    let text = "schema = 1\n[control]\nwhole = 9007199254740993\nthird = 0.3333333333333333\none = 1.0\nsmall = 5e-324\n\
         t = 2020-01-01\nno = nan\nup = inf\ndown = -inf\nlist = [true, \"x\", {}]";
     let graph = graph(&[("a.toml", text)]);
     let stored = serde_json::to_string(&graph.tree.to_json()).expect("trees are serialisable");
     let json: serde_json::Value = serde_json::from_str(&stored).expect("what was written is JSON");
     assert_eq!(
-        json["source"].to_string(),
+        json["control"].to_string(),
         r#"{"whole":9007199254740993,"third":0.3333333333333333,"one":1.0,"small":5e-324,"t":"2020-01-01","no":"NaN","up":"inf","down":"-inf","list":[true,"x",{}]}"#
     );
     let place = graph.tree.place;

@@ -1,0 +1,24 @@
+//! What the author of a source or a sink implements, and how its kind becomes known.
+//!
+//! A kind is a serde struct of parameters that implements [`Source`] or [`Sink`], made known with [`register_source!`](crate::register_source)
+//! or [`register_sink!`](crate::register_sink). What works is an [`Inlet`] or an [`Outlet`]. Each has a thread of its own: it may wait,
+//! block and fail, and the engine thread does not notice.
+
+mod error;
+mod inlet;
+mod kind;
+mod outlet;
+mod source_link;
+mod stop;
+
+pub use error::ConnectorError;
+pub use inlet::{Inlet, Source, SourceWiring, Stamps, WiredChannel};
+pub use kind::{
+    ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,
+};
+#[doc(hidden)]
+pub use kind::{read_sink, read_source};
+pub use outlet::{Kept, OutRow, Outlet, Purpose, Sink, SinkWiring, WiredOutput};
+pub(crate) use source_link::{Arrival, SourceLink, link};
+pub use source_link::{Outflow, Remarks, SourceCounts};
+pub use stop::Stop;

@@ -1,0 +1,116 @@
+//! What the author of a sink implements.
+
+use std::fmt::Debug;
+use std::path::PathBuf;
+
+use super::ConnectorError;
+use crate::document::TimeBase;
+use crate::time::{Duration, Instant};
+
+/// A kind of sink: the parameters of one, as a machine file gives them.
+pub trait Sink: Debug + Send + Sync {
+    /// What it is for.
+    fn purpose(&self) -> Purpose {
+        Purpose::Log
+    }
+
+    /// The sink at work. Nothing is connected yet: that is for the first [`Outlet::put`].
+    ///
+    /// # Errors
+    /// When the parameters do not fit what is asked of it; the service does not start.
+    fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError>;
+}
+
+/// What a sink is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// It keeps every row, old ones too.
+    Log,
+    /// It moves something: only what is recent is put out, once, and never in a step.
+    Command,
+}
+
+/// What a sink is given.
+#[derive(Debug, Clone)]
+pub struct SinkWiring {
+    /// Its name in the machine file.
+    pub name: String,
+    /// The folder that relative paths start from.
+    pub folder: PathBuf,
+    /// The outputs that it is given, in the order of [`OutRow::outputs`].
+    pub outputs: Vec<WiredOutput>,
+    /// How tables give time.
+    pub time: TimeBase,
+}
+
+/// An output that a sink is given.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WiredOutput {
+    /// Its column, as `run` writes it: `correction.Z1`.
+    pub name: String,
+    /// Its unit.
+    pub unit: Option<String>,
+}
+
+/// A sink at work, on a thread of its own.
+pub trait Outlet: Send {
+    /// Puts a row out.
+    ///
+    /// # Errors
+    /// When it cannot be put out, and why. The same row is given again after a while; rows wait meanwhile, as many as there is room for.
+    fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError>;
+
+    /// Hands what is still held back to the system. Called when no row waits.
+    ///
+    /// # Errors
+    /// As [`put`](Self::put).
+    fn flush(&mut self) -> Result<(), ConnectorError> {
+        Ok(())
+    }
+
+    /// The rows that it keeps, where it can be asked for them after a start: then each is put out exactly once.
+    fn kept(&mut self) -> Option<&mut dyn Kept> {
+        None
+    }
+
+    /// What the machine says is applied at present, one value for each output, where it says so.
+    fn applied(&mut self) -> Option<Vec<f64>> {
+        None
+    }
+}
+
+/// The rows that a sink keeps.
+pub trait Kept {
+    /// Where its end is, once all rows are on the disk.
+    ///
+    /// # Errors
+    /// As [`Outlet::put`].
+    fn end(&mut self) -> Result<u64, ConnectorError>;
+
+    /// How many whole rows stand behind a place that [`end`](Self::end) gave; none where it is gone. What is left of a row is cut off.
+    ///
+    /// # Errors
+    /// As [`Outlet::put`].
+    fn rows_after(&mut self, end: u64) -> Result<Option<u64>, ConnectorError>;
+
+    /// Cuts back to so many rows behind a place.
+    ///
+    /// # Errors
+    /// As [`Outlet::put`].
+    fn cut(&mut self, end: u64, rows: u64) -> Result<(), ConnectorError>;
+}
+
+/// What came of a tick, as a sink is given it.
+#[derive(Debug, Clone, Copy)]
+pub struct OutRow<'a> {
+    /// The instant.
+    pub at: Instant,
+    /// Whether the tick was made by time alone.
+    pub is_beat: bool,
+    /// How far it lies behind the newest stamp and the time since.
+    pub behind: Duration,
+    /// The revision of the graph that made it.
+    pub revision: u64,
+    /// The outputs; NaN where there is none.
+    pub outputs: &'a [f64],
+}

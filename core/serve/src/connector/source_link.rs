@@ -1,0 +1,252 @@
+//! What lies between the thread of a source and the engine thread: a bounded ring, on which neither waits for the other's work.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::Thread;
+use std::time::Duration as Wait;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::{Stamps, Stop, WiredChannel};
+use crate::journal::Progress;
+use crate::sequencer::Sample;
+use crate::time::Instant;
+
+/// What comes from a source.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Arrival {
+    Sample(Sample),
+    Connected,
+    Away,
+    /// The times of what follows may start again.
+    Segment,
+    Ended,
+}
+
+/// Where a source reports what it leaves out.
+#[derive(Debug, Clone)]
+pub struct Remarks(Sender<String>);
+
+impl Remarks {
+    /// Where reports are received.
+    pub(crate) fn new() -> (Self, Receiver<String>) {
+        let (send, receive) = channel();
+        (Self(send), receive)
+    }
+
+    /// Reports something that does not stop the source: what was left out and why, once of each kind.
+    pub fn report(&self, words: impl fmt::Display) {
+        // Nobody listens any more where the service has ended.
+        let _ = self.0.send(words.to_string());
+    }
+}
+
+/// What a source counts.
+#[derive(Debug, Default)]
+pub struct SourceCounts {
+    /// Samples that were given.
+    pub given: AtomicU64,
+    /// Samples that were dropped because the engine thread was behind.
+    pub dropped: AtomicU64,
+    /// How often it was started again after a failure.
+    pub restarts: AtomicU64,
+    /// So many samples have been taken by the engine thread…
+    taken: AtomicU64,
+    /// …and stand in the journal once it has so many records.
+    records: AtomicU64,
+}
+
+/// The end that a source holds.
+#[derive(Debug)]
+pub struct Outflow {
+    ring: Producer<Arrival>,
+    engine: Thread,
+    counts: Arc<SourceCounts>,
+    progress: Arc<Progress>,
+    remarks: Remarks,
+    /// By channel of the source: its place in the feed, its conversion, and the newest stamp that is known.
+    channels: Vec<(u32, Option<(f64, f64)>, Instant)>,
+    stamps: Stamps,
+    /// What was taken at a look, and the number of records that have it.
+    look: (u64, u64),
+    written: u64,
+}
+
+/// The end that the engine thread holds.
+#[derive(Debug)]
+pub(crate) struct SourceLink {
+    ring: Consumer<Arrival>,
+    counts: Arc<SourceCounts>,
+    taken: u64,
+}
+
+/// A link of a source to the engine thread, for so many arrivals at once. `places` are those of its channels in the feed.
+pub(crate) fn link(
+    room: usize,
+    channels: &[WiredChannel],
+    places: &[u32],
+    stamps: Stamps,
+    (engine, progress, remarks): (Thread, Arc<Progress>, Remarks),
+) -> (Outflow, SourceLink) {
+    let (ring, arrivals) = RingBuffer::new(room);
+    let counts = Arc::new(SourceCounts::default());
+    let wired = channels.iter().zip(places);
+    let outflow = Outflow {
+        ring,
+        engine,
+        counts: Arc::clone(&counts),
+        progress,
+        remarks,
+        channels: wired
+            .map(|(wired, &place)| (place, wired.conversion, wired.after))
+            .collect(),
+        stamps,
+        look: (0, 0),
+        written: 0,
+    };
+    let link = SourceLink {
+        ring: arrivals,
+        counts,
+        taken: 0,
+    };
+    (outflow, link)
+}
+
+impl Outflow {
+    /// The source is connected: its channels may be waited for.
+    pub fn connected(&mut self) {
+        self.send(Arrival::Connected);
+    }
+
+    /// The source has lost its connection.
+    pub fn away(&mut self) {
+        self.send(Arrival::Away);
+    }
+
+    /// The times of what follows may start again.
+    pub fn segment(&mut self) {
+        for (.., after) in &mut self.channels {
+            *after = Instant::MIN;
+        }
+        self.send(Arrival::Segment);
+    }
+
+    /// Hands a sample over without waiting: the channel by its number in [`SourceWiring::channels`](super::SourceWiring), the value in
+    /// the source's unit, NaN where the source says that there is none. False where there is no room, and the sample was dropped and
+    /// counted.
+    pub fn sample(&mut self, channel: usize, stamp: Instant, value: f64) -> bool {
+        let Some(sample) = self.wired(channel, stamp, value) else {
+            return true;
+        };
+        let is_given = self.ring.push(Arrival::Sample(sample)).is_ok();
+        let counts = if is_given {
+            &self.counts.given
+        } else {
+            &self.counts.dropped
+        };
+        counts.fetch_add(1, Ordering::Relaxed);
+        self.engine.unpark();
+        is_given
+    }
+
+    /// Hands a row over, with a value for each channel of the source, NaN where there is none. Waits for room; false where it is to
+    /// stop meanwhile. For sources that can hold back.
+    #[must_use]
+    pub fn row(&mut self, stamp: Instant, values: &[f64], stop: &Stop) -> bool {
+        while self.ring.slots() < values.len().max(1) {
+            self.engine.unpark();
+            if !stop.wait(Wait::from_millis(1)) {
+                return false;
+            }
+        }
+        let mut is_empty = true;
+        for (channel, value) in values.iter().enumerate() {
+            if !value.is_nan() {
+                is_empty = false;
+                self.sample(channel, stamp, *value);
+            }
+        }
+        // Time passes also where nothing is measured.
+        if is_empty {
+            self.sample(0, stamp, f64::NAN);
+        }
+        true
+    }
+
+    /// Where it reports what it leaves out.
+    #[must_use]
+    pub fn remarks(&self) -> &Remarks {
+        &self.remarks
+    }
+
+    /// How many samples there is room for.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        self.ring.slots()
+    }
+
+    /// How many of the samples that were given are written into the journal: so many may be acknowledged.
+    pub fn written(&mut self) -> u64 {
+        let (taken, records) = self.look;
+        if self.progress.written() >= records {
+            self.written = taken;
+            let taken = self.counts.taken.load(Ordering::Acquire);
+            self.look = (taken, self.counts.records.load(Ordering::Acquire));
+        }
+        self.written
+    }
+
+    /// What is counted.
+    #[must_use]
+    pub fn counts(&self) -> &Arc<SourceCounts> {
+        &self.counts
+    }
+
+    pub(crate) fn end(&mut self) {
+        self.send(Arrival::Ended);
+    }
+
+    /// What is sent without a stamp is few, and the engine thread takes what is there many times a second.
+    fn send(&mut self, arrival: Arrival) {
+        while self.ring.push(arrival).is_err() {
+            self.engine.unpark();
+            if self.ring.is_abandoned() {
+                return;
+            }
+            std::thread::sleep(Wait::from_millis(1));
+        }
+        self.engine.unpark();
+    }
+
+    fn wired(&self, channel: usize, stamp: Instant, value: f64) -> Option<Sample> {
+        let (place, conversion, after) = *self.channels.get(channel)?;
+        // What is read again after a start is not new.
+        if self.stamps == Stamps::Order && stamp <= after {
+            return None;
+        }
+        let value = conversion.map_or(value, |(factor, offset)| value * factor + offset);
+        Some(Sample {
+            channel: place,
+            stamp,
+            value,
+        })
+    }
+}
+
+impl SourceLink {
+    /// What came next.
+    pub(crate) fn next(&mut self) -> Option<Arrival> {
+        let arrival = self.ring.pop().ok()?;
+        self.taken += u64::from(matches!(arrival, Arrival::Sample(_)));
+        Some(arrival)
+    }
+
+    /// All that was taken stands in the journal once it has so many records.
+    pub(crate) fn recorded(&self, records: u64) {
+        // In this order: whoever sees the first sees the second, or a later one.
+        self.counts.records.store(records, Ordering::Release);
+        self.counts.taken.store(self.taken, Ordering::Release);
+    }
+}

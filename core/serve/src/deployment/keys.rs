@@ -1,0 +1,44 @@
+//! Keys of a table that this crate reads itself, by their types, with the ranges that their schema states.
+
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+
+use crate::diagnostic::Diagnostics;
+use crate::document::problem::Refused;
+use crate::document::{Data, Table, Value, decode};
+use crate::node::out_of_range;
+
+/// Reads a table as a type; nothing where there are mistakes, all of which are reported.
+pub(super) fn read<T: DeserializeOwned + JsonSchema>(
+    table: &Value,
+    what: &str,
+    diagnostics: &mut Diagnostics,
+) -> Option<T> {
+    let read = decode(table, what, diagnostics)?;
+    let schema = schemars::schema_for!(T).into();
+    is_in_range(&schema, table, diagnostics).then_some(read)
+}
+
+/// Whether all values are within the ranges of a schema. Those that are not are reported.
+pub(super) fn is_in_range(
+    schema: &serde_json::Value,
+    table: &Value,
+    diagnostics: &mut Diagnostics,
+) -> bool {
+    let wrong = out_of_range(schema, table);
+    let is_fine = wrong.is_empty();
+    for (place, reason) in wrong {
+        diagnostics.report(place, Refused { key: None, reason });
+    }
+    is_fine
+}
+
+/// A table in two: these keys, and all others.
+pub(super) fn split(table: &Value, keys: &[&str]) -> (Value, Value) {
+    let entries = table.as_table().into_iter().flat_map(Table::iter);
+    let entries = entries.map(|(key, entry)| (key.to_owned(), entry.clone()));
+    let (own, others) = entries.partition(|(key, _)| keys.contains(&key.as_str()));
+    [own, others]
+        .map(|part: Vec<_>| Value::new(table.place, Data::Table(part.into_iter().collect())))
+        .into()
+}

@@ -1,0 +1,127 @@
+//! What a machine file says about a service: its sources and sinks, and how ticks are cut.
+
+mod channels;
+mod describe;
+mod keys;
+pub mod problem;
+mod runtime;
+mod schema;
+mod sinks;
+mod size;
+mod sources;
+
+pub use runtime::{Keep, Runtime};
+pub use schema::schemas;
+
+use crate::compile::{Plan, SourceChannel};
+use crate::connector::{Sink, SinkKind, Source, SourceKind};
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::GraphFile;
+use crate::sequencer::ClockRule;
+use crate::time::Duration;
+
+/// The sections that a deployment is read from.
+pub const SECTIONS: [&str; 3] = ["sources", "sinks", "runtime"];
+
+/// What a machine file says about a service.
+#[derive(Debug)]
+pub struct Deployment {
+    /// `[runtime]`.
+    pub runtime: Runtime,
+    /// `[sources.NAME]`, in the order of the file.
+    pub sources: Vec<DeclaredSource>,
+    /// `[sinks.NAME]`, in the order of the file.
+    pub sinks: Vec<DeclaredSink>,
+}
+
+/// A source that a machine file declares.
+#[derive(Debug)]
+pub struct DeclaredSource {
+    /// Its name.
+    pub name: String,
+    /// Its kind.
+    pub kind: &'static SourceKind,
+    /// Its parameters.
+    pub parameters: Box<dyn Source>,
+    /// A source that is away so long is not waited for, and one that gives nothing for so long is started again.
+    pub silent: Duration,
+    /// How its clock is judged; not at all without.
+    pub clock: Option<ClockRule>,
+    /// The channels that it gives.
+    pub channels: Vec<DeclaredChannel>,
+}
+
+/// A channel that a source gives.
+#[derive(Debug, Clone)]
+pub struct DeclaredChannel {
+    /// The channel as the graph knows it.
+    pub channel: SourceChannel,
+    /// Where the source has it: a column, a topic, a node.
+    pub address: String,
+    /// The unit of the channel from that of the source: `value * factor + offset`; none where it is the same.
+    pub conversion: Option<(f64, f64)>,
+    /// A sample no later than this is given to the next tick.
+    pub late: Duration,
+}
+
+/// A sink that a machine file declares.
+#[derive(Debug)]
+pub struct DeclaredSink {
+    /// Its name.
+    pub name: String,
+    /// Its kind.
+    pub kind: &'static SinkKind,
+    /// Its parameters.
+    pub parameters: Box<dyn Sink>,
+    /// The columns of the outputs that it is given, as `run` writes them, in order.
+    pub outputs: Vec<String>,
+    /// A tick that lies further behind is not put out; for commands 5 s unless the file says otherwise.
+    pub behind: Option<Duration>,
+    /// By how much a command may change per second, in the unit of each output; without bound where there is none.
+    pub rate: Vec<Option<f64>>,
+}
+
+impl Deployment {
+    /// What a graph that has been compiled to a plan says of its deployment. `files` are those that it was read from: relative paths
+    /// start at the file in which they stand. All mistakes are reported; without one there is a deployment.
+    pub fn read(
+        graph: &GraphFile,
+        plan: &Plan,
+        files: &Sources,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Self> {
+        let deployment = Self::check(graph, plan, files, diagnostics);
+        if graph.deployment.contains_key("sources") {
+            return deployment;
+        }
+        diagnostics.report(graph.tree.place, problem::NoSources {});
+        None
+    }
+
+    /// As [`read`](Self::read), of a graph that need not have sources: it may be one that others extend.
+    pub fn check(
+        graph: &GraphFile,
+        plan: &Plan,
+        files: &Sources,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Self> {
+        let before = diagnostics.error_count();
+        let section = |name: &str| graph.deployment.get(name);
+        let runtime = runtime::read(section("runtime"), files, diagnostics);
+        let sources = section("sources")
+            .map(|section| sources::read(section, graph, plan, diagnostics))
+            .unwrap_or_default();
+        let sinks = section("sinks")
+            .map(|section| sinks::read(section, graph, plan, diagnostics))
+            .unwrap_or_default();
+        let deployment = Self {
+            runtime: runtime?,
+            sources,
+            sinks,
+        };
+        (diagnostics.error_count() == before).then_some(deployment)
+    }
+}
+
+#[cfg(test)]
+mod tests;

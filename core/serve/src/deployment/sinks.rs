@@ -1,0 +1,244 @@
+//! `[sinks.NAME]`: which there are, and which outputs each is given.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use indexmap::IndexSet;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use super::channels::{expand, texts};
+use super::problem::{NoOutput, NotACommand, OtherRate};
+use super::sources::of_kind;
+use super::{DeclaredSink, keys};
+use crate::compile::Plan;
+use crate::connector::{Purpose, sink_kinds};
+use crate::diagnostic::{Diagnostics, Names, Place};
+use crate::document::{Data, Entry, GraphFile, Pattern, Table, Value, decode};
+use crate::quantity::Quantity;
+use crate::time::Duration;
+use crate::unit::Unit;
+
+/// The keys that every sink has.
+pub(super) const KEYS: [&str; 3] = ["outputs", "behind", "rate"];
+
+/// How far behind a tick may lie that is a command.
+const BEHIND: Duration = Duration::from_ns(5_000_000_000);
+
+/// The keys that every sink has.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SinkKeys {
+    /// The outputs that it is given, or columns of them, such as "correction" or "correction.Z1"; all without.
+    #[serde(rename = "outputs")]
+    #[schemars(with = "Option<OutputsForm>")]
+    _outputs: IgnoredAny,
+    /// Only of commands: a tick that lies further behind is not put out; 5 s without.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    behind: Option<Duration>,
+    /// Only of commands: by how much they may change in a time, such as "5 nm/s", for all outputs or each; without bound without.
+    #[serde(rename = "rate")]
+    #[schemars(with = "Option<RateForm>")]
+    _rate: IgnoredAny,
+}
+
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code)] // it is read with places, from the tree
+enum OutputsForm {
+    /// One output.
+    One(String),
+    /// Several.
+    Several(Vec<String>),
+}
+
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code)] // it is read with places, from the tree
+enum RateForm {
+    /// For all outputs.
+    All(Quantity),
+    /// By output.
+    Each(BTreeMap<String, Quantity>),
+}
+
+/// What a sink may be given.
+struct Outputs<'a> {
+    graph: &'a GraphFile,
+    /// Columns, each with its unit per second.
+    columns: Vec<(String, Unit)>,
+    /// Outputs and columns.
+    names: Arc<Names>,
+}
+
+/// Reads all sinks; what is wrong is reported.
+pub(super) fn read(
+    section: &Value,
+    graph: &GraphFile,
+    plan: &Plan,
+    diagnostics: &mut Diagnostics,
+) -> Vec<DeclaredSink> {
+    let per_second = |slot: usize| {
+        let unit = &plan.channels[slot].channel.unit;
+        unit.difference().per(&Unit::second())
+    };
+    let outputs = plan.outputs.iter();
+    let columns: Vec<_> = outputs
+        .map(|of| (of.name.clone(), per_second(of.slot)))
+        .collect();
+    let names = graph.outputs.iter().map(|of| of.name.clone());
+    let names = names.chain(columns.iter().map(|(name, _)| name.clone()));
+    let outputs = Outputs {
+        graph,
+        names: Arc::new(names.collect()),
+        columns,
+    };
+    let named = section.as_table().into_iter().flat_map(Table::iter);
+    let sinks = named.filter_map(|(name, entry)| sink(name, entry, &outputs, diagnostics));
+    sinks.collect()
+}
+
+fn sink(
+    name: &str,
+    entry: &Entry,
+    outputs: &Outputs<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Option<DeclaredSink> {
+    let (own, others) = keys::split(&entry.value, &KEYS);
+    let (_, parameters) = keys::split(&others, &["type"]);
+    let (by_hand, own) = keys::split(&own, &["outputs", "rate"]);
+    let by_hand = |key: &str| by_hand.as_table().and_then(|table| table.get(key));
+    let role = ("sink", name);
+    let kind = of_kind(role, entry, &parameters, sink_kinds(), &KEYS, diagnostics);
+    let what = format!("the sink `{name}`");
+    let keys = keys::read::<SinkKeys>(&own, &what, diagnostics);
+    let columns = match by_hand("outputs") {
+        Some(value) => outputs.read(value, diagnostics),
+        None => (0..outputs.columns.len()).collect(),
+    };
+    let rate = match by_hand("rate") {
+        Some(value) => outputs.rates(value, &columns, diagnostics),
+        None => vec![None; columns.len()],
+    };
+    let (kind, parameters) = kind?;
+    let is_command = parameters.purpose() == Purpose::Command;
+    for key in ["behind", "rate"].into_iter().filter(|_| !is_command) {
+        if let Some(entry) = entry.value.as_table().and_then(|table| table.entry(key)) {
+            let kind = kind.name;
+            diagnostics.report(entry.key, NotACommand { key, kind });
+        }
+    }
+    Some(DeclaredSink {
+        name: name.to_owned(),
+        kind,
+        parameters,
+        outputs: columns
+            .iter()
+            .map(|&column| outputs.columns[column].0.clone())
+            .collect(),
+        behind: is_command.then_some(keys?.behind.unwrap_or(BEHIND)),
+        rate,
+    })
+}
+
+impl Outputs<'_> {
+    /// The columns that an output, a column or a pattern names.
+    fn find(&self, text: &str, place: Place, diagnostics: &mut Diagnostics) -> Vec<usize> {
+        let mut found = Vec::new();
+        for (name, _) in expand(text, place, &self.graph.sets, diagnostics) {
+            let before = found.len();
+            let pattern = Pattern::new(&name);
+            let columns = self.columns.iter().enumerate();
+            found.extend(
+                columns
+                    .filter(|(_, (column, _))| {
+                        let output = column.split_once('.').map_or("", |(output, _)| output);
+                        pattern.matches(column) || pattern.matches(output)
+                    })
+                    .map(|(nth, _)| nth),
+            );
+            if found.len() == before {
+                let problem = NoOutput {
+                    output: name,
+                    is_of_sink: false,
+                    known: Arc::clone(&self.names),
+                };
+                diagnostics.report(place, problem);
+            }
+        }
+        found
+    }
+
+    fn read(&self, value: &Value, diagnostics: &mut Diagnostics) -> Vec<usize> {
+        let texts = texts(value, "outputs", "the name of an output", diagnostics);
+        let found = texts
+            .into_iter()
+            .flat_map(|(text, place)| self.find(text, place, diagnostics));
+        let distinct: IndexSet<usize> = found.collect();
+        distinct.into_iter().collect()
+    }
+
+    /// The rate of each column of a sink.
+    fn rates(
+        &self,
+        value: &Value,
+        columns: &[usize],
+        diagnostics: &mut Diagnostics,
+    ) -> Vec<Option<f64>> {
+        let mut rates = vec![None; columns.len()];
+        let Data::Table(each) = &value.data else {
+            let all: Vec<usize> = (0..columns.len()).collect();
+            self.rate(value, columns, &all, &mut rates, diagnostics);
+            return rates;
+        };
+        // What is said of a column holds against what is said of its output.
+        let (of_columns, of_outputs): (Vec<_>, Vec<_>) =
+            each.iter().partition(|(key, _)| key.contains('.'));
+        for (key, entry) in of_outputs.into_iter().chain(of_columns) {
+            let found = self.find(key, entry.key, diagnostics);
+            let places = columns.iter().enumerate();
+            let places = places.filter(|(_, column)| found.contains(column));
+            let places: Vec<usize> = places.map(|(nth, _)| nth).collect();
+            if places.is_empty() && !found.is_empty() {
+                let given = columns.iter().map(|&nth| self.columns[nth].0.clone());
+                let problem = NoOutput {
+                    output: key.to_owned(),
+                    is_of_sink: true,
+                    known: Arc::new(given.collect()),
+                };
+                diagnostics.report(entry.key, problem);
+            }
+            self.rate(&entry.value, columns, &places, &mut rates, diagnostics);
+        }
+        rates
+    }
+
+    /// A rate in the unit of each of these columns per second.
+    fn rate(
+        &self,
+        value: &Value,
+        columns: &[usize],
+        places: &[usize],
+        rates: &mut [Option<f64>],
+        diagnostics: &mut Diagnostics,
+    ) {
+        let Some(rate) = decode::<Quantity>(value, "`rate`", diagnostics) else {
+            return;
+        };
+        for &nth in places {
+            let (column, unit) = &self.columns[columns[nth]];
+            let per_second = rate.in_unit(unit).filter(|rate| *rate > 0.0);
+            if per_second.is_none() {
+                let problem = OtherRate {
+                    output: column.clone(),
+                    found: rate.clone(),
+                    expected: unit.clone(),
+                };
+                diagnostics.report(value.place, problem);
+                return;
+            }
+            rates[nth] = per_second;
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! `[sources.NAME]`: which there are, and which channels each gives.
+
+use std::collections::HashMap;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use super::channels::{ChannelsForm, Claim, GraphChannels};
+use super::problem::{ChannelTwice, NoAddress, NoSource, UnknownKind};
+use super::{DeclaredChannel, DeclaredSource, keys};
+use crate::compile::Plan;
+use crate::connector::{ConnectorKind, Source, SourceKind, source_kinds};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::problem::MissingKey;
+use crate::document::{Entry, GraphFile, Table, Value};
+use crate::sequencer::{ClockRemedy, ClockRule};
+use crate::time::Duration;
+
+/// The keys that every source has.
+pub(super) const KEYS: [&str; 4] = ["channels", "silent", "clock", "late"];
+
+/// The keys that every source has.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SourceKeys {
+    /// The channels that it gives, a list of patterns such as "temperature.*" or "position.{axis}", or a table of where it has each. All
+    /// that no other source names without.
+    #[serde(rename = "channels")]
+    #[schemars(with = "Option<ChannelsForm>")]
+    _channels: IgnoredAny,
+    /// A source that is away so long is not waited for, and one that gives nothing for so long is started again.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    silent: Duration,
+    /// How its clock is judged by the time at which samples arrive; not at all without.
+    clock: Option<ClockKeys>,
+    /// A sample no later than this is given to the next tick; a channel may have its own.
+    late: Duration,
+}
+
+/// How the clock of a source is judged.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ClockKeys {
+    /// How far a stamp and its arrival may be apart.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    within: Duration,
+    /// What becomes of samples where they are further apart.
+    #[serde(rename = "else", default)]
+    otherwise: Remedy,
+}
+
+/// What becomes of samples of a clock that is wrong.
+#[derive(Debug, Clone, Copy, Default, Deserialize, serde::Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Remedy {
+    /// They are refused.
+    #[default]
+    Refuse,
+    /// Their stamps are shifted by one offset, so that distances stay.
+    Shift,
+    /// They are stamped with their arrival.
+    Arrival,
+}
+
+impl Default for SourceKeys {
+    fn default() -> Self {
+        Self {
+            _channels: IgnoredAny,
+            silent: Duration::from_ns(30_000_000_000),
+            clock: None,
+            late: Duration::ZERO,
+        }
+    }
+}
+
+impl From<ClockKeys> for ClockRule {
+    fn from(keys: ClockKeys) -> Self {
+        Self {
+            within: keys.within,
+            otherwise: match keys.otherwise {
+                Remedy::Refuse => ClockRemedy::Refuse,
+                Remedy::Shift => ClockRemedy::Shift,
+                Remedy::Arrival => ClockRemedy::Arrival,
+            },
+        }
+    }
+}
+
+/// The kind of a source or sink and its parameters, as far as they are right; what is wrong is reported.
+pub(super) fn of_kind<S: ?Sized>(
+    (role, name): (&'static str, &str),
+    entry: &Entry,
+    parameters: &Value,
+    kinds: &'static std::collections::BTreeMap<&'static str, &'static ConnectorKind<S>>,
+    generic: &[&str],
+    diagnostics: &mut Diagnostics,
+) -> Option<(&'static ConnectorKind<S>, Box<S>)> {
+    let what = format!("the {role} `{name}`");
+    let Some(written) = entry.value.as_table()?.get("type") else {
+        let problem = MissingKey {
+            key: "type".to_owned(),
+            what,
+            advice: Some(format!(
+                "name its kind, such as type = \"csv\"; `athermal nodes` lists the kinds of {role}s"
+            )),
+        };
+        diagnostics.report(entry.key, problem);
+        return None;
+    };
+    let Some(text) = written.as_text() else {
+        super::channels::wrong_type(written, "type", "a kind in quotes", diagnostics);
+        return None;
+    };
+    let Some(kind) = kinds.get(text) else {
+        let problem = UnknownKind {
+            role,
+            kind: text.to_owned(),
+            known: kinds.keys().copied().collect(),
+        };
+        diagnostics.report(written.place, problem);
+        return None;
+    };
+    let elsewhere = [&["type"], generic].concat();
+    let read = (kind.read)(parameters, &what, &elsewhere, diagnostics)?;
+    keys::is_in_range((kind.schema)(), parameters, diagnostics).then_some((*kind, read))
+}
+
+/// A source as far as it could be read.
+struct Part<'a> {
+    name: &'a str,
+    place: Place,
+    kind: Option<(&'static SourceKind, Box<dyn Source>)>,
+    keys: Option<SourceKeys>,
+    /// Where its `channels` stand; at its name without.
+    at: Place,
+    /// None where it takes all that no other names.
+    claims: Option<Vec<Claim>>,
+}
+
+/// Reads all sources; what is wrong is reported.
+pub(super) fn read(
+    section: &Value,
+    graph: &GraphFile,
+    plan: &Plan,
+    diagnostics: &mut Diagnostics,
+) -> Vec<DeclaredSource> {
+    let channels = GraphChannels::new(graph);
+    let before = diagnostics.error_count();
+    let named = section.as_table().into_iter().flat_map(Table::iter);
+    let parts = named.map(|(name, entry)| part(name, entry, &channels, diagnostics));
+    let mut parts: Vec<Part<'_>> = parts.collect();
+    let is_whole = diagnostics.error_count() == before;
+    let taken = share(&mut parts, &channels, diagnostics);
+    // Where some are not read, what lacks a source may be theirs.
+    if is_whole {
+        let lacks =
+            |channel: &usize| !plan.sources[*channel].optional && !taken.contains_key(channel);
+        let mut lacking = (0..plan.sources.len()).filter(lacks);
+        if let Some(first) = lacking.next() {
+            let problem = NoSource {
+                channel: plan.sources[first].name.clone(),
+                more: lacking.count(),
+            };
+            diagnostics.report(section.place, problem);
+        }
+    }
+    let declared = parts
+        .into_iter()
+        .filter_map(|part| declared(part, plan, diagnostics));
+    declared.collect()
+}
+
+fn part<'a>(
+    name: &'a str,
+    entry: &'a Entry,
+    channels: &GraphChannels<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Part<'a> {
+    let (own, others) = keys::split(&entry.value, &KEYS);
+    let (_, parameters) = keys::split(&others, &["type"]);
+    let (named, own) = keys::split(&own, &["channels"]);
+    let what = format!("the source `{name}`");
+    let named = named.as_table().and_then(|table| table.get("channels"));
+    Part {
+        name,
+        place: entry.key,
+        kind: of_kind(
+            ("source", name),
+            entry,
+            &parameters,
+            source_kinds(),
+            &KEYS,
+            diagnostics,
+        ),
+        keys: keys::read::<SourceKeys>(&own, &what, diagnostics),
+        at: named.map_or(entry.key, |value| value.place),
+        claims: named.map(|value| channels.read(value, diagnostics)),
+    }
+}
+
+/// Gives each channel to its source: those that are named first, then the others. Those with two are reported. What is given, by number.
+fn share<'a>(
+    parts: &mut [Part<'a>],
+    channels: &GraphChannels<'_>,
+    diagnostics: &mut Diagnostics,
+) -> HashMap<usize, (&'a str, Place)> {
+    let mut taken: HashMap<usize, (&str, Place)> = HashMap::new();
+    let (named, open): (Vec<_>, Vec<_>) = parts.iter_mut().partition(|of| of.claims.is_some());
+    for part in named {
+        // By where a channel is named the second time, and the first.
+        let mut twice: Vec<(Place, ChannelTwice)> = Vec::new();
+        let claims = part.claims.iter_mut().flatten();
+        for claim in claims {
+            let Some(&(first, place)) = taken.get(&claim.channel) else {
+                taken.insert(claim.channel, (part.name, claim.place));
+                continue;
+            };
+            let mut known = twice.iter_mut();
+            match known.find(|(at, of)| *at == claim.place && of.place == place) {
+                Some((_, of)) => of.more += 1,
+                None => twice.push((
+                    claim.place,
+                    ChannelTwice {
+                        channel: channels.all()[claim.channel].name.clone(),
+                        more: 0,
+                        first: first.to_owned(),
+                        place,
+                    },
+                )),
+            }
+        }
+        for (place, problem) in twice {
+            diagnostics.report(place, problem);
+        }
+    }
+    let rest: Vec<usize> = (0..channels.all().len())
+        .filter(|channel| !taken.contains_key(channel))
+        .collect();
+    for (nth, part) in open.into_iter().enumerate() {
+        let (name, place) = (part.name, part.place);
+        if let (1.., Some(channel)) = (nth, rest.first()) {
+            let (first, at) = taken[channel];
+            let problem = ChannelTwice {
+                channel: channels.all()[*channel].name.clone(),
+                more: rest.len() - 1,
+                first: first.to_owned(),
+                place: at,
+            };
+            diagnostics.report(place, problem);
+            continue;
+        }
+        let claim = |&channel: &usize| Claim {
+            channel,
+            place,
+            address: None,
+            conversion: None,
+            late: None,
+        };
+        part.claims = Some(rest.iter().map(claim).collect());
+        for channel in &rest {
+            taken.insert(*channel, (name, place));
+        }
+    }
+    taken
+}
+
+fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Option<DeclaredSource> {
+    let (kind, parameters) = part.kind?;
+    let mut claims = part.claims?;
+    claims.sort_by_key(|claim| claim.channel);
+    if parameters.needs_addresses() {
+        let mut without = claims.iter().filter(|claim| claim.address.is_none());
+        if let Some(claim) = without.next() {
+            let problem = NoAddress {
+                kind: kind.name,
+                channel: plan.sources[claim.channel].name.clone(),
+                more: without.count(),
+            };
+            diagnostics.report(part.at, problem);
+            return None;
+        }
+    }
+    let keys = part.keys?;
+    let channel = |claim: Claim| {
+        let channel = plan.sources[claim.channel].clone();
+        DeclaredChannel {
+            address: claim.address.unwrap_or_else(|| channel.column.clone()),
+            channel,
+            conversion: claim.conversion,
+            late: claim.late.unwrap_or(keys.late),
+        }
+    };
+    Some(DeclaredSource {
+        name: part.name.to_owned(),
+        kind,
+        parameters,
+        silent: keys.silent,
+        channels: claims.into_iter().map(channel).collect(),
+        clock: keys.clock.map(ClockRule::from),
+    })
+}

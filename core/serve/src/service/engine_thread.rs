@@ -1,0 +1,220 @@
+//! The engine thread: takes what sources give, steps what is due, hands rows to sinks. In the steady state it allocates, locks and
+//! waits for nothing but the next arrival or the next moment at which something is due.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::Sender;
+use std::thread::Thread;
+use std::time::Duration as Wait;
+
+use rtrb::{Consumer, Producer};
+
+use super::ServiceEvent;
+use super::frames::FrameSender;
+use super::status::{Shared, Snapshot};
+use crate::compile::Plan;
+use crate::connector::{Arrival, SourceLink};
+use crate::diagnostic::panic_text;
+use crate::engine::EngineError;
+use crate::moment::{Moment, MonotonicClock};
+use crate::sequencer::Admission;
+use crate::worker::{Output, Worker};
+
+/// How many arrivals of a source are taken before time is looked at again.
+const BATCH: usize = 256;
+/// The longest sleep, so that a beat shows that the thread lives.
+const NAP: Wait = Wait::from_millis(100);
+
+/// What the control thread asks of the engine thread.
+#[derive(Debug)]
+pub(super) enum Order {
+    Freeze(bool),
+    Note(Box<str>),
+    /// To step what waits, and end.
+    Stop,
+}
+
+/// All that the engine thread has.
+pub(super) struct EngineThread {
+    pub(super) worker: Worker,
+    pub(super) clock: MonotonicClock,
+    pub(super) sources: Vec<SourceLink>,
+    pub(super) sinks: Sinks,
+    pub(super) orders: Consumer<Order>,
+    /// Samples that were not accepted, some of them: for whoever reports.
+    pub(super) remarks: Producer<(Admission, u64)>,
+    pub(super) shared: Arc<Shared>,
+    pub(super) events: Sender<ServiceEvent>,
+}
+
+/// Where rows go.
+pub(super) struct Sinks {
+    pub(super) senders: Vec<FrameSender>,
+    /// The columns of each sink.
+    pub(super) columns: Vec<Vec<String>>,
+    pub(super) threads: Vec<Thread>,
+    /// How many graphs had taken over when the columns were looked up.
+    generation: Option<u64>,
+    revision: u64,
+}
+
+impl Sinks {
+    pub(super) fn new(senders: Vec<FrameSender>, columns: Vec<Vec<String>>) -> Self {
+        Self {
+            senders,
+            columns,
+            threads: Vec::new(),
+            generation: None,
+            revision: 0,
+        }
+    }
+
+    fn put(&mut self, output: &Output<'_>) {
+        let stepped = &output.stepped;
+        if self.generation != Some(stepped.generation) {
+            self.generation = Some(stepped.generation);
+            self.revision = u64::from_str_radix(stepped.revision, 16).unwrap_or_default();
+            self.wire(stepped.plan);
+        }
+        for (sender, thread) in self.senders.iter_mut().zip(&self.threads) {
+            sender.send(output, self.revision);
+            thread.unpark();
+        }
+    }
+
+    /// Looks up where the columns stand among the outputs of a graph that has taken over.
+    fn wire(&mut self, plan: &Plan) {
+        for (sender, columns) in self.senders.iter_mut().zip(&self.columns) {
+            let place = |column: &String| plan.outputs.iter().position(|of| of.name == *column);
+            sender.wire(columns.iter().map(place));
+        }
+    }
+}
+
+impl EngineThread {
+    /// Runs until it is to stop, or all sources have ended. Gives the worker back.
+    pub(super) fn run(mut self) -> Worker {
+        let ran = catch_unwind(AssertUnwindSafe(|| self.work()));
+        let failure = match ran {
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some(error.to_string()),
+            Err(panic) => Some(panic_text(&*panic)),
+        };
+        if let Some(failure) = failure {
+            let _ = self.events.send(ServiceEvent::EngineFailed(failure));
+        }
+        self.publish();
+        self.worker
+    }
+
+    fn work(&mut self) -> Result<(), EngineError> {
+        let mut left = self.sources.len();
+        let mut published = Moment::START;
+        loop {
+            self.shared.beat.fetch_add(1, Ordering::Relaxed);
+            let mut is_stopped = false;
+            while let Ok(order) = self.orders.pop() {
+                match order {
+                    Order::Freeze(frozen) => self.worker.freeze(frozen),
+                    Order::Note(text) => self.worker.note(text),
+                    Order::Stop => is_stopped = true,
+                }
+            }
+            let mut has_more = false;
+            for nth in 0..self.sources.len() {
+                has_more |= self.take(nth, &mut left)?;
+            }
+            let now = self.clock.now();
+            let sinks = &mut self.sinks;
+            self.worker.pass(now, |output| sinks.put(output))?;
+            if is_stopped || left == 0 {
+                return self.worker.finish(now, |output| sinks.put(output));
+            }
+            if now - published >= Shared::EVERY {
+                published = now;
+                self.publish();
+            }
+            if has_more {
+                continue;
+            }
+            let due = self.worker.due();
+            let nap = due.map_or(NAP, |due| {
+                let ns = (due - self.clock.now()).as_ns();
+                Wait::from_nanos(ns.max(0) as u64).min(NAP)
+            });
+            if !nap.is_zero() {
+                std::thread::park_timeout(nap);
+            }
+        }
+    }
+
+    /// Takes what a source has given; true where there may be more.
+    fn take(&mut self, nth: usize, left: &mut usize) -> Result<bool, EngineError> {
+        for _ in 0..BATCH {
+            let Some(arrival) = self.sources[nth].next() else {
+                self.recorded(nth);
+                return Ok(false);
+            };
+            let now = self.clock.now();
+            match arrival {
+                Arrival::Sample(sample) => {
+                    let admission = self.worker.arrive(sample, now);
+                    if !matches!(admission, Admission::Accepted(_) | Admission::Held) {
+                        self.remark(sample.channel as usize, admission);
+                    }
+                }
+                Arrival::Connected => self.worker.sequencer().connected(nth, now),
+                Arrival::Away => self.worker.sequencer().away(nth, now),
+                Arrival::Segment => {
+                    let sinks = &mut self.sinks;
+                    self.worker.segment(now, |output| sinks.put(output))?;
+                }
+                Arrival::Ended => {
+                    self.worker.sequencer().ended(nth);
+                    *left -= 1;
+                }
+            }
+        }
+        self.recorded(nth);
+        Ok(true)
+    }
+
+    fn recorded(&mut self, nth: usize) {
+        if !self.worker.sequencer().holds(nth) {
+            self.sources[nth].recorded(self.worker.recorder().event());
+        }
+    }
+
+    /// Hands the first of a reason on, the tenth, the hundredth …
+    fn remark(&mut self, channel: usize, admission: Admission) {
+        let counts = self.worker.sequencer().counts().get(channel);
+        let count = counts.map_or(1, |counts| counts.of(admission));
+        if count
+            .checked_ilog10()
+            .is_some_and(|of| 10_u64.pow(of) == count)
+        {
+            let _ = self.remarks.push((admission, count));
+        }
+    }
+
+    fn publish(&mut self) {
+        let newest = self.worker.sequencer().newest(self.clock.now());
+        let sequencer = self.worker.sequencer();
+        // Whoever reads does so for a moment; otherwise a second later does.
+        if let Ok(mut snapshot) = self.shared.snapshot.try_lock() {
+            let Snapshot {
+                counts,
+                hurried,
+                last,
+                newest: known,
+                ..
+            } = &mut *snapshot;
+            counts.clone_from_slice(sequencer.counts());
+            *hurried = sequencer.hurried();
+            *last = sequencer.timeline().last();
+            *known = newest;
+            snapshot.happenings = self.worker.recorder().happenings();
+        }
+    }
+}

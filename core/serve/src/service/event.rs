@@ -1,0 +1,73 @@
+//! What a service reports while it runs. Whoever runs it puts that into words.
+
+use athermal_run::live::Notice;
+
+use crate::checkpoint::CheckpointError;
+use crate::connector::ConnectorError;
+use crate::engine::NodeCarry;
+use crate::journal::JournalStatus;
+use crate::sequencer::Admission;
+
+/// What happened.
+#[derive(Debug)]
+pub enum ServiceEvent {
+    /// A source failed, and is started again after a while.
+    SourceFailed {
+        /// Its name.
+        source: String,
+        /// Why.
+        error: ConnectorError,
+        /// After so many seconds.
+        again_s: f64,
+    },
+    /// A source left something out.
+    SourceRemark {
+        /// Its name.
+        source: String,
+        /// What, and why.
+        words: String,
+    },
+    /// A source has come to its end.
+    SourceEnded {
+        /// Its name.
+        source: String,
+    },
+    /// A sink cannot put a row out; it is tried again after a while, and rows wait meanwhile.
+    SinkFailed {
+        /// Its name.
+        sink: String,
+        /// Why.
+        error: ConnectorError,
+    },
+    /// A sink that had failed puts out again.
+    SinkBack {
+        /// Its name.
+        sink: String,
+    },
+    /// A sample was not accepted: the first of its channel and reason, the tenth, the hundredth …
+    NotAccepted {
+        /// Why.
+        admission: Admission,
+        /// How many so far.
+        count: u64,
+    },
+    /// Something happened at a hand-over.
+    Swap(Notice),
+    /// Another graph than that of the last checkpoint was given, and takes over.
+    Staged {
+        /// Its revision.
+        revision: String,
+        /// What becomes of each node.
+        carry: Vec<NodeCarry>,
+    },
+    /// Another graph than that of the last checkpoint was given, and cannot take over: what ran last goes on.
+    NotStaged(String),
+    /// A checkpoint was not written; it is tried again.
+    NoCheckpoint(CheckpointError),
+    /// The journal cannot be written, or can again.
+    Journal(JournalStatus),
+    /// The code of a node panicked: it is absent from then on, and the graph goes on.
+    NodeGivenUp(String),
+    /// The engine cannot go on: the service ends.
+    EngineFailed(String),
+}

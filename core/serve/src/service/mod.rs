@@ -1,0 +1,619 @@
+//! A service: sources, an engine thread with its journal, sinks, and a control thread, which is the caller's.
+//!
+//! ```text
+//!  source threads ─ring─▶ engine thread: sequencer → stepper ─ring─▶ sink threads
+//!                              │ records                                ▲ wait until written
+//!                              ├─ring─▶ journal thread ─────────────────┘
+//!                              └─ring─▶ control (the caller): replica, checkpoints, swaps, reports
+//! ```
+
+mod command;
+mod engine_thread;
+mod error;
+mod event;
+mod frames;
+mod position;
+mod sink_thread;
+mod sinks;
+mod source_thread;
+mod status;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration as Wait, Instant as Clock};
+
+use athermal_run::live::{Feed, LiveOptions, StageError, pair_from};
+use athermal_run::model::Model;
+use rtrb::{Consumer, Producer, RingBuffer};
+
+pub use error::ServiceError;
+pub use event::ServiceEvent;
+pub use frames::SinkCounts;
+pub use status::Snapshot;
+
+use crate::checkpoint::Checkpoints;
+use crate::compile::Plan;
+use crate::connector::{
+    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel,
+    WiredOutput, link,
+};
+use crate::deployment::{Deployment, Runtime};
+use crate::folder::StateFolder;
+use crate::journal::{FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, retire};
+use crate::keeper::Keeper;
+use crate::moment::MonotonicClock;
+use crate::recovery::{Recovered, RecoveryReport};
+use crate::sequencer::{Admission, ChannelRules, Rules, Sequencer, SourceRules};
+use crate::time::{Duration, Instant};
+use crate::worker::Worker;
+use command::CommandGate;
+use engine_thread::{EngineThread, Order, Sinks};
+use frames::frames;
+use sink_thread::SinkThread;
+use sinks::OpenSink;
+use status::Shared;
+
+/// How many arrivals of a source may wait for the engine thread.
+const ARRIVALS: usize = 1 << 14;
+/// How many rows may wait for a sink.
+const ROWS: usize = 1 << 13;
+/// How often old files of the journal are looked at.
+const RETIRE: Wait = Wait::from_secs(60);
+/// How long the threads may take to end.
+const ENDS: Wait = Wait::from_secs(5);
+
+/// How a service is run.
+#[derive(Debug, Clone)]
+pub struct ServiceOptions {
+    /// The state folder.
+    pub state: PathBuf,
+    /// The folder that relative paths of sources and sinks start from.
+    pub folder: PathBuf,
+    /// Whether commands are not put out.
+    pub is_dry: bool,
+    /// Whether estimators learn nothing.
+    pub frozen: bool,
+}
+
+/// A service at work.
+pub struct Service {
+    keeper: Keeper,
+    engine: JoinHandle<Worker>,
+    orders: Producer<Order>,
+    remarks: Consumer<(Admission, u64)>,
+    heard: Vec<(String, Receiver<String>)>,
+    shared: Arc<Shared>,
+    progress: Arc<Progress>,
+    stop_sources: Stop,
+    stop_sinks: Stop,
+    sources: Vec<(String, Arc<SourceCounts>)>,
+    source_threads: Vec<JoinHandle<()>>,
+    sinks: Vec<(String, Arc<SinkCounts>)>,
+    sink_threads: Vec<JoinHandle<()>>,
+    channels: Vec<String>,
+    events: Receiver<ServiceEvent>,
+    own: Vec<ServiceEvent>,
+    folder: StateFolder,
+    keep: Keep,
+    retired: Clock,
+    is_degraded: bool,
+    /// How many nodes were given up and reported.
+    given_up: usize,
+    has_failed: bool,
+}
+
+/// What is left of a service that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// What became of the samples of each channel.
+    pub channels: Vec<(String, crate::sequencer::Counts)>,
+    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
+    pub happenings: u64,
+    /// How many ticks were cut early because too many samples waited.
+    pub hurried: u64,
+    /// How the journal is.
+    pub journal: JournalStatus,
+    /// Whether the engine could not go on.
+    pub has_failed: bool,
+}
+
+impl Service {
+    /// Starts a service from where its state folder says that it was. `model` is the graph that is to run.
+    ///
+    /// # Errors
+    /// When the state cannot be used, or a source or sink cannot be what the machine file asks for.
+    pub fn start(
+        model: &Model,
+        deployment: Deployment,
+        options: &ServiceOptions,
+    ) -> Result<(Self, RecoveryReport), ServiceError> {
+        let Deployment {
+            runtime,
+            sources,
+            sinks,
+        } = deployment;
+        let folder = StateFolder::open(&options.state)?;
+        if let Some(revision) = model.revision() {
+            folder.keep_model(model, &revision)?;
+        }
+        let time = &model.plan.time;
+        let units = outputs(&model.plan);
+        let open = |declared: crate::deployment::DeclaredSink| {
+            let wiring = sinks::wiring(&declared, &units, &options.folder, time);
+            OpenSink::open(declared, wiring, &folder)
+        };
+        let sinks: Result<Vec<_>, _> = sinks.into_iter().map(open).collect();
+        let mut sinks = sinks?;
+        let least = sinks.iter_mut().filter_map(OpenSink::least).min();
+        let names: Vec<_> = sources.iter().map(|of| of.name.clone()).collect();
+        let given = Feed::of(&model.plan);
+        let checkpoints = Checkpoints::new(folder.checkpoints(), runtime.keep.checkpoints);
+        let feed = |plan: &Plan| FeedNames::new(&fed(plan, &given), names.clone());
+        let mut failed = None;
+        let recovered = Recovered::find(
+            &folder,
+            &checkpoints,
+            model,
+            feed,
+            least.unwrap_or(u64::MAX),
+            |happenings, engine| {
+                for sink in &mut sinks {
+                    let again = sink.again(happenings, engine);
+                    failed = failed.take().or(again.err());
+                }
+            },
+        )?;
+        failed.map_or(Ok(()), Err)?;
+        let happenings = recovered.happenings();
+        for sink in &mut sinks {
+            sink.settle(happenings)?;
+        }
+        let journal = JournalOptions {
+            sync: wait(runtime.sync),
+            ..JournalOptions::default()
+        };
+        let recorder = Recorder::start(&folder.journal(), recovered.begin(), journal)?;
+        let progress = Arc::clone(recorder.progress());
+        let clock = MonotonicClock::start();
+        let feed = fed(recovered.engine.plan(), &given);
+        let place = |name: &str| feed.iter().position(|of| of.name == name);
+        let rules = rules(&runtime, &sources, &feed);
+        let stamps = recovered.timeline.stamps().to_vec();
+        let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
+        let live = LiveOptions {
+            isolates: true,
+            channels: given.clone(),
+            ..LiveOptions::default()
+        };
+        let differs = recovered.model.revision() != model.revision();
+        let (stepper, control) = pair_from(recovered.engine, live)?;
+        let every = wait(runtime.checkpoint);
+        let keeper = Keeper::new(
+            control,
+            checkpoints,
+            Arc::clone(&progress),
+            happenings,
+            every,
+        );
+        let mut worker = Worker::new(sequencer, stepper, recorder);
+        if options.frozen {
+            worker.freeze(true);
+        }
+        let (to_engine, orders) = RingBuffer::new(64);
+        let (remarks, from_engine) = RingBuffer::new(256);
+        let (tell, events) = channel();
+        let shared = Arc::new(Shared::new(feed.len()));
+        let (stop_sources, stop_sinks) = (Stop::default(), Stop::default());
+        // Sinks first: nothing that comes is put out into nowhere.
+        let (mut senders, mut columns, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
+        for sink in sinks {
+            let (sender, receiver) = frames(ROWS, sink.declared.outputs.len(), &sink.counts);
+            senders.push(sender);
+            columns.push(sink.declared.outputs.clone());
+            waiting.push((sink, receiver));
+        }
+        let mut out = Sinks::new(senders, columns);
+        let (mut sink_threads, mut sink_counts) = (Vec::new(), Vec::new());
+        for (mut sink, frames) in waiting {
+            let gate = (sink.declared.parameters.purpose() == Purpose::Command).then(|| {
+                let mut gate = CommandGate::new(sink.declared.behind, sink.declared.rate.clone());
+                let known = sink.was.as_ref().map(|of| applied(&of.applied));
+                if let Some(applied) = sink.outlet.applied().or(known) {
+                    gate.start_from(&applied);
+                }
+                gate
+            });
+            sink_counts.push((sink.declared.name.clone(), Arc::clone(&sink.counts)));
+            let thread = SinkThread {
+                is_dry: options.is_dry && gate.is_some(),
+                name: sink.declared.name,
+                outlet: sink.outlet,
+                frames,
+                counts: sink.counts,
+                gate,
+                position: sink.position,
+                progress: Arc::clone(&progress),
+                stop: stop_sinks.clone(),
+                events: tell.clone(),
+            };
+            let handle = spawn("sink", move || thread.run())?;
+            out.threads.push(handle.thread().clone());
+            sink_threads.push(handle);
+        }
+        // The engine thread waits for the links of sources, which need to know it.
+        let (hand_over, links) = channel();
+        let engine_thread = {
+            let (shared, tell) = (Arc::clone(&shared), tell.clone());
+            spawn("engine", move || {
+                let sources = links.recv().unwrap_or_default();
+                let thread = EngineThread {
+                    worker,
+                    clock,
+                    sources,
+                    sinks: out,
+                    orders,
+                    remarks,
+                    shared,
+                    events: tell,
+                };
+                thread.run()
+            })?
+        };
+        let (mut inlets, mut links, mut source_counts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut heard = Vec::new();
+        for source in sources {
+            let after = |name: &str| place(name).map_or(Instant::MIN, |place| stamps[place]);
+            let unit = |name: &str| {
+                let mut sources = model.plan.sources.iter().zip(&model.plan.channels);
+                let found = sources.find(|(of, _)| of.name == name);
+                found.map_or_else(crate::unit::Unit::one, |(_, of)| of.channel.unit.clone())
+            };
+            let wired = source.channels.iter().map(|of| WiredChannel {
+                unit: unit(&of.channel.name),
+                channel: of.channel.clone(),
+                address: of.address.clone(),
+                conversion: of.conversion,
+                after: after(&of.channel.name),
+            });
+            let wired: Vec<_> = wired.collect();
+            let places = wired.iter().filter_map(|of| place(&of.channel.name));
+            let places: Vec<_> = places.map(|place| place as u32).collect();
+            let (remarks, words) = Remarks::new();
+            let (outflow, link) = link(
+                ARRIVALS,
+                &wired,
+                &places,
+                source.parameters.stamps(),
+                (
+                    engine_thread.thread().clone(),
+                    Arc::clone(&progress),
+                    remarks,
+                ),
+            );
+            heard.push((source.name.clone(), words));
+            let wiring = SourceWiring {
+                name: source.name.clone(),
+                folder: options.folder.clone(),
+                channels: wired,
+                time: time.clone(),
+                table: model.plan.table.clone(),
+            };
+            let inlet = source.parameters.open(wiring);
+            let inlet = inlet.map_err(|error| ServiceError::Source {
+                source: source.name.clone(),
+                error,
+            })?;
+            source_counts.push((source.name.clone(), Arc::clone(outflow.counts())));
+            links.push(link);
+            inlets.push((source.name, inlet, outflow));
+        }
+        let _ = hand_over.send(links);
+        let source_threads = inlets
+            .into_iter()
+            .map(|(name, inlet, outflow)| source(name, inlet, outflow, &stop_sources, &tell))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut service = Self {
+            keeper,
+            engine: engine_thread,
+            orders: to_engine,
+            remarks: from_engine,
+            heard,
+            shared,
+            progress,
+            stop_sources,
+            stop_sinks,
+            sources: source_counts,
+            source_threads,
+            sinks: sink_counts,
+            sink_threads,
+            channels: feed.iter().map(|of| of.name.clone()).collect(),
+            events,
+            own: Vec::new(),
+            folder,
+            keep: keep(&runtime),
+            retired: Clock::now(),
+            is_degraded: false,
+            given_up: 0,
+            has_failed: false,
+        };
+        if differs {
+            service.replace(model);
+        }
+        Ok((service, recovered.report))
+    }
+
+    /// What happened since the last call. Call it ten times a second: it also takes checkpoints.
+    pub fn pump(&mut self) -> Vec<ServiceEvent> {
+        let mut events = std::mem::take(&mut self.own);
+        match self.keeper.pump() {
+            Ok(notices) => events.extend(notices.into_iter().map(ServiceEvent::Swap)),
+            Err(error) => events.push(ServiceEvent::NoCheckpoint(error)),
+        }
+        while let Ok((admission, count)) = self.remarks.pop() {
+            events.push(ServiceEvent::NotAccepted { admission, count });
+        }
+        for (source, words) in &self.heard {
+            let remark = |words| ServiceEvent::SourceRemark {
+                source: source.clone(),
+                words,
+            };
+            events.extend(words.try_iter().map(remark));
+        }
+        while let Ok(event) = self.events.try_recv() {
+            self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
+            events.push(event);
+        }
+        let replica = self.keeper.control().replica();
+        let panics = replica.map_or(&[][..], crate::engine::Engine::panics);
+        for panic in panics.iter().skip(self.given_up) {
+            events.push(ServiceEvent::NodeGivenUp(panic.to_string()));
+        }
+        self.given_up = panics.len();
+        let status = self.progress.status();
+        if status.is_degraded != self.is_degraded {
+            self.is_degraded = status.is_degraded;
+            events.push(ServiceEvent::Journal(status));
+        }
+        if self.retired.elapsed() >= RETIRE {
+            self.retired = Clock::now();
+            let needed = self.keeper.oldest().unwrap_or_default();
+            // What stays does no harm.
+            let _ = retire(&self.folder.journal(), self.keep, needed);
+        }
+        events
+    }
+
+    /// Whether all sources have come to their ends, or the engine cannot go on.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.engine.is_finished()
+    }
+
+    /// How often the engine thread has gone round: it lives for as long as this grows.
+    #[must_use]
+    pub fn beat(&self) -> u64 {
+        self.shared.beat.load(Ordering::Relaxed)
+    }
+
+    /// What the engine thread knew within the last second or two.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        let snapshot = self.shared.snapshot.lock();
+        snapshot.map_or_else(|poisoned| poisoned.into_inner().clone(), |of| of.clone())
+    }
+
+    /// The channels, in the order of [`Snapshot::counts`].
+    #[must_use]
+    pub fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    /// The sources, and what each counts.
+    #[must_use]
+    pub fn sources(&self) -> &[(String, Arc<SourceCounts>)] {
+        &self.sources
+    }
+
+    /// The sinks, and what each counts.
+    #[must_use]
+    pub fn sinks(&self) -> &[(String, Arc<SinkCounts>)] {
+        &self.sinks
+    }
+
+    /// How the journal is.
+    #[must_use]
+    pub fn journal(&self) -> JournalStatus {
+        self.progress.status()
+    }
+
+    /// Freezes learning, or lets it go on, before the next tick.
+    pub fn freeze(&mut self, frozen: bool) {
+        self.order(Order::Freeze(frozen));
+    }
+
+    /// Writes a remark into the journal.
+    pub fn note(&mut self, text: &str) {
+        self.order(Order::Note(text.into()));
+    }
+
+    /// Lets a graph take over before the next tick, with what it can take of the states of what runs.
+    ///
+    /// # Errors
+    /// When it cannot take over; what runs is untouched.
+    pub fn swap(&mut self, model: &Model) -> Result<Vec<crate::engine::NodeCarry>, StageError> {
+        let control = self.keeper.control();
+        let carry = control.stage(model, false)?.carry().to_vec();
+        control.commit()?;
+        Ok(carry)
+    }
+
+    /// Ends: what waits is stepped, rows are put out, the journal is synced, and a checkpoint is taken.
+    ///
+    /// # Errors
+    /// When the last checkpoint cannot be written. Everything is in the journal all the same.
+    pub fn stop(mut self) -> Result<(Ended, Vec<ServiceEvent>), ServiceError> {
+        self.stop_sources.ask();
+        self.order(Order::Stop);
+        let mut events = Vec::new();
+        let began = Clock::now();
+        while !self.engine.is_finished() && began.elapsed() < ENDS {
+            events.extend(self.pump());
+            std::thread::sleep(Wait::from_millis(2));
+        }
+        let worker = self.engine.is_finished().then(|| self.engine.join());
+        let mut has_failed = self.has_failed;
+        if let Some(Ok(worker)) = worker {
+            let (_, _, recorder) = worker.into_parts();
+            recorder.finish();
+        } else {
+            has_failed = true;
+        }
+        let ended = |thread: &JoinHandle<()>| thread.is_finished();
+        while !self.sink_threads.iter().all(ended) && began.elapsed() < ENDS {
+            std::thread::sleep(Wait::from_millis(2));
+        }
+        self.stop_sinks.ask();
+        let snapshot = self.shared.snapshot.lock();
+        let snapshot =
+            snapshot.map_or_else(|poisoned| poisoned.into_inner().clone(), |of| of.clone());
+        events.extend(self.events.try_iter());
+        let ended = Ended {
+            channels: self.channels.into_iter().zip(snapshot.counts).collect(),
+            happenings: snapshot.happenings,
+            hurried: snapshot.hurried,
+            journal: self.progress.status(),
+            has_failed,
+        };
+        if !has_failed {
+            self.keeper.finish()?;
+        }
+        // A source that does not stop does not keep the program from ending.
+        drop(self.source_threads);
+        Ok((ended, events))
+    }
+
+    fn order(&mut self, order: Order) {
+        if self.orders.push(order).is_ok() {
+            self.engine.thread().unpark();
+        }
+    }
+
+    /// Lets the graph that was given take over from the one that ran last.
+    fn replace(&mut self, model: &Model) {
+        let event = match self.swap(model) {
+            Ok(carry) => ServiceEvent::Staged {
+                revision: model.revision().unwrap_or_default(),
+                carry,
+            },
+            Err(error) => ServiceEvent::NotStaged(error.to_string()),
+        };
+        self.own.push(event);
+    }
+}
+
+impl std::fmt::Debug for Service {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Service")
+            .field("sources", &self.sources)
+            .field("sinks", &self.sinks)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The channels that samples are given for: those of what runs, then those of what is to run.
+fn fed(plan: &Plan, given: &[Feed]) -> Vec<Feed> {
+    let mut feed = Feed::of(plan);
+    for channel in given {
+        if !feed.contains(channel) {
+            feed.push(channel.clone());
+        }
+    }
+    feed
+}
+
+fn rules(runtime: &Runtime, sources: &[crate::deployment::DeclaredSource], feed: &[Feed]) -> Rules {
+    let channel = |of: &Feed| {
+        let mut wired = sources.iter().enumerate().flat_map(|(nth, source)| {
+            let channels = source.channels.iter();
+            channels.map(move |channel| (nth, channel))
+        });
+        let found = wired.find(|(_, channel)| channel.channel.name == of.name);
+        found.map_or_else(ChannelRules::default, |(source, channel)| ChannelRules {
+            source,
+            late: channel.late,
+        })
+    };
+    Rules {
+        wait: runtime.wait,
+        join: runtime.join,
+        settle: runtime.settle,
+        future: runtime.future,
+        heartbeat: runtime.heartbeat,
+        sources: sources
+            .iter()
+            .map(|of| SourceRules {
+                silent: of.silent,
+                clock: of.clock,
+                is_in_order: of.parameters.stamps() == Stamps::Order,
+            })
+            .collect(),
+        channels: feed.iter().map(channel).collect(),
+        ..Rules::default()
+    }
+}
+
+fn outputs(plan: &Plan) -> Vec<WiredOutput> {
+    let output = |of: &crate::compile::PlannedOutput| WiredOutput {
+        name: of.name.clone(),
+        unit: Some(plan.channels[of.slot].channel.unit.text().to_owned()),
+    };
+    plan.outputs.iter().map(output).collect()
+}
+
+fn keep(runtime: &Runtime) -> Keep {
+    Keep {
+        age: runtime.keep.journal.map_or(Wait::MAX, wait),
+        at_most: runtime.keep.at_most.unwrap_or(u64::MAX),
+    }
+}
+
+fn wait(duration: Duration) -> Wait {
+    Wait::from_nanos(duration.as_ns().max(0) as u64)
+}
+
+fn applied(known: &[Option<f64>]) -> Vec<f64> {
+    let value = |of: &Option<f64>| of.unwrap_or(f64::NAN);
+    known.iter().map(value).collect()
+}
+
+fn source(
+    name: String,
+    mut inlet: Box<dyn Inlet>,
+    out: Outflow,
+    stop: &Stop,
+    events: &Sender<ServiceEvent>,
+) -> Result<JoinHandle<()>, ServiceError> {
+    let (stop, events) = (stop.clone(), events.clone());
+    spawn("source", move || {
+        source_thread::run(&name, &mut *inlet, out, &stop, &events);
+    })
+}
+
+fn spawn<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, ServiceError> {
+    let thread = Builder::new().name(name.to_owned()).spawn(work);
+    thread.map_err(ServiceError::Thread)
+}
+
+/// The folder that a service keeps its state in where the machine file names none: beside that file.
+#[must_use]
+pub fn usual_state(machine: &Path) -> PathBuf {
+    machine.with_extension("state")
+}

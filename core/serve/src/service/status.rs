@@ -1,0 +1,48 @@
+//! What a service knows of itself, for whoever asks.
+
+use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
+
+use crate::sequencer::Counts;
+use crate::time::{Duration, Instant};
+
+/// What the engine thread publishes.
+#[derive(Debug)]
+pub(super) struct Shared {
+    /// Grows for as long as the engine thread lives.
+    pub(super) beat: AtomicU64,
+    pub(super) snapshot: Mutex<Snapshot>,
+}
+
+impl Shared {
+    /// How often the engine thread publishes.
+    pub(super) const EVERY: Duration = Duration::from_ns(1_000_000_000);
+
+    pub(super) fn new(channels: usize) -> Self {
+        Self {
+            beat: AtomicU64::new(0),
+            snapshot: Mutex::new(Snapshot {
+                counts: vec![Counts::default(); channels],
+                hurried: 0,
+                happenings: 0,
+                last: Instant::MIN,
+                newest: None,
+            }),
+        }
+    }
+}
+
+/// What the engine thread knew when it last published.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// What became of the samples of each channel.
+    pub counts: Vec<Counts>,
+    /// How many ticks were cut early because too many samples waited.
+    pub hurried: u64,
+    /// How many ticks, beats, breaks and freezes there were.
+    pub happenings: u64,
+    /// The last tick.
+    pub last: Instant,
+    /// The newest stamp, and the time since.
+    pub newest: Option<Instant>,
+}

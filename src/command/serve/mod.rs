@@ -1,0 +1,160 @@
+//! `athermal serve`: a machine file as a service.
+
+pub(super) mod events;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use athermal::Model;
+use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::serve::deployment::Deployment;
+use athermal::serve::service::{Ended, Service, ServiceError, ServiceOptions, usual_state};
+use clap::Args;
+use serde_json::json;
+
+use super::model::check_fitted;
+use super::run::stop;
+use crate::message::Message;
+use crate::terminal::{Answer, Failure, Terminal};
+use athermal_analysis::figures::counted;
+
+/// How often is looked at what happened.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Run a machine file as a service: sources in, corrections out, nothing lost
+///
+/// Takes what the sources of the file give, steps its graph, and hands every tick to its sinks. What was accepted is in a journal
+/// before its outputs leave, so that a service that was killed goes on as if it had not been. A source or sink that fails is tried
+/// again; a bad row or message is counted and left out. Ends when all sources have, or at Ctrl-C.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  athermal serve machine.toml\n  athermal serve machine.toml --dry-run"
+)]
+pub struct Serve {
+    /// A graph with `[sources]`, `[sinks]` and `[runtime]`, and the `model` that it names
+    machine: PathBuf,
+    /// Keep the state in this folder, and not where the file says or beside it
+    #[arg(long, value_name = "FOLDER")]
+    state: Option<PathBuf>,
+    /// Do everything but send commands
+    #[arg(long)]
+    dry_run: bool,
+    /// Let no estimator learn while it runs; votes still go by recent errors
+    #[arg(long)]
+    frozen: bool,
+}
+
+impl Serve {
+    /// Serves until all sources have ended, or a signal comes.
+    ///
+    /// # Errors
+    /// When the file has mistakes, or the state cannot be used.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let (model, deployment) = self.load(terminal)?;
+        let beside = || usual_state(&self.machine);
+        let declared = deployment.runtime.state.clone();
+        let state = self.state.clone().or(declared).unwrap_or_else(beside);
+        let folder = self.machine.parent().unwrap_or(Path::new("."));
+        let options = ServiceOptions {
+            state: state.clone(),
+            folder: folder.to_owned(),
+            is_dry: self.dry_run,
+            frozen: self.frozen,
+        };
+        stop::listen_for_the_end();
+        let started = Service::start(&model, deployment, &options);
+        let (mut service, report) = started.map_err(refused)?;
+        events::recovered(terminal, &state, &report);
+        let channels = service.channels().to_vec();
+        let reports = events::Events {
+            terminal: *terminal,
+            channels: &channels,
+        };
+        while !service.is_over() && !stop::is_stopped() {
+            for event in service.pump() {
+                reports.report(event);
+            }
+            std::thread::sleep(LOOK);
+        }
+        let sinks = service.sinks().to_vec();
+        let (ended, events) = service.stop().map_err(refused)?;
+        for event in events {
+            reports.report(event);
+        }
+        summary(terminal, &ended);
+        events::sinks(terminal, &sinks);
+        if ended.has_failed {
+            return Err(Failure::Outside(format!(
+                "the service ended early; what was accepted is in {}",
+                state.display()
+            )));
+        }
+        Ok(Answer::Fine)
+    }
+
+    fn load(&self, terminal: &Terminal) -> Result<(Model, Deployment), Failure> {
+        let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
+        let loaded = Model::load_from(&self.machine, Wanted::default(), &mut sources, &mut doubts);
+        let model = loaded?;
+        let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut doubts);
+        let Some(deployment) = deployment.filter(|_| !doubts.has_errors()) else {
+            return Err(Failure::Graph {
+                diagnostics: Box::new(doubts),
+                sources: Box::new(sources),
+            });
+        };
+        terminal.doubts(&doubts, &sources);
+        check_fitted(&model, &self.machine)?;
+        super::model::warn_unfitted(terminal, &model, &self.machine);
+        Ok((model, deployment))
+    }
+}
+
+fn refused(error: ServiceError) -> Failure {
+    match error {
+        ServiceError::Source { .. } | ServiceError::Unfit(_) => Failure::Request(error.to_string()),
+        other => Failure::Outside(other.to_string()),
+    }
+}
+
+fn summary(terminal: &Terminal, ended: &Ended) {
+    for (channel, counts) in &ended.channels {
+        let left_out = [
+            (counts.late, "late"),
+            (counts.twice, "repeated"),
+            (counts.future, "from the future"),
+            (counts.clock, "of a wrong clock"),
+        ];
+        let left_out = left_out.into_iter().filter(|(count, _)| *count > 0);
+        let words: Vec<_> = left_out
+            .map(|(count, why)| format!("{count} {why}"))
+            .collect();
+        if !words.is_empty() {
+            terminal.warning(format_args!(
+                "{channel}: left out {} beside {} accepted",
+                words.join(", "),
+                counted(counts.accepted, "sample")
+            ));
+        }
+    }
+    if ended.hurried > 0 {
+        terminal.warning(format_args!(
+            "{} cut before `wait` was over, because too many samples waited",
+            counted(ended.hurried, "tick")
+        ));
+    }
+    if ended.journal.lost > 0 {
+        terminal.warning(format_args!(
+            "{} never written to the journal",
+            counted(ended.journal.lost, "record")
+        ));
+    }
+    let facts = json!({
+        "happenings": ended.happenings,
+        "records_lost": ended.journal.lost,
+        "hurried": ended.hurried,
+    });
+    let words = format!("{} so far", counted(ended.happenings, "tick"));
+    terminal.note(Message::new("ended", facts, words));
+}

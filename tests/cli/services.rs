@@ -1,0 +1,267 @@
+//! A service as a user runs it: `athermal serve`, killed, restarted, given bad rows, replayed, and its journal as data.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use athermal::core::prng::Prng;
+
+use crate::workbench::{Scratch, athermal};
+
+const GRAPH: &str = r#"
+schema = 1
+name = "line"
+time = { column = "time_s", unit = "s" }
+signals.temperature = { unit = "Cel", channels = ["plate", "room"], max_age = "3s" }
+signals.position = { unit = "nm", channels = ["Z"], max_age = "3s" }
+nodes.trend = { type = "slope", inputs.signal = "temperature", windows = ["2s", "7s"] }
+nodes.masses = { type = "first_order", inputs.signal = "temperature", time_constants = ["3s", "1min"] }
+nodes.drift = { type = "slope", inputs.signal = "position", windows = ["7s"], unit = "nm/min" }
+outputs.trend = "trend"
+outputs.masses = "masses"
+outputs.drift = "drift"
+"#;
+
+const SERVICE: &str = r#"
+[runtime]
+wait = "20 ms"
+settle = "0 s"
+checkpoint = "100 ms"
+
+[sources.log]
+type = "csv"
+path = "log.csv"
+
+[sinks.history]
+type = "csv"
+path = "history.csv"
+"#;
+
+const HEADER: &str = "time_s,plate,room,Z\n";
+
+/// Rows of a log, some with holes, from one number to before another.
+fn rows(from: usize, to: usize) -> String {
+    let mut text = String::new();
+    for nth in from..to {
+        let mut prng = Prng::stream(nth as u64, "services");
+        let cell = |value: f64, hole: bool| match hole {
+            true => String::new(),
+            false => format!("{value:.4}"),
+        };
+        let plate = cell(20.0 + prng.uniform(), nth % 7 == 3);
+        let room = cell(21.0 + prng.uniform(), nth % 11 == 5);
+        let z = cell(100.0 * prng.uniform(), nth % 5 == 1);
+        text += &format!("{}.{},{plate},{room},{z}\n", nth / 10, nth % 10);
+    }
+    text
+}
+
+fn desk(name: &str, service: &str) -> Scratch {
+    let scratch = Scratch::new(&format!("service-{name}"));
+    scratch.file("graph.toml", GRAPH);
+    scratch.file(
+        "line.toml",
+        &format!("schema = 1\nextends = \"graph.toml\"\n{service}"),
+    );
+    scratch
+}
+
+fn serve(scratch: &Scratch, more: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(["serve"])
+        .arg(scratch.path("line.toml"))
+        .args(more)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// How many whole rows stand in a file.
+fn lines(path: &Path) -> usize {
+    let text = std::fs::read(path).unwrap_or_default();
+    let ends = text.iter().filter(|byte| **byte == b'\n').count();
+    ends.saturating_sub(1)
+}
+
+/// Waits until so many rows stand in a file.
+fn until_rows(path: &Path, rows: usize, child: &mut Child) {
+    let began = Instant::now();
+    while lines(path) < rows {
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "{}", told(child));
+        let so_far = lines(path);
+        assert!(began.elapsed() < Duration::from_secs(60), "{so_far} rows");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn told(child: &mut Child) -> String {
+    let mut text = String::new();
+    if let Some(mut stderr) = child.stderr.take() {
+        let _ = std::io::Read::read_to_string(&mut stderr, &mut text);
+    }
+    text
+}
+
+/// Asks a service to end, and gives what it reported.
+fn end(mut child: Child) -> String {
+    let status = Command::new("kill")
+        .args(["-s", "INT", &child.id().to_string()])
+        .status();
+    assert!(status.unwrap().success());
+    let text = told(&mut child);
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{text}");
+    text
+}
+
+/// What `run` gives of the same rows, with the column of revisions left out.
+fn by_run(scratch: &Scratch) -> String {
+    let (graph, log) = (scratch.path("graph.toml"), scratch.path("log.csv"));
+    athermal(&[&"run", &graph, &"--input", &log]).ended(0).out
+}
+
+/// What a service wrote, without the column of revisions.
+fn history(scratch: &Scratch) -> String {
+    let text = std::fs::read_to_string(scratch.path("history.csv")).unwrap();
+    let line = |line: &str| line.rsplit_once(',').unwrap().0.to_owned() + "\n";
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn a_service_gives_what_a_run_gives_and_its_journal_what_the_log_gives() {
+    let scratch = desk("run", SERVICE);
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 600)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&scratch.path("history.csv"), 600, &mut child);
+    let text = end(child);
+    assert!(text.contains("the service begins cold"), "{text}");
+    assert!(text.contains("600 ticks so far"), "{text}");
+    assert!(history(&scratch) == by_run(&scratch));
+
+    let state = scratch.path("line.state");
+    let replayed = athermal(&[&"replay", &state, &"--check"]).ended(0);
+    let words = "600 ticks stepped again, to the same bits";
+    assert!(replayed.told.contains(words), "{}", replayed.told);
+
+    // The journal is a recording: what is diagnosed of it is what is diagnosed of the log.
+    let (graph, log) = (scratch.path("graph.toml"), scratch.path("log.csv"));
+    let journal = format!("journal:{}", state.display());
+    let of = |data: &dyn AsRef<std::ffi::OsStr>| {
+        let arguments: &[&dyn AsRef<std::ffi::OsStr>] =
+            &[&"diagnose", &graph, &"--data", data, &"--format", &"json"];
+        let text = athermal(arguments).out;
+        text.replace(&journal, "DATA")
+            .replace(&*log.to_string_lossy(), "DATA")
+    };
+    assert_eq!(of(&journal), of(&log));
+}
+
+#[test]
+fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_twice() {
+    let kills = if std::env::var_os("ATHERMAL_LONG").is_some() {
+        2_000
+    } else {
+        200
+    };
+    let scratch = desk("kills", SERVICE);
+    let (log, out) = (scratch.path("log.csv"), scratch.path("history.csv"));
+    let (mut prng, mut written) = (Prng::stream(1, "kills"), 0);
+    scratch.file("log.csv", HEADER);
+    let mut at_work = 0;
+    let mut add = |count: usize| {
+        let mut file = std::fs::OpenOptions::new().append(true).open(&log).unwrap();
+        std::io::Write::write_all(&mut file, rows(written, written + count).as_bytes()).unwrap();
+        written += count;
+    };
+    for nth in 0..kills {
+        let before = lines(&out);
+        add(20);
+        let mut child = serve(&scratch, &[]);
+        // Three of four are killed at work, the others anywhere.
+        let began = Instant::now();
+        while nth % 4 != 0 && lines(&out) <= before && began.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        add(20);
+        std::thread::sleep(Duration::from_micros(prng.between(0.0, 30e3) as u64));
+        let _ = child.kill();
+        let _ = child.wait();
+        at_work += usize::from(lines(&out) > before);
+    }
+    let written = 40 * kills;
+    let mut child = serve(&scratch, &[]);
+    until_rows(&out, written, &mut child);
+    end(child);
+    assert!(history(&scratch) == by_run(&scratch));
+    let state = scratch.path("line.state");
+    athermal(&[&"replay", &state, &"--check"]).ended(0);
+    println!("{kills} kills, {at_work} of them at work, {written} rows");
+    assert!(at_work * 2 > kills, "{at_work}");
+}
+
+#[test]
+fn bad_rows_are_counted_and_named_and_a_file_that_is_not_there_is_waited_for() {
+    let scratch = desk("bad", SERVICE);
+    let mut child = serve(&scratch, &[]);
+    std::thread::sleep(Duration::from_millis(100));
+    let mut text = HEADER.to_owned() + &rows(0, 20);
+    text += "oops,1,2,3\n2.0,x,21,5\n";
+    text += &rows(21, 40);
+    scratch.file("log.csv", &text);
+    until_rows(&scratch.path("history.csv"), 40, &mut child);
+    let text = end(child);
+    assert!(text.contains("source `log`: cannot open"), "{text}");
+    assert!(
+        text.contains("oops") && text.contains("others like it are counted"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_second_service_on_one_state_is_refused_and_a_damaged_journal_too() {
+    let scratch = desk("second", SERVICE);
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 50)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&scratch.path("history.csv"), 50, &mut child);
+    let second = athermal(&[&"serve", &scratch.path("line.toml")]).ended(3);
+    assert!(
+        second
+            .told
+            .contains("another service keeps its state there"),
+        "{}",
+        second.told
+    );
+    end(child);
+    let state = athermal(&[&"replay", &scratch.path("nowhere")]).ended(2);
+    assert!(state.told.contains("there is no journal"), "{}", state.told);
+}
+
+#[test]
+fn another_graph_takes_over_at_the_start_and_the_journal_knows_when() {
+    let scratch = desk("swap", SERVICE);
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 100)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&scratch.path("history.csv"), 100, &mut child);
+    end(child);
+    let other = GRAPH.replace("\"3s\", \"1min\"", "\"3s\", \"2min\"");
+    scratch.file("graph.toml", &other);
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 200)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&scratch.path("history.csv"), 200, &mut child);
+    let text = end(child);
+    assert!(
+        text.contains("another graph than the one that ran last"),
+        "{text}"
+    );
+    assert!(text.contains("took over"), "{text}");
+    let revisions: std::collections::BTreeSet<_> =
+        std::fs::read_to_string(scratch.path("history.csv"))
+            .unwrap()
+            .lines()
+            .skip(1)
+            .map(|line| line.rsplit_once(',').unwrap().1.to_owned())
+            .collect();
+    assert_eq!(revisions.len(), 2);
+}
