@@ -10,7 +10,7 @@ use athermal::core::engine::Fitted;
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Table};
-use athermal::{Engine, Model};
+use athermal::Engine;
 
 const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
 const LIMIT: f64 = 250.0;
