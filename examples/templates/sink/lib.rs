@@ -76,7 +76,10 @@ impl Outlet for Largest {
         let aside = self.path.with_extension("new");
         let written = fs::write(&aside, text).and_then(|()| fs::rename(&aside, &self.path));
         written.map_err(|error| {
-            ConnectorError::new(format_args!("cannot write {}: {error}", self.path.display()))
+            ConnectorError::new(format_args!(
+                "cannot write {}: {error}",
+                self.path.display()
+            ))
         })
     }
 }
