@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::workbench::{Read, data, graph};
+use athermal::Engine;
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fitted;
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Table};
-use athermal::Engine;
 
 const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
 const LIMIT: f64 = 250.0;
