@@ -6,6 +6,7 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+mod changed_world;
 mod coefficients;
 mod compensation;
 mod defaults;

@@ -404,6 +404,16 @@ impl Predictor for LinearPredictor {
         novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
     }
 
+    fn centre(&self) -> f64 {
+        let means = self.novelty.iter().flat_map(Novelty::means);
+        let products = self
+            .coefficients
+            .iter()
+            .zip(means)
+            .map(|(b, mean)| b * mean);
+        self.intercept + products.sum::<f64>()
+    }
+
     fn std_dev(&self, regressors: &[f64]) -> f64 {
         let variance = self.variance.as_ref();
         variance.map_or(f64::NAN, |variance| variance.at(regressors).sqrt())

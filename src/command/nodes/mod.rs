@@ -106,7 +106,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     if !outputs.is_empty() {
         println!("\nOutput ports, the first where none is named:");
     }
-    for (port, what) in outputs {
+    for (port, what) in &outputs {
         let name = format!("  {port:<17} ");
         print!("{}", paragraph(&name, 6, &what));
     }
@@ -124,6 +124,12 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         line(
             "train.abs_truth (table) – `{ below = \"…\", above = \"…\" }`: the truths that are fitted on",
         );
+        if outputs.iter().any(|(port, _)| *port == "novelty") {
+            line(
+                "outside (\"shrink\", \"absent\" or \"pass\") – what becomes of predictions where `novelty` is above 1: their distance from \
+                 the mean of the fit is divided by it, which is the default, there are none, or they stay; not with `learn`",
+            );
+        }
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
             line(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
@@ -203,6 +209,11 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                 port(
                     "std_dev",
                     "where all voters have one: that of the truth about the prediction",
+                    weighs,
+                ),
+                port(
+                    "novelty",
+                    "where voters have one: its mean by their weights",
                     weighs,
                 ),
             ];
