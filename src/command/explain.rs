@@ -1,16 +1,25 @@
-//! `athermal explain`: what the code of a diagnostic means.
+//! `athermal explain`: what the code of a diagnostic means, or what a machine file says of its service.
 
-use athermal::core::diagnostic::{Code, codes, explain, nearest};
+use std::path::Path;
+
+use athermal::core::diagnostic::{Code, Diagnostics, Sources, codes, explain, nearest};
+use athermal_serve::deployment::Deployment;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::model::load_to_fit;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
-/// Explain the code of a mistake, or list them all
+/// Explain the code of a mistake, or what a machine file wires; or list all codes
+///
+/// Of a machine file: which source gives each channel, and in which unit; which outputs each sink is given, and at which rate.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal explain A052\n  athermal explain")]
+#[command(
+    after_help = "Examples:\n  athermal explain A052\n  athermal explain machine.toml\n  athermal explain"
+)]
 pub struct Explain {
-    /// The code, such as A052
+    /// The code, such as A052, or a machine file
+    #[arg(value_name = "CODE|FILE")]
     code: Option<String>,
 }
 
@@ -31,6 +40,7 @@ impl Explain {
                     println!("{}  {}", entry.code, entry.title);
                 }
             }
+            Some(file) if Path::new(file).is_file() => wiring(Path::new(file), terminal)?,
             Some(code) => match explain(code) {
                 Some(entry) if json => println!("{:#}", describe(entry)),
                 Some(entry) => print!("{}", page(entry)),
@@ -47,6 +57,29 @@ impl Explain {
         }
         Ok(Answer::Fine)
     }
+}
+
+/// What a machine file says of its service.
+fn wiring(path: &Path, terminal: &Terminal) -> Result<(), Failure> {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let model = load_to_fit(path, &mut sources, terminal)?;
+    let plan = &model.plan;
+    let Some(read) = Deployment::read(&model.graph, plan, &sources, &mut diagnostics) else {
+        let (diagnostics, sources) = (Box::new(diagnostics), Box::new(sources));
+        return Err(Failure::Graph {
+            diagnostics,
+            sources,
+        });
+    };
+    if terminal.format == Format::Json {
+        println!("{:#}", read.to_json(plan));
+    } else {
+        let mut text = String::new();
+        // A text can always be written to.
+        let _ = read.describe(plan, &mut text);
+        print!("{text}");
+    }
+    Ok(())
 }
 
 fn page(entry: &Code) -> String {

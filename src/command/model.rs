@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use athermal::Model;
-use athermal::core::compile::Wanted;
+use athermal::core::compile::{Outside, PlannedRole, Wanted};
 use athermal::core::diagnostic::{Diagnostics, Sources, listed};
 use athermal::core::quantity::Quantity;
 use athermal::run::model::ModelError;
@@ -72,6 +72,26 @@ pub fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
             path.display(),
             few(nodes),
             if nodes.len() == 1 { "gives" } else { "give" },
+        ));
+    }
+}
+
+/// Warns of a model that was fitted before fits kept where their edge is: what it predicts outside stays as it is.
+pub fn warn_without_novelty(terminal: &Terminal, model: &Model, path: &Path) {
+    let mut known = model.plan.nodes.iter().filter_map(|node| {
+        let PlannedRole::Estimator { outside, .. } = &node.role else {
+            return None;
+        };
+        let fit = model.fitted.get(&node.instance())?;
+        let row = vec![0.0; fit.uses().len()];
+        let heeded = *outside != Outside::Pass && !row.is_empty();
+        heeded.then(|| !fit.novelty(&row).is_nan())
+    });
+    let first = known.next();
+    if first == Some(false) && !known.any(|known| known) {
+        terminal.warning(format_args!(
+            "{}: its fits do not say where their edge is, so predictions outside of them pass as they are; a new fit does",
+            path.display()
         ));
     }
 }

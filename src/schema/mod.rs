@@ -1,5 +1,7 @@
 //! Decides the JSON Schema of graph files, for exactly the kinds that are linked in; what a kind's parameters are is decided by the kind.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -10,6 +12,8 @@ use athermal_core::node::{InputPort, Kind, Read, kinds};
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
+use athermal_serve::connector::{ConnectorKind, sink_kinds, source_kinds};
+use athermal_serve::deployment;
 use athermal_trial::TestTable;
 
 /// What is the same whatever kinds are linked in. What depends on them is empty there.
@@ -31,6 +35,8 @@ pub fn graph_schema() -> Value {
     generator.subschema_for::<Quantity>();
     generator.subschema_for::<Unit>();
     let format = as_draft_7(&format, &str::to_owned);
+    let sections = deployment::schemas(&mut generator);
+    let [runtime, source, sink] = sections.map(|schema| as_draft_7(&schema, &str::to_owned));
     let common = generator.take_definitions(true).into_iter();
     let common = common.map(|(name, schema)| (name, as_draft_7(&schema, &str::to_owned)));
     let mut definitions: Map<String, Value> = common.collect();
@@ -46,6 +52,11 @@ pub fn graph_schema() -> Value {
     schema["description"] = format!("{frame} Node types: {}.", names.join(", ")).into();
     schema["properties"]["time"]["properties"]["unit"]["enum"] = json!(TIME_UNITS);
     schema["properties"]["table"] = table(&format);
+    schema["properties"]["runtime"] = runtime;
+    let sources = connectors(source_kinds(), &source, &mut definitions);
+    schema["properties"]["sources"]["additionalProperties"] = sources;
+    let sinks = connectors(sink_kinds(), &sink, &mut definitions);
+    schema["properties"]["sinks"]["additionalProperties"] = sinks;
     let node = &mut schema["definitions"]["Node"]["then"];
     node["properties"]["type"]["enum"] = json!(names);
     node["properties"]["type"]["x-taplo"]["docs"]["enumValues"] = json!(summaries);
@@ -62,8 +73,8 @@ pub fn graph_schema() -> Value {
 
 /// Takes the definitions of a kind over to `taken`, and gives its schema with references to them. A name that another kind has for
 /// something else gets the kind's name in front.
-fn adopt(kind: &Kind, taken: &mut Map<String, Value>) -> Value {
-    let mut schema = (kind.schema)().clone();
+fn adopt(kind: &str, schema: &Value, taken: &mut Map<String, Value>) -> Value {
+    let mut schema = schema.clone();
     let own = schema["$defs"].take();
     let own: Vec<(&String, &Value)> = own.as_object().into_iter().flatten().collect();
     let clashes = |name: &str, schema: &Value| {
@@ -73,7 +84,7 @@ fn adopt(kind: &Kind, taken: &mut Map<String, Value>) -> Value {
     let clashing = own.iter().filter(|(name, schema)| clashes(name, schema));
     let clashing: Vec<&str> = clashing.map(|(name, _)| name.as_str()).collect();
     let rename = |name: &str| match clashing.contains(&name) {
-        true => format!("{}.{name}", kind.name),
+        true => format!("{kind}.{name}"),
         false => name.to_owned(),
     };
     for (name, schema) in &own {
@@ -170,7 +181,7 @@ fn by_tag(choices: &[Value]) -> Option<Map<String, Value>> {
 
 /// The keys of one kind, the framework's included.
 fn node(kind: &Kind, framework: &Value, definitions: &mut Map<String, Value>) -> Value {
-    let mut parameters = adopt(kind, definitions);
+    let mut parameters = adopt(kind.name, (kind.schema)(), definitions);
     let mut properties = json!({
         "type": { "description": kind.documentation() },
         "each": {
@@ -212,6 +223,40 @@ fn inputs(kind: &Kind) -> Value {
     };
     let ports: Map<String, Value> = (kind.inputs)().iter().map(port).collect();
     json!({ "description": "What the node reads.", "type": "object", "properties": ports, "additionalProperties": false })
+}
+
+/// A source or a sink: the keys that each has, and those of its kind behind its `type`.
+fn connectors<S: ?Sized>(
+    kinds: &BTreeMap<&str, &ConnectorKind<S>>,
+    shared: &Value,
+    definitions: &mut Map<String, Value>,
+) -> Value {
+    let choice = |kind: &&ConnectorKind<S>| {
+        let own = adopt(kind.name, (kind.schema)(), definitions);
+        let mut properties = json!({ "type": { "description": kind.documentation() } });
+        for keys in [shared, &own] {
+            for (key, schema) in keys["properties"].as_object().into_iter().flatten() {
+                properties[key] = schema.clone();
+            }
+        }
+        json!({
+            "if": { "properties": { "type": { "const": kind.name } }, "required": ["type"] },
+            "then": { "properties": properties, "additionalProperties": false }
+        })
+    };
+    let choices: Vec<Value> = kinds.values().map(choice).collect();
+    let names: Vec<&str> = kinds.keys().copied().collect();
+    let texts: Vec<String> = kinds.values().map(|kind| kind.summary()).collect();
+    let docs = json!({ "docs": { "enumValues": texts } });
+    json!({
+        "if": { "type": "boolean" },
+        "then": { "description": "False removes an inherited one.", "const": false },
+        "else": {
+            "type": "object",
+            "properties": { "type": { "description": "Its kind.", "enum": names, "x-taplo": docs } },
+            "allOf": choices
+        }
+    })
 }
 
 /// `[table]` with the keys of a file, which `[[table.files]]` has again beside the names that it is for.

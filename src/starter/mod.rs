@@ -23,7 +23,7 @@ use std::path::Path;
 
 use athermal::core::document::{Arrangement, Pattern, TableBase, TableFormat};
 use athermal::core::time::TimeFormat;
-use athermal::files::{Dataset, Description, FileError, Format, TimeForm, apart};
+use athermal::files::{Dataset, Description, FileError, Format, LongFormat, TimeForm, apart};
 
 use clock::Clock;
 use column::Column;
@@ -97,7 +97,9 @@ impl Log {
             return Err(unfit(why));
         }
         let (time, format) = (request.time.as_deref(), request.format.as_ref());
-        let clock = clock::find(&described, time, format).map_err(unfit)?;
+        let of_one = long.as_ref().map(|long| of_one_name(&described, long));
+        let of_one = of_one.as_ref().filter(|of| of.rows.len() > 2);
+        let clock = clock::find(of_one.unwrap_or(&described), time, format).map_err(unfit)?;
         let clock = undecided::decided(path, clock)?;
         let times = clock.columns.names();
         described.table.decimal = described.decimal(times);
@@ -133,6 +135,18 @@ impl Log {
         own.zone == clock.zone && own.columns == clock.columns && is_form
             || own.zone.is_none()
                 && found().is_some_and(|of| of.columns == own.columns && of.form == own.form)
+    }
+}
+
+/// The rows of the first name in a long layout: of these the times advance, where those of many names stand still.
+fn of_one_name(described: &Description, long: &LongFormat) -> Description {
+    let at = described.columns.iter().position(|of| *of == long.names);
+    let name = |row: &Vec<String>| at.and_then(|at| row.get(at).cloned());
+    let first = described.rows.first().and_then(name);
+    let rows = described.rows.iter().filter(|row| name(row) == first);
+    Description {
+        rows: rows.cloned().collect(),
+        ..described.clone()
     }
 }
 

@@ -45,8 +45,9 @@ impl Survey {
                 continue;
             };
             let times = series.values.len() as f64 / starts.len() as f64;
-            series.time_s = starts.iter().map(|&at| series.time_s[at]).collect();
-            series.values = starts.iter().map(|&at| series.values[at]).collect();
+            let changes = starts.iter();
+            let changes = changes.map(|&at| (series.time_s[at], series.values[at]));
+            series.replace(changes.collect::<Vec<_>>().into_iter());
             series.changes = true;
             let every = clock.about(series.interval_s().unwrap_or(0.0));
             column.warn(format!(

@@ -1,5 +1,7 @@
 //! Decides what is measured of a log's columns: rates, gaps, extremes; not what they mean.
 
+use std::cell::OnceCell;
+
 use athermal::core::document::TableBase;
 use athermal::files::{
     CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, has_clock,
@@ -47,6 +49,16 @@ pub struct Series {
     pub unreadable: u64,
     /// The first of them, for people.
     pub first_unreadable: Option<Unreadable>,
+    gaps: OnceCell<Gaps>,
+}
+
+/// The times between the values of a series.
+#[derive(Debug, Default)]
+struct Gaps {
+    /// Those within segments in s, that which each hundredth of them does not exceed; nothing where there are none.
+    hundredths: Vec<f64>,
+    /// Whether there are others.
+    has_segments: bool,
 }
 
 /// A cell that cannot be read.
@@ -129,18 +141,34 @@ impl Series {
         Some(sum / count)
     }
 
-    /// The time between two values in s that the share `share` of them does not exceed.
+    /// The time between two values in s that the share `share` of them, in hundredths, does not exceed.
     #[must_use]
     pub fn gap(&self, share: f64) -> Option<f64> {
-        let mut gaps: Vec<f64> = self
-            .time_s
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .filter(|gap| *gap < APART_S)
-            .collect();
-        gaps.sort_by(f64::total_cmp);
-        let last = gaps.len().checked_sub(1)?;
-        Some(gaps[(share * last as f64).round() as usize])
+        let hundredths = &self.gaps().hundredths;
+        hundredths.get((share * 100.0).round() as usize).copied()
+    }
+
+    /// Looked at once: windows of many widths are set against them.
+    fn gaps(&self) -> &Gaps {
+        self.gaps.get_or_init(|| {
+            let all = self.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+            let mut gaps: Vec<f64> = all.filter(|gap| *gap < APART_S).collect();
+            let has_segments = gaps.len() + 1 < self.time_s.len();
+            gaps.sort_unstable_by(f64::total_cmp);
+            let last = gaps.len().saturating_sub(1) as f64;
+            let place = |hundredth| (f64::from(hundredth) / 100.0 * last).round() as usize;
+            let hundredths = (0..=100_u8).filter_map(|of| gaps.get(place(of)).copied());
+            Gaps {
+                hundredths: hundredths.collect(),
+                has_segments,
+            }
+        })
+    }
+
+    /// Takes other values in place of these.
+    pub fn replace(&mut self, pairs: impl Iterator<Item = (f64, f64)>) {
+        (self.time_s, self.values) = pairs.unzip();
+        self.gaps = OnceCell::new();
     }
 
     /// Whether it only counts rows, or the time: whole numbers that rise by the same step in nearly each row, by several where rows are
@@ -178,6 +206,11 @@ impl Series {
     #[must_use]
     pub fn stretches(&self, width_s: f64) -> Vec<f64> {
         let longest = (width_s / 2.0).max(2.5 * self.gap(0.5).unwrap_or(0.0));
+        if let (Some(most), false) = (self.gap(1.0), self.gaps().has_segments)
+            && most <= longest
+        {
+            return vec![self.time_s[self.time_s.len() - 1] - self.time_s[0]];
+        }
         let pieces = self.time_s.chunk_by(|a, b| b - a <= longest);
         pieces
             .map(|piece| piece[piece.len() - 1] - piece[0])
@@ -196,8 +229,12 @@ impl Series {
     /// Leaves out all other values; how many these are.
     pub fn keep(&mut self, is_kept: impl Fn(f64) -> bool) -> u64 {
         let before = self.values.len();
-        let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
-        (self.time_s, self.values) = pairs.filter(|(_, value)| is_kept(*value)).unzip();
+        let (times, values) = (
+            std::mem::take(&mut self.time_s),
+            std::mem::take(&mut self.values),
+        );
+        let pairs = times.into_iter().zip(values);
+        self.replace(pairs.filter(|(_, value)| is_kept(*value)));
         (before - self.values.len()) as u64
     }
 

@@ -390,3 +390,22 @@ fn the_long_layout_of_an_archive_is_read() {
         assert!(starter.text.contains(declared), "{}", starter.text);
     }
 }
+
+#[test]
+fn the_time_of_a_long_layout_of_many_signals_is_found() {
+    let text = log("time_s,tag,value\n", |time, plate, z| {
+        let others = (1..30).map(|nth| format!("{time},T{nth}_degC,{plate:.3}\n"));
+        others.collect::<String>() + &format!("{time},Z_um,{z:.4}\n")
+    });
+    let log = Log::of("many.csv", text.as_bytes());
+    let starter = started(&log.0).unwrap();
+    assert!(
+        starter.text.contains("column = \"time_s\""),
+        "{}",
+        starter.text
+    );
+    assert_eq!(
+        rows(&log.0, layout(&plan(&starter.text)), false).len(),
+        1500
+    );
+}

@@ -403,7 +403,7 @@ fn what_learns_and_reads_past_truths_predicts_several_steps_from_those_that_were
         GRAPH.replace("LEARN", "").replace("[outputs]", &nodes) + "past = \"past\"\n"
     };
     let learns = scratch.file("learns.toml", nodes("learn = true"));
-    let still = scratch.file("still.toml", nodes("learn = false"));
+    let still = scratch.file("still.toml", nodes("learn = false\noutside = \"pass\""));
     let learns = fitted(&scratch, "learns.json", &learns, &data);
     let still = fitted(&scratch, "still.json", &still, &data);
     for steps in ["2", "5"] {

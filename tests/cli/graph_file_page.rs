@@ -10,6 +10,7 @@ use athermal::core::document::{Memory, declare, load};
 use athermal::core::node::kinds;
 use athermal::schema::graph_schema;
 use athermal::trial;
+use athermal_serve::connector::{sink_kinds, source_kinds};
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/src/graph-file.md");
@@ -38,7 +39,7 @@ fn keys(schema: &Value, definitions: &Value) -> BTreeSet<String> {
     found
 }
 
-/// The schema without what the types of nodes bring: their inputs and their own parameters.
+/// The schema without what the types of nodes and the kinds of sources and sinks bring: their inputs and their own parameters.
 fn schema_of_the_framework() -> Value {
     let mut schema = graph_schema();
     let node = &mut schema["definitions"]["Node"]["then"];
@@ -52,6 +53,18 @@ fn schema_of_the_framework() -> Value {
         let ports = properties["inputs"]["properties"].as_object_mut().unwrap();
         let one = ports.values().next().cloned();
         properties["inputs"] = one.unwrap_or_default();
+    }
+    let sources = source_kinds().values().map(|kind| (kind.schema)());
+    let sinks = sink_kinds().values().map(|kind| (kind.schema)());
+    for (section, kinds) in [
+        ("sources", sources.collect::<Vec<_>>()),
+        ("sinks", sinks.collect()),
+    ] {
+        let choices = &mut schema["properties"][section]["additionalProperties"]["else"]["allOf"];
+        for (kind, choice) in kinds.into_iter().zip(choices.as_array_mut().unwrap()) {
+            let properties = choice["then"]["properties"].as_object_mut().unwrap();
+            properties.retain(|key, _| kind["properties"].get(key).is_none());
+        }
     }
     schema
 }

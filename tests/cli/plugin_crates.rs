@@ -28,16 +28,8 @@ const ROLES: [(&str, &[&str], &str); 6] = [
         "build --with path:.",
     ),
     ("combiner", &["tests/conformance.rs"], "build --with path:."),
-    (
-        "source",
-        &["tests/live.rs", "examples/run.rs"],
-        "--example run",
-    ),
-    (
-        "sink",
-        &["tests/live.rs", "examples/run.rs"],
-        "--example run",
-    ),
+    ("source", &["tests/live.rs"], "target/athermal serve"),
+    ("sink", &["tests/live.rs"], "target/athermal serve"),
     ("machine", &["tests/conformance.rs"], "build --with path:."),
 ];
 
@@ -91,7 +83,7 @@ fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names_and_nothing_else(
         assert!(read("graphs/room-lag.toml").contains("[[tests]]"), "{role}");
         for file in expected.iter().filter(|file| **file != "Cargo.lock") {
             let text = read(file);
-            for left in ["my-node", "my_node", "MyNode", "CORE", "ATHERMAL"] {
+            for left in ["my-node", "my_node", "MyNode", "CORE", "SERVE"] {
                 assert!(!text.contains(left), "{left} in {file} of a {role}");
             }
         }
@@ -106,7 +98,11 @@ fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names_and_nothing_else(
 #[test]
 fn what_was_written_is_told_to_programs_too() {
     let scratch = Scratch::new("new-json");
-    for (role, kind) in [("feature", "\"room_lag\""), ("machine", "null")] {
+    for (role, kind) in [
+        ("feature", "\"room_lag\""),
+        ("source", "\"room_lag\""),
+        ("machine", "null"),
+    ] {
         let folder = scratch.path(role);
         let wrote = athermal(&[
             &"--format",
@@ -140,6 +136,11 @@ fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
             "a node type `slope` already, from athermal-features",
         ),
         (
+            "csv",
+            "sink",
+            "a sink `csv` already, from athermal-connectors",
+        ),
+        (
             "linear-axis",
             "machine",
             "a machine `linear-axis` already, from athermal-simulation",
@@ -154,7 +155,7 @@ fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
     athermal(&[&"new", &"plugin", &"room-lag", &"-o", &scratch.path("")])
         .ended(2)
         .tells(&["not empty"]);
-    // What is no node has no name in graphs that could be taken.
+    // A source may have the name of a node: both are looked up where they stand.
     let folder = scratch.path("slope");
     athermal(&[
         &"new", &"plugin", &"slope", &"--role", &"source", &"-o", &folder,

@@ -6,6 +6,7 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+mod changed_world;
 mod coefficients;
 mod compensation;
 mod defaults;
@@ -17,6 +18,7 @@ mod redundancy;
 mod reference_figures;
 mod scores_by_hand;
 mod shared;
+mod starter_against_ridge;
 mod starter_graphs;
 mod state_space;
 mod streaming;

@@ -12,8 +12,9 @@ use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::score::{Score, ScoreOptions, score};
 
-/// A figure may be worse than the reference by this share, and better by any.
-const WORSE: f64 = 1.02;
+/// A figure may be worse than the reference by this share, and better by any. Of it 1 % is what predictions cost that shrink at chuck
+/// steps beyond those of the fit, which the reference does not know.
+const WORSE: f64 = 1.03;
 
 /// Fits a graph of this project on one recording and scores it on another.
 fn scored(name: &str, train: &Path, test: &Path, below: Option<&str>) -> Vec<Score> {

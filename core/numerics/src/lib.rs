@@ -24,6 +24,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod active_set;
+mod agreement;
 mod blocks;
 mod change;
 mod checks;
@@ -55,6 +56,7 @@ mod selection;
 mod sgd;
 mod state_space;
 
+pub use agreement::{Agreement, Look};
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
 pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOptions};
 pub use collinearity::Collinearity;

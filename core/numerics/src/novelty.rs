@@ -8,17 +8,20 @@ use serde::{Deserialize, Serialize};
 
 /// So many directions are told apart at most: more cost more at a tick and find no more.
 const DIRECTIONS: usize = 12;
-/// A direction in which rows vary by less than a tenth of a regressor's standard deviation counts as one in which they hardly do.
-const HARDLY: f64 = 0.01;
+/// The variance below which rows hardly take a direction, in that of a regressor.
+const HARDLY: f64 = 0.05;
+/// The variance of noise in any direction, in that of a regressor: what weighs directions that rows do take.
+const NOISE: f64 = 0.001;
 /// The share of the rows of the fit that lie inside.
 const INSIDE: f64 = 0.999;
 
 /// How far a row of regressors lies outside of the rows of a fit: `√(d / d₉₉.₉)`, so that 1 is the edge.
 ///
 /// With the standardised regressors `z` of `p` columns, `n` rows and the eigenvectors `v` and eigenvalues `λ` of `ZᵀZ / n` it is
-/// `d = (‖z‖² − Σ λ / (λ + 0.01) (vᵀz)²) / (‖z‖² + p)`, the sum over the twelve largest `λ`; `d₉₉.₉` is the 99.9 % quantile of the
-/// rows. Of up to twelve columns the numerator is `0.01 zᵀ(ZᵀZ / n + 0.01 I)⁻¹z`, the leverage of ridge. What is merely larger in a
-/// direction in which the rows vary much changes `d` little; a direction that they hardly took does, at any amplitude.
+/// `d = (‖z‖² − Σ λ / (λ + 0.001) (vᵀz)²) / (‖z‖² + p)`, the sum over the `λ` above 0.05, at most the twelve largest; `d₉₉.₉` is the
+/// 99.9 % quantile of the rows. Where all are in the sum the numerator is `0.001 zᵀ(ZᵀZ / n + 0.001 I)⁻¹z`, the leverage of ridge.
+/// What is merely larger in a direction in which the rows vary much changes `d` little; a direction that they hardly took does, at
+/// any amplitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "StoredNovelty", into = "StoredNovelty")]
 pub struct Novelty {
@@ -35,7 +38,7 @@ struct Column {
     scale: f64,
     /// `1 / scale`.
     inverse: f64,
-    /// Its part in each direction, `√(λ / (λ + 0.01)) v`, for the standardised regressor.
+    /// Its part in each direction, `√(λ / (λ + 0.001)) v`, for the standardised regressor.
     along: [f64; DIRECTIONS],
 }
 
@@ -142,14 +145,16 @@ impl Novelty {
                 .iter()
                 .map(|&column| Column::new(standard.means[column], standard.scales[column]))
                 .collect(),
-            directions: order.min(DIRECTIONS),
+            directions: (0..order.min(DIRECTIONS))
+                .take_while(|nth| values[order - 1 - nth] > HARDLY * count)
+                .count(),
             edge: 1.0,
         };
         for nth in 0..novelty.directions {
             // They come from the smallest to the largest.
             let from = order - 1 - nth;
-            let variance = values[from].max(0.0) / count;
-            let share = (variance / (variance + HARDLY)).sqrt();
+            let variance = values[from] / count;
+            let share = (variance / (variance + NOISE)).sqrt();
             for (i, &column) in problem.active.iter().enumerate() {
                 novelty.columns[column].along[nth] = share * vectors[(i, from)];
             }
@@ -161,13 +166,19 @@ impl Novelty {
                 row.iter_mut()
                     .zip(columns)
                     .for_each(|(to, &column)| *to = x[column]);
-                novelty.measure(&row)
+                let (beyond, whole) = novelty.parts(row.iter().copied());
+                beyond / whole
             })
             .collect();
         let inside = ((all.len() as f64 * INSIDE).ceil() as usize).saturating_sub(1);
         let (_, edge, _) = all.select_nth_unstable_by(inside, f64::total_cmp);
         novelty.edge = *edge;
         (novelty.edge > 0.0 && novelty.edge.is_finite()).then_some(novelty)
+    }
+
+    /// The mean of each column.
+    pub fn means(&self) -> impl Iterator<Item = f64> {
+        self.columns.iter().map(|column| column.mean)
     }
 
     /// How many columns it is of.
@@ -180,12 +191,20 @@ impl Novelty {
     #[inline]
     #[must_use]
     pub fn at(&self, x: &[f64]) -> f64 {
-        (self.measure(x) / self.edge).sqrt()
+        self.at_each(x.iter().copied())
     }
 
-    /// `d`.
+    /// The same at values that are made one by one.
     #[inline]
-    fn measure(&self, x: &[f64]) -> f64 {
+    #[must_use]
+    pub fn at_each(&self, x: impl Iterator<Item = f64>) -> f64 {
+        let (beyond, whole) = self.parts(x);
+        (beyond / (whole * self.edge)).sqrt()
+    }
+
+    /// Numerator and denominator of `d`.
+    #[inline]
+    fn parts(&self, x: impl Iterator<Item = f64>) -> (f64, f64) {
         let (mut size, mut along) = (0.0, [0.0; DIRECTIONS]);
         for (column, x) in self.columns.iter().zip(x) {
             let z = (x - column.mean) * column.inverse;
@@ -193,7 +212,7 @@ impl Novelty {
             along = std::array::from_fn(|nth| along[nth] + column.along[nth] * z);
         }
         let known: f64 = along.iter().map(|part| part * part).sum();
-        (size - known).max(0.0) / (size + self.columns.len() as f64)
+        ((size - known).max(0.0), size + self.columns.len() as f64)
     }
 }
 
@@ -260,12 +279,12 @@ mod tests {
             .map(|z| z[0] * z[1])
             .sum::<f64>()
             / count;
-        let diagonal = 1.0 + HARDLY;
+        let diagonal = 1.0 + NOISE;
         let determinant = diagonal * diagonal - correlation * correlation;
         let measure = |x: [f64; 2]| {
             let [a, b] = z(x);
             let leverage = (diagonal * (a * a + b * b) - 2.0 * correlation * a * b) / determinant;
-            HARDLY * leverage / (a * a + b * b + 2.0)
+            NOISE * leverage / (a * a + b * b + 2.0)
         };
         let mut all: Vec<f64> = rows()
             .iter()

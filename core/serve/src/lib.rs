@@ -34,6 +34,8 @@ pub mod recovery;
 pub mod replay;
 pub mod sequencer;
 pub mod service;
+#[cfg(any(test, feature = "testkit"))]
+pub mod testkit;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.

@@ -1,82 +1,85 @@
-//! A sink of athermal: a line for each tick, as a controller reads it.
+//! A sink of athermal: a file with the largest value that each output had.
 //!
-//! A line is the instant in seconds and every output by its name: `12.500 gradient.plate=60.1 gradient.room=-`. `-` is no
-//! value: whoever reads must be able to tell it from zero, and from a line that was lost.
+//! Make it send rows to your controller instead. A sink that moves something gives [`Purpose::Command`] as its purpose: then only
+//! recent rows come, and none changes faster than the machine file's `rate`.
+//!
+//! [`Purpose::Command`]: athermal_serve::connector::Purpose::Command
 
 use std::fmt::Write as _;
-use std::io::Write;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::PathBuf;
 
-use athermal_core::compile::Plan;
-use athermal_run::live::{Frame, Sink, SinkError};
+use athermal_serve::connector::{ConnectorError, OutRow, Outlet, Sink, SinkWiring};
+use athermal_serve::register_sink;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
-/// Lines to whatever takes bytes: standard output, a serial port, a socket.
-pub struct MyNode<W> {
-    output: W,
-    /// The names of the outputs, in the order of the graph.
-    names: Vec<String>,
-    line: String,
+/// Keeps the largest value that each output had, in a file with a line for each.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct MyNode {
+    /// The file. What it holds from before a restart counts too.
+    path: PathBuf,
 }
 
-impl<W: Write> MyNode<W> {
-    /// Writes to `output` what the graph of `plan` puts out.
-    pub fn new(output: W, plan: &Plan) -> Self {
-        let names = plan.outputs.iter().map(|output| output.name.clone());
-        Self {
-            output,
-            names: names.collect(),
-            line: String::new(),
-        }
+register_sink!(MyNode, "my_node");
+
+impl MyNode {
+    /// A sink that keeps its file there.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self { path: path.into() }
     }
 }
 
-impl<W: Write> Sink for MyNode<W> {
-    fn put(&mut self, frame: &Frame<'_>) -> Result<(), SinkError> {
-        self.line.clear();
-        write!(self.line, "{:.3}", frame.time.as_ns() as f64 / 1e9)?;
-        for (name, value) in self.names.iter().zip(frame.outputs) {
-            if value.is_finite() {
-                write!(self.line, " {name}={value}")?;
-            } else {
-                write!(self.line, " {name}=-")?;
-            }
-        }
-        self.line.push('\n');
-        // In one piece and at once: somebody waits for it.
-        self.output.write_all(self.line.as_bytes())?;
-        Ok(self.output.flush()?)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use athermal_core::time::Instant;
-
-    fn put<W: Write>(output: W, outputs: &[f64]) -> Result<(), SinkError> {
-        let mut sink = MyNode {
-            output,
-            names: vec!["Z1".to_owned(), "Z2".to_owned()],
-            line: String::new(),
+impl Sink for MyNode {
+    fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError> {
+        let path = wiring.folder.join(&self.path);
+        let before = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+            read => read.map_err(ConnectorError::new)?,
         };
-        sink.put(&Frame {
-            time: Instant::from_ns(12_500_000_000),
-            time_text: "",
-            revision: "",
-            outputs,
-        })?;
-        sink.finish()
+        let known = |name: &str| {
+            let mut lines = before.lines().filter_map(|line| line.split_once(' '));
+            let (_, value) = lines.find(|(of, _)| *of == name)?;
+            value.parse().ok()
+        };
+        let outputs = wiring.outputs.into_iter();
+        let largest = outputs.map(|output| (known(&output.name).unwrap_or(f64::NAN), output.name));
+        Ok(Box::new(Largest {
+            path,
+            largest: largest.collect(),
+        }))
+    }
+}
+
+struct Largest {
+    path: PathBuf,
+    /// By output; NaN where there was none.
+    largest: Vec<(f64, String)>,
+}
+
+impl Outlet for Largest {
+    fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError> {
+        for ((largest, _), output) in self.largest.iter_mut().zip(row.outputs) {
+            // NaN is no output, and no maximum of numbers.
+            *largest = largest.max(*output);
+        }
+        Ok(())
     }
 
-    #[test]
-    fn a_line_has_the_instant_and_every_output_and_tells_none_from_zero() {
-        let mut line = Vec::new();
-        put(&mut line, &[0.0, f64::NAN]).unwrap();
-        assert_eq!(line, b"12.500 Z1=0 Z2=-\n");
-    }
-
-    #[test]
-    fn that_nobody_listens_any_more_is_told() {
-        let told = put(&mut [0_u8; 4][..], &[1.0, 2.0]).unwrap_err();
-        assert_eq!(told.to_string(), "failed to write whole buffer");
+    fn flush(&mut self) -> Result<(), ConnectorError> {
+        let mut text = String::new();
+        for (largest, name) in self.largest.iter().filter(|(of, _)| !of.is_nan()) {
+            writeln!(text, "{name} {largest}").map_err(ConnectorError::new)?;
+        }
+        // Never half a file: written beside, then put in its place.
+        let aside = self.path.with_extension("new");
+        let written = fs::write(&aside, text).and_then(|()| fs::rename(&aside, &self.path));
+        written.map_err(|error| {
+            ConnectorError::new(format_args!(
+                "cannot write {}: {error}",
+                self.path.display()
+            ))
+        })
     }
 }

@@ -1,25 +1,47 @@
-//! The sink in a whole run: a log in, lines with what the graph makes of it out.
+//! The sink keeps the rules of every sink, and the largest values.
 
-use std::error::Error;
+use std::fs;
+use std::path::PathBuf;
 
-use athermal::Model;
-use athermal::files::{Options, Reader, layout};
-use athermal::run::live;
+use athermal_serve::testkit::{assert_sink, check_again, open_sink, put};
 use my_node::MyNode;
 
+/// An empty folder of its own.
+fn folder(name: &str) -> PathBuf {
+    let name = format!("my-node-{name}-{}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
 #[test]
-fn each_row_of_a_log_becomes_a_line() -> Result<(), Box<dyn Error>> {
-    let mut engine = Model::load("graphs/my-node.toml")?.engine()?;
-    let log = "time_s,plate,room\n0,20,\n10,20.5,\n20,21,\n";
-    let layout = layout(engine.plan());
-    let mut source = Reader::from_read("a log", log.as_bytes(), layout, Options::default())?;
-    let mut lines = Vec::new();
-    let mut sink = MyNode::new(&mut lines, engine.plan());
-    live::run(&mut engine, &mut source, &mut sink)?;
-    let lines = String::from_utf8(lines)?;
-    // Over less than five minutes there is no slope.
-    let none = "gradient.plate=- gradient.room=-";
-    let expected = ["0.000", "10.000", "20.000"].map(|time| format!("{time} {none}"));
-    assert_eq!(lines.lines().collect::<Vec<_>>(), expected);
-    Ok(())
+fn it_keeps_the_rules_of_every_sink() {
+    let folder = folder("rules");
+    assert_sink(&MyNode::new("largest.txt"), &folder, &["a", "b"]);
+}
+
+#[test]
+fn the_largest_values_are_kept_also_across_a_restart() {
+    let (folder, sink) = (folder("restart"), MyNode::new("largest.txt"));
+    for second in [7, 3] {
+        let mut outlet = open_sink(&sink, &folder, &["a", "b"]).unwrap();
+        put(&mut *outlet, second, 2).unwrap();
+        outlet.flush().unwrap();
+    }
+    let text = fs::read_to_string(folder.join("largest.txt")).unwrap();
+    assert_eq!(text, "a 7\nb 8\n");
+}
+
+#[test]
+fn a_folder_that_is_gone_is_reported_and_the_row_is_taken_again() {
+    let folder = folder("gone");
+    let mut outlet = open_sink(&MyNode::new("largest.txt"), &folder, &["a"]).unwrap();
+    let fail = |fails: bool| {
+        let _ = match fails {
+            true => fs::remove_dir_all(&folder),
+            false => fs::create_dir_all(&folder),
+        };
+    };
+    check_again(&mut *outlet, 1, fail).unwrap();
 }

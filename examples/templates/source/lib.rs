@@ -1,124 +1,65 @@
-//! A source of athermal: the lines that a controller prints.
+//! A source of athermal: a counter.
 //!
-//! A line is an instant in seconds and what was measured then: `12.5 plate=21.503 room=-`. A name is the column that the
-//! graph gives a channel; what the graph does not read is passed over. `-` is no value, and so is a name that is missing.
+//! It gives each of its channels the same count, one more each time. Make it ask your controller instead: connect in
+//! [`Inlet::run`], and come back with an error where the connection is lost. `run` is called again after a while.
 
-use std::io::BufRead;
+use std::time::{SystemTime, UNIX_EPOCH};
 
-use athermal_core::compile::Plan;
-use athermal_core::time::Instant;
-use athermal_run::recording::{Event, Samples, Source, SourceError};
+use athermal_core::time::{Duration, Instant};
+use athermal_serve::connector::{ConnectorError, Inlet, Outflow, Source, SourceWiring, Stop};
+use athermal_serve::register_source;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
-/// Lines from whatever has lines: standard input, a serial port, a socket.
-pub struct MyNode<R> {
-    input: R,
-    /// The columns that the graph reads, in its order.
-    columns: Vec<String>,
-    line: Vec<u8>,
-    skipped: u64,
+/// Counts on all channels, one more each time.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct MyNode {
+    /// The time from one count to the next.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    every: Duration,
 }
 
-impl<R: BufRead> MyNode<R> {
-    /// Reads from `input` what the graph of `plan` wants.
-    pub fn new(input: R, plan: &Plan) -> Self {
-        let columns = plan.sources.iter().map(|channel| channel.column.clone());
-        Self {
-            input,
-            columns: columns.collect(),
-            line: Vec::new(),
-            skipped: 0,
-        }
-    }
+register_source!(MyNode, "my_node");
 
-    /// How many lines could not be read. Cables are noisy: one broken line must not end a run, nor go unnoticed.
-    pub fn skipped(&self) -> u64 {
-        self.skipped
+impl MyNode {
+    /// A counter that counts so often.
+    pub fn new(every: Duration) -> Self {
+        Self { every }
     }
 }
 
-impl<R: BufRead> Source for MyNode<R> {
-    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
-        loop {
-            self.line.clear();
-            if self.input.read_until(b'\n', &mut self.line)? == 0 {
-                return Ok(None);
+impl Source for MyNode {
+    fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
+        let every = u64::try_from(self.every.as_ns());
+        let every = every.map_err(|_| ConnectorError::new("`every` is below 0"))?;
+        Ok(Box::new(Counter {
+            every: std::time::Duration::from_nanos(every),
+            channels: wiring.channels.len(),
+            count: 0.0,
+        }))
+    }
+}
+
+struct Counter {
+    every: std::time::Duration,
+    channels: usize,
+    count: f64,
+}
+
+impl Inlet for Counter {
+    fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
+        // Here a connection is made; what fails is worded for whoever reads the log.
+        out.connected();
+        while stop.wait(self.every) {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH);
+            let since = since.map_err(ConnectorError::new)?.as_nanos();
+            // A source that has stamps of its own gives those.
+            let stamp = Instant::from_ns(i64::try_from(since).map_err(ConnectorError::new)?);
+            self.count += 1.0;
+            for channel in 0..self.channels {
+                out.sample(channel, stamp, self.count);
             }
-            if let Some(time) = read(&self.line, &self.columns, samples) {
-                return Ok(Some(Event::Row(time)));
-            }
-            self.skipped += 1;
         }
-    }
-}
-
-/// The instant of a line, whose values go into `samples`; none if it cannot be read.
-fn read(line: &[u8], columns: &[String], samples: &mut Samples) -> Option<Instant> {
-    // A line without its end was cut off, and its last number may be another one.
-    let line = std::str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
-    let mut words = line.split_ascii_whitespace();
-    let seconds = words.next()?;
-    let time = instant(seconds)?;
-    samples.time_text.clear();
-    samples.time_text.push_str(seconds);
-    samples.values.clear();
-    samples.values.resize(columns.len(), f64::NAN);
-    for word in words {
-        let (name, number) = word.split_once('=')?;
-        let value = match number {
-            "-" => f64::NAN,
-            number => number.parse().ok()?,
-        };
-        if let Some(channel) = columns.iter().position(|column| column == name) {
-            samples.values[channel] = value;
-        }
-    }
-    Some(time)
-}
-
-fn instant(seconds: &str) -> Option<Instant> {
-    let ns = (seconds.parse::<f64>().ok()? * 1e9).round();
-    // Written so that NaN fails too.
-    (ns.abs() < i64::MAX as f64).then(|| Instant::from_ns(ns as i64))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What a graph with the channels `plate` and `room` is given.
-    fn given(text: &[u8]) -> (Vec<(i64, Vec<f64>)>, u64) {
-        let mut source = MyNode {
-            input: text,
-            columns: ["plate", "room"].map(str::to_owned).to_vec(),
-            line: Vec::new(),
-            skipped: 0,
-        };
-        let (mut samples, mut rows) = (Samples::default(), Vec::new());
-        while let Some(Event::Row(time)) = source.next(&mut samples).unwrap() {
-            rows.push((time.as_ns() / 1_000_000, samples.values.clone()));
-        }
-        (rows, source.skipped())
-    }
-
-    #[test]
-    fn values_go_to_their_channels_in_any_order() {
-        let text = b"0.0 plate=21.5 room=20\n0.25 room=20.5 door=1 plate=21.6\r\n";
-        let expected = vec![(0, vec![21.5, 20.0]), (250, vec![21.6, 20.5])];
-        assert_eq!(given(text), (expected, 0));
-    }
-
-    #[test]
-    fn what_was_not_measured_is_absent_and_not_what_it_was_before() {
-        let (rows, skipped) = given(b"0 plate=21.5 room=20\n1 plate=-\n2\n");
-        assert_eq!((rows.len(), skipped), (3, 0));
-        assert!(rows[1..].iter().flat_map(|row| &row.1).all(|x| x.is_nan()));
-    }
-
-    #[test]
-    fn lines_that_cannot_be_read_are_left_out_and_counted() {
-        let text = b"ready\n\nNaN plate=1\n1e300 plate=1\n3 plate=2x\n4 plate\n\xff\xfe\n5 plate=21.\n6 plate=2";
-        let (rows, skipped) = given(text);
-        assert_eq!((rows.len(), skipped), (1, 8));
-        assert_eq!((rows[0].0, rows[0].1[0]), (5000, 21.0));
+        Ok(())
     }
 }

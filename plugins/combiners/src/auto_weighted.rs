@@ -22,6 +22,9 @@ use crate::share::{raise, shrink};
 /// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
 /// much, at the cost of the larger ones.
 ///
+/// A voter that steps outside of its fit loses its vote at once: where its `novelty` is above 1, its weight is divided by the square
+/// of that, and the port `novelty` is the mean of the voters' by their weights.
+///
 /// Where all voters have a standard deviation, the port `std_dev` is that of
 /// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
 /// small, since it takes one of the voters to be right.
@@ -101,6 +104,10 @@ impl Combiner for AutoWeighted {
         true
     }
 
+    fn heeds_novelty(&self) -> bool {
+        true
+    }
+
     fn memory(&self) -> Duration {
         self.memory.longest()
     }
@@ -162,9 +169,22 @@ impl Weigher {
     fn weighed(&self, errors: &Errors, votes: Votes<'_>) -> RefMut<'_, Weighed> {
         let mut last = self.last.borrow_mut();
         if !last.is_of(errors, votes) {
-            last.weights.fill(f64::NAN);
-            last.total = self.weigh(errors, votes, &mut last.weights);
-            last.changes = Some(errors.changes());
+            let Weighed {
+                weights,
+                total,
+                changes,
+            } = &mut *last;
+            weights.fill(f64::NAN);
+            *total = self.weigh(errors, votes, weights);
+            *changes = Some(errors.changes());
+            if let Some(trust) = errors.trust()
+                && self.parameters.weights != Weighting::AsPrintedRaw
+            {
+                votes
+                    .present()
+                    .for_each(|(voter, _)| weights[voter] *= trust[voter]);
+                *total = votes.present().map(|(voter, _)| weights[voter]).sum();
+            }
         }
         last
     }

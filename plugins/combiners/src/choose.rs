@@ -13,7 +13,8 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 /// The vote of the voter with the smallest recent root mean square error.
 ///
 /// A voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose vote it is,
-/// and the port `std_dev` its standard deviation where all voters have one.
+/// and the port `std_dev` its standard deviation where all voters have one. The error of a voter whose `novelty` is above 1 counts as
+/// so many times as large.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Best {
@@ -40,6 +41,10 @@ impl Combiner for Best {
     }
 
     fn has_weights(&self) -> bool {
+        true
+    }
+
+    fn heeds_novelty(&self) -> bool {
         true
     }
 
@@ -70,7 +75,9 @@ impl Rule for OfLate {
 }
 
 fn chosen(errors: &Errors, votes: Votes<'_>) -> Option<(usize, f64)> {
-    let error = |voter: usize| errors.means()[voter].unwrap_or(f64::INFINITY);
+    let trust = |voter: usize| errors.trust().map_or(1.0, |trust| trust[voter]);
+    let error =
+        |voter: usize| errors.means()[voter].map_or(f64::INFINITY, |mean| mean / trust(voter));
     votes.present().reduce(|best, next| {
         if error(next.0) < error(best.0) {
             next

@@ -8,6 +8,7 @@ use athermal_core::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::memory::Memory;
+use crate::share::trust;
 
 /// The largest square of an error; a larger one counts as that, so that of so many as there may be in a memory the sum is a number.
 const LARGEST: f64 = 1e290;
@@ -58,6 +59,10 @@ impl<R: Rule> Combine for ByErrors<R> {
         self.rule.reason(&self.errors, votes)
     }
 
+    fn heed(&mut self, novelty: &[f64]) {
+        self.errors.heed(novelty);
+    }
+
     fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
         self.rule.observe(&mut self.errors, votes, truth, arrived);
     }
@@ -104,6 +109,9 @@ pub(crate) struct Errors {
     /// How often the means have changed, so that what follows from them is worked out only then.
     #[serde(skip)]
     changes: u64,
+    /// What each voter counts by how far it is outside of its fit at present: 1 inside; empty where that is not known of any.
+    #[serde(skip)]
+    trust: Vec<f64>,
     /// Up to when truths have been let through.
     #[serde(skip, default = "long_ago")]
     newest: Instant,
@@ -125,6 +133,7 @@ impl Errors {
             means: vec![None; voters],
             counts: vec![0.0; voters],
             changes: 0,
+            trust: Vec::with_capacity(voters),
             newest: long_ago(),
             kept_until: long_ago(),
         }
@@ -135,7 +144,22 @@ impl Errors {
         &self.means
     }
 
-    /// A number that is another one once the means are.
+    /// What each voter counts by how far it is outside of its fit: 1 inside; nothing while all are.
+    pub(crate) fn trust(&self) -> Option<&[f64]> {
+        let outside = self.trust.iter().any(|&trust| trust != 1.0);
+        outside.then_some(&*self.trust)
+    }
+
+    fn heed(&mut self, novelty: &[f64]) {
+        let all = || novelty.iter().map(|&novelty| trust(novelty));
+        if !all().eq(self.trust.iter().copied()) {
+            self.trust.clear();
+            self.trust.extend(all());
+            self.changes += 1;
+        }
+    }
+
+    /// A number that is another one once the means are, or what voters count by their novelty.
     pub(crate) fn changes(&self) -> u64 {
         self.changes
     }
@@ -314,6 +338,7 @@ mod tests {
         let mut guard = Guard {
             memory,
             min_truths: 2,
+            most_novel: 3.0,
         }
         .build(1);
         let weighted: AutoWeighted = serde_json::from_str(r#"{ "memory": "15min" }"#).unwrap();

@@ -8,12 +8,14 @@ use serde::{Deserialize, Serialize};
 use crate::errors::{ByErrors, Errors, Rule};
 use crate::mean::mean;
 use crate::memory::Memory;
+use crate::share::trust;
 
 /// Passes a prediction on only while it does no harm: while its recent error is below that of predicting zero.
 ///
 /// Otherwise it predicts zero, which is what a machine without a model does. Before `min_truths` truths have been compared,
-/// nothing is known to do harm and the prediction passes. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
-/// passes since too little is known. The port `weights` says 0 while it is held back. Of several predictions the mean of those that are
+/// nothing is known to do harm and the prediction passes. One from far outside of its fit is held back before its truth comes: where
+/// its `novelty` is above `most_novel`. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
+/// passes since too little is known, 3 it is held back as it is too novel. The port `weights` says 0 while it is held back. Of several predictions the mean of those that are
 /// there is guarded, and held back when one of them does harm on the truths that it predicted. Where all have a standard deviation, the port `std_dev` passes it on, or that of
 /// their mixture; while the prediction is held back there is none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,10 +30,18 @@ pub struct Guard {
     #[serde(default = "five")]
     #[schemars(range(min = 1))]
     pub min_truths: usize,
+    /// Above which `novelty` a prediction is held back, 1 or more. At the default of 3 one that shrinks has lost two thirds.
+    #[serde(default = "three")]
+    #[schemars(range(min = 1.0))]
+    pub most_novel: f64,
 }
 
 fn five() -> usize {
     5
+}
+
+fn three() -> f64 {
+    3.0
 }
 
 /// The numbers of the port `reason`.
@@ -39,6 +49,7 @@ mod reason {
     pub(super) const HARMLESS: f64 = 0.0;
     pub(super) const HARMS: f64 = 1.0;
     pub(super) const UNKNOWN: f64 = 2.0;
+    pub(super) const NOVEL: f64 = 3.0;
 }
 
 impl Combiner for Guard {
@@ -68,6 +79,10 @@ impl Combiner for Guard {
         true
     }
 
+    fn heeds_novelty(&self) -> bool {
+        true
+    }
+
     fn has_reason(&self) -> bool {
         true
     }
@@ -83,6 +98,7 @@ impl Combiner for Guard {
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         let rule = Guarding {
             min_truths: self.min_truths as f64,
+            least_trust: trust(self.most_novel),
             voters,
         };
         // Behind the voters stands for each of them one that predicts zero whenever it predicts.
@@ -93,16 +109,24 @@ impl Combiner for Guard {
 /// Compares the votes with predicting zero.
 struct Guarding {
     min_truths: f64,
+    /// What a vote at the most novelty counts.
+    least_trust: f64,
     voters: usize,
 }
 
 impl Guarding {
-    /// What is known of the votes that are there: that one does harm counts before that one is not known yet.
+    /// What is known of the votes that are there: that one is too novel or does harm counts before that one is not known yet.
     fn judge(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
         let means = errors.means();
         let mut judged = reason::HARMLESS;
         for (voter, _) in votes.present() {
             let zero = self.voters + voter;
+            if errors
+                .trust()
+                .is_some_and(|trust| trust[voter] < self.least_trust)
+            {
+                return reason::NOVEL;
+            }
             match (means[voter], means[zero]) {
                 (Some(own), Some(of_zero)) if errors.count(zero) >= self.min_truths => {
                     if own >= of_zero {
@@ -116,7 +140,7 @@ impl Guarding {
     }
 
     fn passes(&self, errors: &Errors, votes: Votes<'_>) -> bool {
-        self.judge(errors, votes) != reason::HARMS
+        ![reason::HARMS, reason::NOVEL].contains(&self.judge(errors, votes))
     }
 }
 
@@ -170,6 +194,7 @@ mod tests {
         let mut guard = Guard {
             memory: Memory::Time(Duration::from_ns(600_000_000_000)),
             min_truths: 2,
+            most_novel: 3.0,
         }
         .build(1);
         let vote = Votes(&[7.0]);
@@ -197,6 +222,7 @@ mod tests {
         let mut guard = Guard {
             memory: Memory::Time(Duration::from_ns(600_000_000_000)),
             min_truths: 2,
+            most_novel: 3.0,
         }
         .build(3);
         let gone = f64::NAN;
@@ -224,11 +250,36 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_from_far_outside_of_its_fit_is_held_back_before_any_truth() {
+        let mut guard = Guard {
+            memory: Memory::Time(Duration::from_ns(600_000_000_000)),
+            min_truths: 2,
+            most_novel: 3.0,
+        }
+        .build(1);
+        let vote = Votes(&[7.0]);
+        for (novelty, expected) in [
+            (f64::NAN, (7.0, 2.0)),
+            (2.9, (7.0, 2.0)),
+            (3.1, (0.0, 3.0)),
+            (0.5, (7.0, 2.0)),
+        ] {
+            guard.heed(&[novelty]);
+            assert_eq!(
+                (guard.combine(vote), guard.reason(vote)),
+                expected,
+                "{novelty}"
+            );
+        }
+    }
+
+    #[test]
     fn what_fades_counts_for_less_while_no_truth_comes() {
         let half_life = Duration::from_ns(60_000_000_000);
         let mut guard = Guard {
             memory: Memory::HalfLife(crate::memory::Fading { half_life }),
             min_truths: 5,
+            most_novel: 3.0,
         }
         .build(1);
         let vote = Votes(&[7.0]);

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::memory::Fading;
-use crate::share::raise;
+use crate::share::{raise, trust};
 
 /// Exponential weights: a vote that loses little to the best voter in hindsight, whatever comes.
 ///
@@ -31,6 +31,7 @@ use crate::share::raise;
 ///
 /// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
 /// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
+/// A voter that steps outside of its fit loses its vote at once, as in `auto_weighted`; what it is owed stays.
 /// Where all voters have a standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -65,6 +66,10 @@ impl Combiner for Hedge {
         true
     }
 
+    fn heeds_novelty(&self) -> bool {
+        true
+    }
+
     fn memory(&self) -> Duration {
         let half_life = self.half_life.unwrap_or_default();
         Fading { half_life }.longest()
@@ -83,6 +88,7 @@ impl Combiner for Hedge {
                 widest: 0.0,
                 last: None,
             },
+            trust: vec![1.0; voters],
             room: RefCell::new(vec![0.0; voters]),
         })
     }
@@ -91,6 +97,8 @@ impl Combiner for Hedge {
 struct Hedging {
     parameters: Hedge,
     losses: Losses,
+    /// What each voter counts by its novelty.
+    trust: Vec<f64>,
     /// Room for the weights.
     room: RefCell<Vec<f64>>,
 }
@@ -133,6 +141,21 @@ impl Hedging {
         }
         for (voter, _) in votes.present() {
             weights[voter] /= total;
+        }
+    }
+
+    /// The weights of these votes, with the floor and by their novelty.
+    fn share(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        self.weigh(votes, self.rate(), weights);
+        raise(weights, votes, self.parameters.floor);
+        if self.trust.iter().any(|&trust| trust != 1.0) {
+            votes
+                .present()
+                .for_each(|(voter, _)| weights[voter] *= self.trust[voter]);
+            let total: f64 = votes.present().map(|(voter, _)| weights[voter]).sum();
+            votes
+                .present()
+                .for_each(|(voter, _)| weights[voter] /= total);
         }
     }
 
@@ -199,15 +222,19 @@ impl Combine for Hedging {
             return f64::NAN;
         }
         let weights = &mut *self.room.borrow_mut();
-        self.weigh(votes, self.rate(), weights);
-        raise(weights, votes, self.parameters.floor);
+        self.share(votes, weights);
         let terms = votes.present().map(|(voter, vote)| weights[voter] * vote);
         terms.sum()
     }
 
     fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
-        self.weigh(votes, self.rate(), weights);
-        raise(weights, votes, self.parameters.floor);
+        self.share(votes, weights);
+    }
+
+    fn heed(&mut self, novelty: &[f64]) {
+        for (trusted, &novelty) in self.trust.iter_mut().zip(novelty) {
+            *trusted = trust(novelty);
+        }
     }
 
     fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {

@@ -2,6 +2,16 @@
 
 use athermal_core::node::Votes;
 
+/// What a vote counts whose regressors are so far outside of those of its fit: 1 up to the edge, then by the inverse square, as
+/// `auto_weighted` weighs an error that is so many times as large.
+pub(crate) fn trust(novelty: f64) -> f64 {
+    if novelty > 1.0 {
+        1.0 / (novelty * novelty)
+    } else {
+        1.0
+    }
+}
+
 /// Draws the weights of the votes that are there towards equal ones, and makes them add up to one.
 pub(crate) fn shrink(weights: &mut [f64], votes: Votes<'_>, shrinkage: f64) {
     let count = votes.present().count() as f64;

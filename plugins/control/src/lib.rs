@@ -1,6 +1,7 @@
 //! Control nodes of athermal: from a predicted drift to a correction that may be trusted, and what it is worth.
 
 mod compensate;
+mod cross_check;
 mod health;
 mod limit;
 pub mod optical_loss;
@@ -10,6 +11,7 @@ mod stability;
 mod uncorrected;
 
 pub use compensate::{Compensate, Stop, held_back_by};
+pub use cross_check::CrossCheck;
 pub use health::{Health, health_reason};
 pub use optical_loss::OpticalLoss;
 pub use safe_state::{SafeState, WhenLost};

@@ -6,7 +6,7 @@ use athermal_core::node::{
 };
 use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
-use athermal_numerics::Standardizer;
+use athermal_numerics::{Novelty, Standardizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,8 @@ const MOST_TERMS: usize = 500;
 /// `ŷ(t + ahead) = b₀ + Σ b_j z_j + Σ b_jk z_j z_k` with features centred and scaled by the rows of the fit, so that a square is not
 /// nearly its feature once more. Terms are chosen by stepwise regression, as Chen (1996) did for the thermal errors of a
 /// machining centre, unless another selection is stated; there may be 500 of them at most. Outside the range of the fit a
-/// square grows without bound: put a `guard` behind it.
+/// square grows without bound: the port `novelty` shows where that is, of the terms as that of `linear` does of features, and `outside`
+/// says what becomes of it. Put a `guard` behind it too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Polynomial {
@@ -57,6 +58,10 @@ impl Estimator for Polynomial {
 
     fn mistakes(&self) -> Vec<Mistake> {
         self.solver.mistakes()
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
@@ -244,6 +249,10 @@ impl Trainer for PolynomialTrainer {
             terms: Vec::new(),
             coefficients: Vec::new(),
             intercept: linear.intercept,
+            // It is of all terms, which are those that are left but where one has no coefficient.
+            novelty: linear
+                .novelty
+                .filter(|_| linear.coefficients.iter().all(|b| *b != 0.0)),
         };
         let mut used: Vec<usize> = Vec::new();
         let mut place = |feature: usize| {
@@ -294,6 +303,9 @@ pub struct PolynomialPredictor {
     /// The intercept, in the unit of the truth.
     #[serde(with = "number")]
     intercept: f64,
+    /// How far terms are from those of the fit, where its rows say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    novelty: Option<Novelty>,
 }
 
 impl Predictor for PolynomialPredictor {
@@ -309,6 +321,10 @@ impl Predictor for PolynomialPredictor {
         mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
         let features = self.terms.iter().flat_map(|term| [Some(term.0), term.1]);
         mistakes.extend(term_mistake(width, features.flatten()));
+        if let Some(novelty) = &self.novelty {
+            let lists = [("novelty.means", novelty.width())];
+            mistakes.extend(Mistake::of_lengths(self.terms.len(), &lists));
+        }
         mistakes
     }
 
@@ -328,6 +344,24 @@ impl Predictor for PolynomialPredictor {
             terms: std::iter::once(constant).chain(terms).collect(),
             ..Coefficients::default()
         })
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        let z = |j: usize| (regressors[j] - self.centres[j]) / self.scales[j];
+        let terms = self.terms.iter();
+        let terms = terms.map(|term| z(term.0) * term.1.map_or(1.0, z));
+        let novelty = self.novelty.as_ref();
+        novelty.map_or(f64::NAN, |novelty| novelty.at_each(terms))
+    }
+
+    fn centre(&self) -> f64 {
+        let means = self.novelty.iter().flat_map(Novelty::means);
+        let products = self
+            .coefficients
+            .iter()
+            .zip(means)
+            .map(|(b, mean)| b * mean);
+        self.intercept + products.sum::<f64>()
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -279,6 +279,10 @@ impl Trainer for LinearTrainer {
         self.blocks.push(regressors, truth);
     }
 
+    fn segment(&mut self) {
+        self.blocks.segment();
+    }
+
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         let predictor: Box<dyn Predictor> = match self.fitted(&mut report)? {
@@ -402,6 +406,16 @@ impl Predictor for LinearPredictor {
     fn novelty(&self, regressors: &[f64]) -> f64 {
         let novelty = self.novelty.as_ref();
         novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
+    }
+
+    fn centre(&self) -> f64 {
+        let means = self.novelty.iter().flat_map(Novelty::means);
+        let products = self
+            .coefficients
+            .iter()
+            .zip(means)
+            .map(|(b, mean)| b * mean);
+        self.intercept + products.sum::<f64>()
     }
 
     fn std_dev(&self, regressors: &[f64]) -> f64 {

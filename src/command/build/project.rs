@@ -11,10 +11,11 @@ use crate::terminal::Failure;
 const MARK: &str = "# Written by `athermal build`, which writes it again.\n";
 
 /// The crates of athermal that a plugin may ask a registry for.
-const CRATES: [(&str, &str); 6] = [
+const CRATES: [(&str, &str); 7] = [
     ("athermal-core", "core/framework"),
     ("athermal-graph", "core/graph"),
     ("athermal-run", "core/run"),
+    ("athermal-serve", "core/serve"),
     ("athermal-trial", "core/trial"),
     ("athermal-testkit", "core/testkit"),
     ("athermal-numerics", "core/numerics"),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use athermal::core::node::kinds;
 use athermal::trial::machine::machines;
+use athermal_serve::connector::{sink_kind, source_kind};
 use clap::Args;
 use serde_json::json;
 
@@ -16,7 +17,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Write a crate with a node type, a source, a sink or a machine of your own
 ///
 /// The crate builds as it is: something small that works, its tests, a graph with a test, and a README with what to do
-/// next. A node comes with the tests of the rules that every node keeps, a source or a sink with a live program of its own.
+/// next. A node, a source and a sink come with the tests of the rules that each of them keeps.
 /// Change it into yours and run its tests.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -60,10 +61,9 @@ impl Plugin {
         let words = [
             ("VERSION", VERSION.to_owned()),
             ("CORE", of("core/framework")),
-            ("RUN", of("core/run")),
+            ("SERVE", of("core/serve")),
             ("TRIAL", of("core/trial")),
             ("TESTKIT", of("core/testkit")),
-            ("ATHERMAL", in_toml(checkout.folder())),
         ];
         let mut written = Vec::new();
         for (path, text) in files(&names, self.role, &words) {
@@ -83,7 +83,7 @@ impl Plugin {
                 json!({
                     "folder": folder,
                     "role": self.role,
-                    "kind": self.role.is_node().then_some(names.kind),
+                    "kind": self.role.has_kind().then_some(names.kind),
                     "files": written,
                 })
             );
@@ -111,10 +111,20 @@ impl Plugin {
         let machine = machines()
             .get(self.name.as_str())
             .and_then(|all| all.first());
-        let (what, name, package, version) = match (self.role, kind, machine) {
-            (Role::Machine, _, Some(of)) => ("machine", of.machine.name(), of.package, of.version),
-            (role, Some(of), _) if role.is_node() => ("node type", of.name, of.package, of.version),
-            _ => return Ok(()),
+        let taken = match self.role {
+            Role::Machine => {
+                machine.map(|of| ("machine", of.machine.name(), of.package, of.version))
+            }
+            Role::Source => {
+                source_kind(&names.kind).map(|of| ("source", of.name, of.package, of.version))
+            }
+            Role::Sink => {
+                sink_kind(&names.kind).map(|of| ("sink", of.name, of.package, of.version))
+            }
+            _ => kind.map(|of| ("node type", of.name, of.package, of.version)),
+        };
+        let Some((what, name, package, version)) = taken else {
+            return Ok(());
         };
         Err(Failure::Request(format!(
             "there is a {what} `{name}` already, from {package} {version}; a second one of the name could not be used beside it"
@@ -129,6 +139,9 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
 }
 
+/// What to do with a source or a sink.
+const SERVE: &str = "build a binary that has it, and serve a graph with it";
+
 /// What was written, and what to type next.
 fn next(folder: &Path, names: &Names, role: Role) -> String {
     let Names { package, kind, .. } = names;
@@ -141,28 +154,21 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
             format!("the machine `{package}`"),
             "build a binary that has it, and try a graph on it",
         ),
-        Role::Source => ("a source".to_owned(), "run a graph with it (see README.md)"),
-        Role::Sink => ("a sink".to_owned(), "run a graph with it (see README.md)"),
+        Role::Source => (format!("the source `{kind}`"), SERVE),
+        Role::Sink => (format!("the sink `{kind}`"), SERVE),
     };
     let graph = format!("graphs/{package}.toml");
     let mut lines = vec![
         command(&["cd", &quoted(&folder.display().to_string())]),
         "  cargo test".to_owned(),
     ];
-    match role {
-        Role::Source => {
-            let line = "echo '0 plate=21.5' |";
-            lines.push(command(&[line, "cargo run --example run --", &graph]));
-        }
-        Role::Sink => {
-            lines.push(command(&["cargo run --example run --", &graph, "log.csv"]));
-        }
-        _ => {
-            let build = "build --with path:. -o target/athermal";
-            lines.push(command(&[&program(), build]));
-            lines.push(command(&["target/athermal test", &graph]));
-        }
-    }
+    let build = "build --with path:. -o target/athermal";
+    lines.push(command(&[&program(), build]));
+    let tries = match role.is_live() {
+        true => "target/athermal serve",
+        false => "target/athermal test",
+    };
+    lines.push(command(&[tries, &graph]));
     format!(
         "wrote {}, with {brings}; test it, {then}:\n{}",
         folder.display(),

@@ -1,5 +1,5 @@
 //! The files of a new plugin crate. Their texts are those of `examples/templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
-//! name, and `CORE`, `RUN`, `TRIAL`, `TESTKIT`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
+//! name, and `CORE`, `SERVE`, `TRIAL`, `TESTKIT` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -27,6 +27,18 @@ impl Role {
     #[must_use]
     pub fn is_node(self) -> bool {
         matches!(self, Self::Feature | Self::Estimator | Self::Combiner)
+    }
+
+    /// Whether graph files name it as a `type`.
+    #[must_use]
+    pub fn has_kind(self) -> bool {
+        self.is_node() || self.is_live()
+    }
+
+    /// Whether it is part of a service.
+    #[must_use]
+    pub fn is_live(self) -> bool {
+        matches!(self, Self::Source | Self::Sink)
     }
 }
 
@@ -105,7 +117,7 @@ fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
             "Cargo.toml": "node/Cargo.toml.txt", "README.md": "node/README.md.txt",
         ],
         Role::Source | Role::Sink => files![
-            "Cargo.toml": "live/Cargo.toml.txt", "graphs/my-node.toml": "live/graph.toml",
+            "Cargo.toml": "live/Cargo.toml.txt",
         ],
         Role::Machine => files![
             "Cargo.toml": "machine/Cargo.toml.txt", "README.md": "machine/README.md.txt",
@@ -126,11 +138,11 @@ fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
         ],
         Role::Source => files![
             "src/lib.rs": "source/lib.rs", "tests/live.rs": "source/live.rs",
-            "examples/run.rs": "source/run.rs", "README.md": "source/README.md.txt",
+            "graphs/my-node.toml": "source/graph.toml", "README.md": "source/README.md.txt",
         ],
         Role::Sink => files![
             "src/lib.rs": "sink/lib.rs", "tests/live.rs": "sink/live.rs",
-            "examples/run.rs": "sink/run.rs", "README.md": "sink/README.md.txt",
+            "graphs/my-node.toml": "sink/graph.toml", "README.md": "sink/README.md.txt",
         ],
         Role::Machine => files![
             "src/lib.rs": "machine/lib.rs", "tests/conformance.rs": "machine/conformance.rs",
@@ -162,14 +174,14 @@ mod tests {
         let names = Names::of("room-lag").unwrap();
         let words = [
             ("VERSION", "1.2.3".to_owned()),
-            ("CORE", "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned()),
-            ("ATHERMAL", "\"/srv/my-node\"".to_owned()),
+            ("CORE", "\"/srv/my-node/SERVE/CORE/VERSION\"".to_owned()),
+            ("SERVE", "\"/srv/my-node/SERVE\"".to_owned()),
         ];
         let (path, text) = files(&names, Role::Source, &words).swap_remove(0);
         assert_eq!(path, "Cargo.toml");
         for line in [
-            "athermal-core = { path = \"/srv/my-node/ATHERMAL/CORE/VERSION\", version = \"1.2.3\" }\n",
-            "athermal = { path = \"/srv/my-node\", version = \"1.2.3\", default-features = false }\n",
+            "athermal-core = { path = \"/srv/my-node/SERVE/CORE/VERSION\", version = \"1.2.3\" }\n",
+            "athermal-serve = { path = \"/srv/my-node/SERVE\", version = \"1.2.3\" }\n",
         ] {
             assert!(text.contains(line), "{text}");
         }
@@ -178,13 +190,12 @@ mod tests {
     #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
-        let words = ["VERSION", "CORE", "RUN", "TRIAL", "TESTKIT", "ATHERMAL"]
+        let words = ["VERSION", "CORE", "SERVE", "TRIAL", "TESTKIT"]
             .map(|word| (word, "\"/sources\"".to_owned()));
         for role in Role::value_variants() {
             for (path, text) in files(&names, *role, &words) {
                 for left in [
-                    "my_node", "my-node", "MyNode", "CORE", "RUN", "TRIAL", "TESTKIT", "VERSION",
-                    "ATHERMAL",
+                    "my_node", "my-node", "MyNode", "CORE", "SERVE", "TRIAL", "TESTKIT", "VERSION",
                 ] {
                     assert!(!path.contains(left), "{left} in {path}");
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");

@@ -1,5 +1,6 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
+mod connectors;
 mod parameters;
 mod settings;
 
@@ -14,11 +15,11 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::{page, paragraph};
 use settings::settings;
 
-/// List the node types, or explain one
+/// List the node types and the kinds of sources and sinks, or explain one
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal nodes\n  athermal nodes slope")]
+#[command(after_help = "Examples:\n  athermal nodes\n  athermal nodes slope\n  athermal nodes csv")]
 pub struct Nodes {
-    /// The type to explain
+    /// The type or kind to explain
     name: Option<String>,
 }
 
@@ -30,17 +31,22 @@ impl Nodes {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match &self.name {
             None => list(terminal),
-            Some(name) => explain(terminal, kind(name).ok_or_else(|| unknown(name))?),
+            Some(name) => match kind(name) {
+                Some(kind) => explain(terminal, kind),
+                None if connectors::explain(terminal, name) => {}
+                None => return Err(unknown(name)),
+            },
         }
         Ok(Answer::Fine)
     }
 }
 
 fn unknown(name: &str) -> Failure {
-    let near = nearest(name, kinds().keys().copied());
+    let all = kinds().keys().chain(connectors::names());
+    let near = nearest(name, all.copied());
     let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
     Failure::Request(format!(
-        "there is no node type `{name}`{near} (`athermal nodes` lists them all)"
+        "there is no node type, source or sink `{name}`{near} (`athermal nodes` lists them all)"
     ))
 }
 
@@ -48,7 +54,10 @@ fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
         let all = kinds().values().flatten();
         let all: Vec<Value> = all.map(|kind| describe(kind)).collect();
-        println!("{:#}", json!({ "nodes": all, "written": written_names() }));
+        let (sources, sinks) = connectors::describe_all();
+        let all =
+            json!({ "nodes": all, "sources": sources, "sinks": sinks, "written": written_names() });
+        println!("{all:#}");
         return;
     }
     let group = |kind: &Kind| (kind.role, kind.package, kind.version);
@@ -63,6 +72,7 @@ fn list(terminal: &Terminal) {
             print!("{}", paragraph(&name, name.len(), &kind.summary()));
         }
     }
+    connectors::list();
 }
 
 fn explain(terminal: &Terminal, kind: &Kind) {
@@ -96,7 +106,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     if !outputs.is_empty() {
         println!("\nOutput ports, the first where none is named:");
     }
-    for (port, what) in outputs {
+    for (port, what) in &outputs {
         let name = format!("  {port:<17} ");
         print!("{}", paragraph(&name, 6, &what));
     }
@@ -114,6 +124,12 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         line(
             "train.abs_truth (table) – `{ below = \"…\", above = \"…\" }`: the truths that are fitted on",
         );
+        if outputs.iter().any(|(port, _)| *port == "novelty") {
+            line(
+                "outside (\"shrink\", \"absent\" or \"pass\") – what becomes of predictions where `novelty` is above 1: their distance from \
+                 the mean of the fit is divided by it, which is the default, there are none, or they stay; not with `learn`",
+            );
+        }
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
             line(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
@@ -193,6 +209,11 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                 port(
                     "std_dev",
                     "where all voters have one: that of the truth about the prediction",
+                    weighs,
+                ),
+                port(
+                    "novelty",
+                    "where voters have one: its mean by their weights",
                     weighs,
                 ),
             ];

@@ -26,7 +26,7 @@ use serde_json::json;
 
 use crate::command::aside::check_apart;
 use crate::command::faults::{self, ChannelWatch, Purpose};
-use crate::command::model::{self, check_fitted, warn_unfitted};
+use crate::command::model::{self, check_fitted, warn_unfitted, warn_without_novelty};
 use crate::command::{beyond, data, refused, unread};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -87,6 +87,7 @@ impl Run {
         let reports = Reports { terminal, ends };
         let (model, watched) = self.load(&terminal, state.as_ref())?;
         warn_unfitted(&terminal, &model, &self.model);
+        warn_without_novelty(&terminal, &model, &self.model);
         if let Some(words) = feedback::in_words(&model.plan) {
             terminal.warning(words);
         }

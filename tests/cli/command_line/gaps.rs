@@ -59,10 +59,19 @@ file = "out.csv"
     assert_told("command-line-deployment", &text, &expected);
     let (graph, _) = text.split_once("[source]").unwrap();
     let text = format!("{graph}[runtime]\nheartbeat = 1\nhartbeat = \"1s\"\n");
-    let expected = [(19, "expected a duration"), (20, "no key \"hartbeat\"")];
+    let unused = (4, "no output depends on the signal");
+    let expected = [
+        unused,
+        (19, "expected a duration"),
+        (20, "no key \"hartbeat\""),
+    ];
     assert_told("command-line-runtime", &text, &expected);
     let text = text.replace("heartbeat = 1\nhartbeat = \"1s\"", "heartbeat = \"0s\"");
-    assert_told("command-line-heartbeat", &text, &[(19, "greater than 0")]);
+    assert_told(
+        "command-line-heartbeat",
+        &text,
+        &[unused, (19, "greater than 0")],
+    );
     let text = "schema = 1\nsources = \"a.csv\"\nruntime = 3\nmodel = 4\n";
     let expected = [
         (2, "expected a table for \"sources\""),

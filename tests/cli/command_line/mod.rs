@@ -13,6 +13,7 @@ mod mistakes;
 mod mistakes_in_tests;
 mod next;
 mod numbers;
+mod older;
 mod programs;
 mod references;
 mod requests;

@@ -129,8 +129,14 @@ fn ports(kind: &str) -> BTreeMap<String, String> {
 fn the_page_of_a_node_names_the_output_ports_that_it_has() {
     for (kind, expected) in [
         ("rls", &["learning", "prediction", "std_dev"][..]),
-        ("auto_weighted", &["prediction", "std_dev", "weights"]),
-        ("guard", &["prediction", "reason", "std_dev", "weights"]),
+        (
+            "auto_weighted",
+            &["novelty", "prediction", "std_dev", "weights"],
+        ),
+        (
+            "guard",
+            &["novelty", "prediction", "reason", "std_dev", "weights"],
+        ),
         ("conformal", &["lower", "prediction", "upper"]),
         ("narx", &["prediction"]),
     ] {

@@ -219,6 +219,7 @@ type = \"linear\"
 inputs.features = \"code\"
 inputs.truth = \"position.Z\"
 ahead = \"30s\"
+outside = \"pass\"
 "
     )
 }

@@ -25,12 +25,14 @@ inputs.features = \"temperature\"
 inputs.truth = \"position.Z\"
 ahead = \"0s\"
 solver = {{ type = \"ols\" }}
+outside = \"pass\"
 [nodes.rich]
 type = \"linear\"
 inputs.features = \"past\"
 inputs.truth = \"position.Z\"
 ahead = \"0s\"
 solver = {{ type = \"ols\" }}
+outside = \"pass\"
 [nodes.stack]
 type = \"stack\"
 inputs.voters = [\"plain\", \"rich\"]

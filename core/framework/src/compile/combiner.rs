@@ -2,12 +2,22 @@
 
 use super::estimator::{about, std_dev_of};
 use super::instance::Instance;
-use super::plan::{AuxPorts, PlannedRole, STD_DEV, TruthLink, WEIGHTS};
+use super::plan::{AuxPorts, NOVELTY, PlannedRole, STD_DEV, TruthLink, WEIGHTS};
 use super::provenance::Provenance;
 use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::node::{Combiner, InputPort, OutputPort};
 use crate::time::Duration;
+use crate::unit::Unit;
+
+/// What comes out of a combiner, where in the plan that is which always stands beside the prediction, and the gathers of the
+/// deviations of its votes and of their novelties.
+type Ports = (
+    Vec<OutputPort>,
+    AuxPorts,
+    Option<usize>,
+    Option<(usize, Vec<usize>)>,
+);
 
 impl Resolver<'_> {
     pub(super) fn combiner(
@@ -90,13 +100,14 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let (outputs, beside, std_devs) =
+        let (outputs, beside, std_devs, novelties) =
             self.ports(instance, combiner, combined, (&port, &voters))?;
         let channels = outputs.iter().map(|port| port.channels.len()).sum();
         let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
             voters: gather,
             std_devs,
+            novelties,
             state,
             truth: link,
             beside,
@@ -104,16 +115,15 @@ impl Resolver<'_> {
         self.add(instance, outputs, role, behind, predicts)
     }
 
-    /// What comes out of a combiner, where in the plan that is which always stands beside the prediction, and the gather of the
-    /// deviations of its votes.
+    /// What comes out of a combiner, and what is read for it beside the votes.
     fn ports(
         &mut self,
         instance: &Instance<'_>,
         combiner: &dyn Combiner,
         combined: Channel,
         (port, voters): (&InputPort, &[usize]),
-    ) -> Option<(Vec<OutputPort>, AuxPorts, Option<usize>)> {
-        let reason = about(&self.channels[voters[0]].channel, combined.name.clone());
+    ) -> Option<Ports> {
+        let number = about(&self.channels[voters[0]].channel, combined.name.clone());
         let std_dev = std_dev_of(&combined);
         let mut outputs = vec![OutputPort {
             name: "prediction",
@@ -131,7 +141,7 @@ impl Resolver<'_> {
             put(WEIGHTS, self.weights(voters));
         }
         if combiner.has_reason() {
-            beside.reason = Some(put("reason", vec![reason]));
+            beside.reason = Some(put("reason", vec![number.clone()]));
         }
         if combiner.coverage().is_some() {
             let mut bound = |name| put(name, vec![combined.clone()]);
@@ -145,19 +155,38 @@ impl Resolver<'_> {
             put(std_dev.name, std_dev.channels);
             of_votes = Some(self.gather(instance, port, &of_voters, &lags, Some(&unit))?);
         }
-        Some((outputs, beside, of_votes))
+        let mut novelties = None;
+        if combiner.has_weights()
+            && let Some((which, slots)) = self.novelties(voters)
+        {
+            put(NOVELTY, vec![number]);
+            let (unit, lags) = (Unit::one(), [Duration::ZERO]);
+            let gather = self.gather(instance, port, &slots, &lags, Some(&unit))?;
+            novelties = Some((gather, which));
+        }
+        Some((outputs, beside, of_votes, novelties))
+    }
+
+    /// The novelties that stand beside these predictions, with which of them they are of; none where there is none.
+    fn novelties(&self, voters: &[usize]) -> Option<(Vec<usize>, Vec<usize>)> {
+        let beside = |(nth, &slot): (usize, &usize)| Some((nth, self.beside(slot, NOVELTY)?));
+        let (which, slots): (Vec<_>, Vec<_>) = voters.iter().enumerate().filter_map(beside).unzip();
+        (!slots.is_empty()).then_some((which, slots))
     }
 
     /// The standard deviation that stands beside each of these predictions, where all have one.
     fn std_devs(&self, voters: &[usize]) -> Option<Vec<usize>> {
-        let beside = |&slot: &usize| {
-            let node = &self.nodes[self.channels[slot].node?];
-            let (_, predictions) = node.ports.first()?;
-            let (_, std_devs) = node.ports.iter().find(|(name, _)| *name == STD_DEV)?;
-            let nth = slot.checked_sub(predictions.start)?;
-            (nth < std_devs.len()).then(|| std_devs.start + nth)
-        };
-        voters.iter().map(beside).collect()
+        let all = voters.iter().map(|&slot| self.beside(slot, STD_DEV));
+        all.collect()
+    }
+
+    /// The channel of a port that stands beside a prediction.
+    fn beside(&self, slot: usize, port: &str) -> Option<usize> {
+        let node = &self.nodes[self.channels[slot].node?];
+        let (_, predictions) = node.ports.first()?;
+        let (_, beside) = node.ports.iter().find(|(name, _)| *name == port)?;
+        let nth = slot.checked_sub(predictions.start)?;
+        (nth < beside.len()).then(|| beside.start + nth)
     }
 
     /// A channel for the weight of each voter, named after the voter's node, or after the voter where that is not enough.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::instance::{Declared, Instance};
-use super::keys::{EstimatorKeys, Limits};
+use super::keys::{EstimatorKeys, Learn, Limits, Outside};
 use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{NOVELTY, PlannedFit, PlannedRole, STD_DEV, TrainingLimits, TruthLink};
@@ -13,7 +13,7 @@ use super::resolver::Resolver;
 use super::row::Row;
 use crate::channel::Channel;
 use crate::diagnostic::Problem;
-use crate::node::{Estimator, FREEZE, OutputPort};
+use crate::node::{Estimator, FREEZE, Learns, Mistake, OutputPort};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -112,6 +112,7 @@ impl Resolver<'_> {
         }
         let training = self.limits(instance, &instance.read.estimator, link.slot);
         let learning = self.learning(instance, estimator);
+        let outside = self.outside(instance, estimator);
         if !whole {
             return None;
         }
@@ -151,11 +152,36 @@ impl Resolver<'_> {
             learning,
             std_dev: None,
             novelty: None,
+            outside: outside?,
         };
         self.add(instance, ports, role, behind, Some(truth))?;
         // Asked for later by whoever wants to know whether it needs a fit, and to fail here where it fails.
         let added = self.nodes.last();
         added.map(|node| drop(node.fixed()))
+    }
+
+    /// What becomes of predictions outside of the rows of the fit; `None` when an error about it has been reported.
+    fn outside(&mut self, instance: &Instance<'_>, estimator: &dyn Estimator) -> Option<Outside> {
+        let EstimatorKeys { outside, learn, .. } = instance.read.estimator;
+        let learns = match estimator.learns() {
+            Learns::Never { .. } => false,
+            Learns::OnRequest => learn.is_some_and(|learn| learn != Learn::Switch(false)),
+            Learns::ByDefault => learn != Some(Learn::Switch(false)),
+        };
+        let why = match outside {
+            _ if estimator.has_novelty() && !learns => {
+                return Some(outside.unwrap_or(Outside::Shrink));
+            }
+            None => return Some(Outside::Pass),
+            Some(_) if learns => {
+                "it goes on learning, and what it has learned since the fit lies outside of that"
+            }
+            Some(_) => "its fit does not say how far regressors are outside of it",
+        };
+        let message = format!("`outside` would do nothing: {why}");
+        let mistake = Mistake::at("outside", message).help("leave `outside` out");
+        self.mistakes(instance, vec![mistake]);
+        None
     }
 
     /// How far ahead of now the truth is that is learned from.

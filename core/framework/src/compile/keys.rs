@@ -17,6 +17,32 @@ pub struct EstimatorKeys {
     pub(crate) train: Train,
     /// Whether it goes on learning while it runs: `true`, or a table of limits.
     pub(crate) learn: Option<Learn>,
+    /// What becomes of predictions from regressors outside of those of the fit, where the port `novelty` is above 1.
+    pub(crate) outside: Option<Outside>,
+}
+
+/// What becomes of predictions from regressors outside of those of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Outside {
+    /// Their distance from the mean of the truths of the fit is divided by the novelty, which is the default. The standard deviation
+    /// `σ` becomes `√((novelty · σ)² + d²)`, `d` being how far the prediction has moved.
+    Shrink,
+    /// There is none.
+    Absent,
+    /// They stay as they are.
+    Pass,
+}
+
+impl Outside {
+    /// As graph files have it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Shrink => "shrink",
+            Self::Absent => "absent",
+            Self::Pass => "pass",
+        }
+    }
 }
 
 /// Which rows an estimator is trained on.

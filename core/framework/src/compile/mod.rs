@@ -36,7 +36,7 @@ pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
 pub use gate::Misordered;
-pub use keys::EstimatorKeys;
+pub use keys::{EstimatorKeys, Outside};
 pub use kind_fault::KindFault;
 pub use plan::{
     AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,

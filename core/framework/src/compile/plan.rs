@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::instance::instance_name;
+use super::keys::Outside;
 use super::origins::upstream;
 use super::persistence_lag;
 use super::provenance::smallest_lag;
@@ -199,6 +200,8 @@ pub enum PlannedRole {
         std_dev: Option<usize>,
         /// The slot of the novelty of its regressors, where somebody reads it.
         novelty: Option<usize>,
+        /// What becomes of its predictions where that is above 1.
+        outside: Outside,
     },
     /// One prediction of several.
     Combiner {
@@ -206,6 +209,8 @@ pub enum PlannedRole {
         voters: usize,
         /// The gather of their standard deviations, where all have one: read only for one of the combination.
         std_devs: Option<usize>,
+        /// The gather of the novelties of those votes that have one, and which these are.
+        novelties: Option<(usize, Vec<usize>)>,
         /// The gather of the state that it goes by, where it goes by one.
         state: Option<usize>,
         /// What is predicted, where it learns from errors.
@@ -234,7 +239,11 @@ impl PlannedRole {
             Self::Estimator { learning, .. } => learning.as_ref().and_then(|l| l.freeze),
             Self::Combiner { beside, .. } => beside.std_dev.map(|(_, of_voters)| of_voters),
         };
-        self.inputs().chain(more)
+        let novelties = match self {
+            Self::Combiner { beside, .. } => beside.novelties,
+            Self::Feature { .. } | Self::Estimator { .. } => None,
+        };
+        self.inputs().chain(more).chain(novelties)
     }
 
     /// What it is fitted on, where it is fitted, or would be if it were not known what it predicts by.
@@ -353,6 +362,10 @@ pub struct AuxPorts {
     pub bounds: Option<(usize, usize)>,
     /// Of the standard deviation, where somebody reads it, and the gather of those of the voters.
     pub std_dev: Option<(usize, usize)>,
+    /// Of the novelty, where somebody reads it.
+    pub novelty: Option<usize>,
+    /// The gather of the novelties of voters, where it heeds them or shows its own.
+    pub novelties: Option<usize>,
 }
 
 /// How an estimator goes on learning while it runs.

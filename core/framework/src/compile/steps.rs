@@ -10,6 +10,7 @@ use super::plan::{NOVELTY, Plan, PlannedNode, PlannedRole, STD_DEV, Step, WEIGHT
 use super::problem;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
+use crate::node::Role;
 use crate::time::Duration;
 
 /// Makes a plan that can be stepped of nodes that stand in an order in which they can run. `read` are the slots that somebody
@@ -115,12 +116,20 @@ fn mark_read(plan: &mut Plan, read: impl IntoIterator<Item = usize>, wanted: Wan
                 *outside = outside.or(novelty);
             }
             PlannedRole::Combiner {
-                std_devs, beside, ..
+                std_devs,
+                novelties,
+                beside,
+                ..
             } => {
                 beside.weights = beside.weights.or(weights);
                 beside.std_dev = beside.std_dev.or(std_dev.zip(*std_devs));
-                if let Some((_, of_votes)) = beside.std_dev {
-                    let entries = &plan.gathers[of_votes].entries;
+                beside.novelty = beside.novelty.or(novelty);
+                let heeds = matches!(node.spec.role(), Role::Combiner(of) if of.heeds_novelty());
+                let novelties = novelties.as_ref().map(|&(gather, _)| gather);
+                beside.novelties = novelties.filter(|_| heeds || beside.novelty.is_some());
+                let of_votes = beside.std_dev.map(|(_, of_votes)| of_votes);
+                for gather in of_votes.into_iter().chain(beside.novelties) {
+                    let entries = &plan.gathers[gather].entries;
                     entries.iter().for_each(|of| is_read[of.slot] = true);
                 }
             }

@@ -68,6 +68,11 @@ pub trait Combiner: Debug + Send + Sync {
         false
     }
 
+    /// Whether it goes by how far the regressors of each voter are outside of those of its fit: see [`Combine::heed`].
+    fn heeds_novelty(&self) -> bool {
+        false
+    }
+
     /// The share of truths that its intervals are to cover, for kinds that give intervals: the ports `lower` and `upper`.
     fn coverage(&self) -> Option<f64> {
         None
@@ -118,6 +123,10 @@ pub trait Combine: Send {
 
     /// Called before [`combine`](Combine::combine), for kinds with an input `state`: its value, NaN where there is none.
     fn state(&mut self, _now: Instant, _state: f64) {}
+
+    /// Called before [`combine`](Combine::combine), for kinds that [heed](Combiner::heeds_novelty) it: how far the regressors of
+    /// each voter are outside of those of its fit, 1 at the edge; NaN where that is not known.
+    fn heed(&mut self, _novelty: &[f64]) {}
 
     /// A truth and the votes that were cast for it. `arrived` is when the truth was measured.
     fn observe(&mut self, _votes: Votes<'_>, _truth: f64, _arrived: Instant) {}

@@ -48,6 +48,12 @@ pub trait Predictor: InModel + Any + Debug + Send + Sync {
         f64::NAN
     }
 
+    /// What it predicts in the middle of the rows of the fit, the mean of their truths: where a prediction outside of them goes that is
+    /// not trusted. Only asked of kinds that say [`Estimator::has_novelty`](super::Estimator::has_novelty).
+    fn centre(&self) -> f64 {
+        0.0
+    }
+
     /// What it consists of, for people; none for one that says nothing of it.
     fn coefficients(&self) -> Option<Coefficients> {
         None

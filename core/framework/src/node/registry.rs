@@ -101,7 +101,7 @@ impl Kind {
     pub fn framework_keys(&self) -> &'static [&'static str] {
         let learns_from_truth = || (self.inputs)().iter().any(|port| port.read == Read::Truth);
         match self.role {
-            RoleName::Estimator => &["ahead", "train", "learn"],
+            RoleName::Estimator => &["ahead", "train", "learn", "outside"],
             RoleName::Feature if learns_from_truth() => &["ahead", "train"],
             RoleName::Feature | RoleName::Combiner => &[],
         }
@@ -120,6 +120,7 @@ impl Kind {
                 "lower",
                 "upper",
                 "std_dev",
+                "novelty",
             ],
         }
     }

@@ -293,12 +293,17 @@ impl<'a> GraphChannels<'a> {
         };
         let unit_place = entry.value.place_of("unit");
         let mut claims = Vec::new();
+        // Of an entry for several channels one has what is wrong with its unit.
+        let mut unit = keys.unit.as_ref();
         for (channel, pairs) in found {
+            let before = diagnostics.error_count();
+            let conversion = self.conversion(channel, unit, unit_place, diagnostics);
+            unit = unit.filter(|_| diagnostics.error_count() == before);
             claims.push(Claim {
                 channel,
                 place: entry.key,
                 address: address(channel, pairs),
-                conversion: self.conversion(channel, keys.unit.as_ref(), unit_place, diagnostics),
+                conversion,
                 late: keys.late,
             });
         }

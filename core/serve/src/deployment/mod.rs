@@ -1,14 +1,17 @@
 //! What a machine file says about a service: its sources and sinks, and how ticks are cut.
 
 mod channels;
+mod describe;
 mod keys;
 pub mod problem;
 mod runtime;
+mod schema;
 mod sinks;
 mod size;
 mod sources;
 
 pub use runtime::{Keep, Runtime};
+pub use schema::schemas;
 
 use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Sink, SinkKind, Source, SourceKind};

@@ -1,7 +1,7 @@
 //! Every kind of this crate through the rules that every node keeps.
 
 use athermal_control::{
-    Compensate, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
+    Compensate, CrossCheck, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
 };
 use athermal_testkit::conformance;
 use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
@@ -42,6 +42,36 @@ conformance!(
     .speaks_without_input(&["correction", "why"])
     .except(Rule::Past, IS_TAKEN_OUT)
     .except(Rule::Memory, IS_TAKEN_OUT),
+);
+
+/// Why the past of a sensor is not all that a value is made of.
+const IS_OF_OTHERS: &str =
+    "the others say whether a sample is there, and a verdict stands for as long as it holds";
+
+conformance!(
+    CrossCheck,
+    Case::new(
+        r#"
+        ahead = "0s"
+        lag = "1min"
+        after = "20s"
+        recover = "1min"
+        "#
+    )
+    .input("signal", 3, "Cel")
+    .speaks_without_input(&["reason"])
+    .except(Rule::Past, IS_OF_OTHERS),
+    Case::new(
+        r#"
+        ahead = "0s"
+        limit = 2.0
+        lag = "10s"
+        recover = "30s"
+        "#
+    )
+    .input("signal", 4, "K")
+    .speaks_without_input(&["reason"])
+    .except(Rule::Past, IS_OF_OTHERS),
 );
 
 conformance!(

@@ -9,14 +9,14 @@ use athermal_files::{Layout, Options, Reader, Row, TimeForm};
 use proptest::prelude::*;
 
 /// Many more cases where there is time for them.
-fn cases() -> ProptestConfig {
+pub(super) fn cases() -> ProptestConfig {
     let long = std::env::var_os("ATHERMAL_LONG").is_some();
     ProptestConfig::with_cases(if long { 100_000 } else { 300 })
 }
 
 /// What becomes of a line.
 #[derive(Debug, Clone)]
-enum Damage {
+pub(super) enum Damage {
     /// It ends behind so many bytes.
     Cut(usize),
     /// Behind it stands a text.
@@ -29,7 +29,7 @@ enum Damage {
     Noise(Vec<u8>),
 }
 
-fn damages() -> impl Strategy<Value = Damage> {
+pub(super) fn damages() -> impl Strategy<Value = Damage> {
     prop_oneof![
         (0..20_usize).prop_map(Damage::Cut),
         Just(Damage::Note),

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod any_bytes;
+mod forms;
 mod hostile;
 mod shared_data;
 mod time_in_two_columns;

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use serde_json::Value;
 
 use super::ParameterChange;
-use crate::compile::plan::{Plan, PlannedNode, PlannedRole, TruthLink};
+use crate::compile::plan::{NOVELTY, Plan, PlannedNode, PlannedRole, TruthLink};
 use crate::document::{TimeBase, TimeForm};
 use crate::node::{FREEZE, Kind, Read, Role, TruthLags, kinds};
 use crate::quantity::Quantity;
@@ -250,6 +250,11 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     {
         facts.plain("learn.outliers", learning.limits.outliers.to_string());
         facts.plain("learn.margin", learning.limits.margin.to_string());
+    }
+    if let PlannedRole::Estimator { outside, .. } = &node.role
+        && node.port(NOVELTY).is_some()
+    {
+        facts.plain("outside", outside.name());
     }
     if let Value::Object(parameters) = node.spec.parameters() {
         let measured = measured_parameters(node.kind);

@@ -3,6 +3,7 @@
 //! A second way to predict has to earn its place: it saves a seventh to a quarter of a tick of the die tester (`benches/budgets`).
 
 use super::context::TickContext;
+use super::edge::Edge;
 use super::estimate::given;
 use super::gather::Gathered;
 use super::part::Part;
@@ -72,6 +73,8 @@ struct Linear<'a> {
     slot: usize,
     trigger: Option<usize>,
     learns: bool,
+    edge: Option<&'a Edge>,
+    novelty: Option<usize>,
     form: LinearForm<'a>,
     shared: Option<&'a Part>,
     own: &'a [Part],
@@ -101,6 +104,8 @@ impl<'a> Linear<'a> {
             slot: running.slot,
             trigger: running.trigger,
             learns: estimate.learning.is_some(),
+            edge: estimate.edge(),
+            novelty: running.novelty,
             form,
             shared,
             own,
@@ -117,6 +122,8 @@ pub(crate) struct Bank {
     members: Box<[Member]>,
     /// Room for the other regressors of a member.
     row: Box<[f64]>,
+    /// Room for all of them.
+    all: Box<[f64]>,
 }
 
 /// One of the estimators of a bank.
@@ -126,6 +133,10 @@ struct Member {
     /// The gather that lets it run, unless it does at every tick.
     trigger: Option<usize>,
     learns: bool,
+    /// The edge of the rows of its fit, where that is heeded.
+    edge: Option<Edge>,
+    /// The slot of how far it is outside of them, where somebody reads it.
+    novelty: Option<usize>,
     constant: f64,
     /// Of the regressors whose products are not summed at once.
     coefficients: Box<[f64]>,
@@ -152,6 +163,8 @@ impl Bank {
             slot: of.slot,
             trigger: of.trigger,
             learns: of.learns,
+            edge: of.edge.cloned(),
+            novelty: of.novelty,
             constant: of.form.constant,
             coefficients: of.form.coefficients[at_once..].into(),
             own: of.own.first().cloned(),
@@ -160,8 +173,10 @@ impl Bank {
         };
         let members: Box<[_]> = members.iter().map(of_member).collect();
         let others = members.iter().map(|member| member.coefficients.len());
+        let most = others.max().unwrap_or(0);
         Self {
-            row: vec![0.0; others.max().unwrap_or(0)].into(),
+            row: vec![0.0; most].into(),
+            all: vec![0.0; at_once + most].into(),
             shared,
             products,
             at_once,
@@ -232,9 +247,21 @@ impl Bank {
                 context.at_work.is(member.node);
                 learning.ran([at_once, others], now, gathered, !context.frozen);
             }
-            let prediction = member.constant + sums.sum(&member.coefficients, others);
+            let mut prediction = member.constant + sums.sum(&member.coefficients, others);
+            let mut novelty = f64::NAN;
+            if let Some(edge) = &member.edge {
+                let row = &mut self.all[..at_once.len() + others.len()];
+                let (first, rest) = row.split_at_mut(at_once.len());
+                first.copy_from_slice(at_once);
+                rest.copy_from_slice(others);
+                novelty = edge.novelty(row);
+                prediction = edge.bounded(prediction, novelty);
+            }
             let (value, stamp) = given(prediction, stamp.min(oldest), now);
             context.slots.set(member.slot, value, stamp);
+            if let Some(slot) = member.novelty {
+                context.slots.set(slot, novelty, stamp);
+            }
         }
         all
     }

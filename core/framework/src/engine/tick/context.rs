@@ -111,17 +111,13 @@ impl TickContext<'_> {
             let known = if value.is_nan() {
                 f64::NAN
             } else {
-                estimate.std_dev(row, now)
+                estimate.std_dev(row, value, now)
             };
             self.slots.set(slot, known, stamp);
         }
         if let Some(slot) = node.novelty {
-            let known = if value.is_nan() {
-                f64::NAN
-            } else {
-                estimate.novelty(row)
-            };
-            self.slots.set(slot, known, stamp);
+            let novelty = estimate.edge().map_or(f64::NAN, |edge| edge.novelty(row));
+            self.slots.set(slot, novelty, stamp);
         }
     }
 
@@ -138,12 +134,13 @@ impl TickContext<'_> {
         if !fresh {
             return;
         }
+        vote.heed(gathered);
         let (value, stamp) = vote.run(votes, now);
         slots.set(vote.wires.slot, value, stamp);
         let Some(&beside) = vote.wires.beside.as_deref() else {
             return;
         };
-        if beside.weights.is_some() || beside.std_dev.is_some() {
+        if beside.weights.is_some() || beside.std_dev.is_some() || beside.novelty.is_some() {
             let weights = vote.weigh(votes);
             if let Some(first) = beside.weights {
                 for (slot, &weight) in (first..).zip(weights) {
@@ -158,6 +155,9 @@ impl TickContext<'_> {
             let ends = vote.interval();
             slots.set(lower, unless_infinite(ends[0]), stamp);
             slots.set(upper, unless_infinite(ends[1]), stamp);
+        }
+        if let Some(slot) = beside.novelty {
+            slots.set(slot, unless_infinite(vote.novelty()), stamp);
         }
         if let Some((slot, of_voters)) = beside.std_dev {
             let of_voters = &gathered[of_voters].values;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use super::edge::Edge;
 use super::gather::Gathered;
 use super::part::Part;
-use crate::channel::unless_infinite;
-use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
+use crate::compile::{Gather, Outside, PlannedNode, PlannedRole, TruthLink};
 use crate::engine::learning::Feedback;
 use crate::engine::learning::GatedLearner;
 use crate::engine::state::NodeState;
@@ -73,6 +73,8 @@ pub(crate) struct Estimate {
     takes_absent: bool,
     /// What goes on learning, where the plan wants it: it then predicts in place of the predictor.
     pub(crate) learning: Option<Box<GatedLearner>>,
+    /// The edge of the rows of the fit, where anybody heeds it.
+    edge: Option<Edge>,
     /// What is read in place of measured past truths, in an evaluation of several steps.
     feedback: Option<Box<Feedback>>,
 }
@@ -93,6 +95,7 @@ impl Estimate {
             learning,
             std_dev,
             novelty,
+            outside,
             ..
         } = &node.role
         else {
@@ -119,9 +122,11 @@ impl Estimate {
                 EngineError::DoesNotLearn { node }
             })
         });
+        let heeded = learning.is_none() && (novelty.is_some() || *outside != Outside::Pass);
         Ok(Self {
             width: used.len(),
-            plain: std_dev.is_none() && novelty.is_none(),
+            plain: std_dev.is_none(),
+            edge: heeded.then(|| Edge::new(&predictor, *outside)),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -219,9 +224,10 @@ impl Estimate {
     /// The prediction from regressors at an instant: that of what goes on learning, else of the fit.
     #[inline]
     fn predict(&self, row: &[f64], at: Instant) -> f64 {
-        match &self.learning {
-            Some(learning) => learning.predict(row, at),
-            None => self.predictor.predict(row),
+        match (&self.learning, &self.edge) {
+            (Some(learning), _) => learning.predict(row, at),
+            (None, None) => self.predictor.predict(row),
+            (None, Some(edge)) => edge.bounded(self.predictor.predict(row), edge.novelty(row)),
         }
     }
 
@@ -244,10 +250,13 @@ impl Estimate {
         (whole, oldest)
     }
 
-    /// The standard deviation of the truth about the prediction that was made at this tick from a row.
-    pub(crate) fn std_dev(&self, row: &[f64], now: Instant) -> f64 {
+    /// The standard deviation of the truth about the prediction of this tick, which was made from a row.
+    pub(crate) fn std_dev(&self, row: &[f64], prediction: f64, now: Instant) -> f64 {
         let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
-        let std_dev = widened * self.std_dev_of_one(row, now);
+        let mut std_dev = widened * self.std_dev_of_one(row, now);
+        if let Some(edge) = &self.edge {
+            std_dev = edge.widened(std_dev, prediction, row);
+        }
         if std_dev.is_finite() {
             std_dev
         } else {
@@ -263,9 +272,9 @@ impl Estimate {
         }
     }
 
-    /// How far the row of this tick is outside of those of the fit; NaN where that is not known.
-    pub(crate) fn novelty(&self, row: &[f64]) -> f64 {
-        unless_infinite(self.predictor.novelty(row))
+    /// The edge of the rows of the fit, where predictions or somebody who reads them heed it.
+    pub(crate) fn edge(&self) -> Option<&Edge> {
+        self.edge.as_ref()
     }
 
     /// What goes on learning.

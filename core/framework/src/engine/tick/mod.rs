@@ -5,6 +5,7 @@
 
 mod bank;
 mod context;
+mod edge;
 mod estimate;
 mod gather;
 mod history;

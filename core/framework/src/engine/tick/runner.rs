@@ -167,6 +167,7 @@ fn runner(
         (
             PlannedRole::Combiner {
                 voters,
+                novelties,
                 state,
                 truth,
                 beside,
@@ -176,6 +177,10 @@ fn runner(
         ) => {
             let wires = Wires {
                 voters: *voters,
+                novelties: beside
+                    .novelties
+                    .and(novelties.as_ref())
+                    .map(|(gather, which)| (*gather, which[..].into())),
                 state: *state,
                 slot: node.slots.start,
                 beside: (*beside != AuxPorts::default()).then(|| Box::new(*beside)),

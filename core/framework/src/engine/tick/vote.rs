@@ -18,6 +18,8 @@ pub(crate) struct Vote {
     interval: Option<[f64; 3]>,
     /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
+    /// The novelty of each vote of this tick; NaN where it is not known.
+    novelty: Vec<f64>,
     /// How many truths it has seen that there was a vote for.
     truths: u64,
     pub(crate) wires: Wires,
@@ -27,6 +29,8 @@ pub(crate) struct Vote {
 pub(crate) struct Wires {
     /// The gather of the votes.
     pub(crate) voters: usize,
+    /// The gather of the novelties of votes, and which these are, where it heeds them or shows its own.
+    pub(crate) novelties: Option<(usize, Box<[usize]>)>,
     /// The gather of the state that it goes by, where it goes by one.
     pub(crate) state: Option<usize>,
     pub(crate) slot: usize,
@@ -49,6 +53,7 @@ impl Vote {
             withheld: link.map(|link| Embargo::new(link, width)),
             interval,
             weights: vec![f64::NAN; voters],
+            novelty: vec![f64::NAN; voters],
             truths: 0,
             wires,
         }
@@ -57,6 +62,29 @@ impl Vote {
     /// Hands the combiner the state that it goes by.
     pub(crate) fn go_by(&mut self, state: f64, now: Instant) {
         self.combine.state(now, state);
+    }
+
+    /// Hands the combiner how far each vote of this tick comes from outside of its fit.
+    pub(crate) fn heed(&mut self, gathered: &[Gathered]) {
+        if let Some((gather, which)) = &self.wires.novelties {
+            for (&nth, novelty) in which.iter().zip(&gathered[*gather].values) {
+                self.novelty[nth] = *novelty;
+            }
+            self.combine.heed(&self.novelty);
+        }
+    }
+
+    /// How far the votes that have been weighed come from outside of their fits: the mean by their weights, of those of which it is
+    /// known.
+    pub(crate) fn novelty(&self) -> f64 {
+        let (mut sum, mut known) = (0.0, 0.0);
+        for (weight, novelty) in self.weights.iter().zip(&self.novelty) {
+            if *weight > 0.0 && !novelty.is_nan() {
+                sum += weight * novelty;
+                known += weight;
+            }
+        }
+        sum / known
     }
 
     /// Why the votes of this tick are combined as they are.

@@ -141,7 +141,6 @@ fn a_unit_that_measures_something_else_is_reported_at_its_place() {
         ),
         &[
             "A205 at `\"mm\"`: `temperature.plate` is in Cel, and mm measures something else",
-            "A205 at `\"mm\"`: `temperature.room`",
             "A017 at `\"parsek\"`",
         ],
     );

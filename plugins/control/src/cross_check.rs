@@ -1,0 +1,426 @@
+//! Whether a sensor contradicts the others.
+
+use athermal_core::channel::ABSENT;
+use athermal_core::diagnostic::counted;
+use athermal_core::node::{
+    Encoder, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary,
+    Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
+};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{Agreement, GramBlocks, Look};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::limit;
+
+/// Learns in the fit how sensors go together, and lets through only those that still do.
+///
+/// A sensor that comes loose, ages, is moved or swapped for another reads what is possible, and what the others do not. Its channel is
+/// then absent, as that of a sensor that is dead, and estimators on other sensors go on. The port `reason` says why: 0 it agrees,
+/// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass.
+///
+/// The fit keeps the covariance of all channels, now and `lag` ago, at the instants of the truth, whatever that is. Of a row it is
+/// looked at what lies in directions that the fit hardly took, and in which sensor that is: the one without which nothing of it is left
+/// (the contribution by reconstruction of Alcala and Qin 2009). Where it is more than `limit` times what is usual in the fit, for as
+/// long as `after`, and falls below that without the sensor, the sensor contradicts the others. Where two are wrong at once, or the
+/// machine itself has changed so that no sensor alone explains it, none is named; a fast machine moves all that hang together.
+///
+/// Sensors are told apart only as far as others know of them: of two that see nothing in common, neither contradicts the other. The
+/// rows of the fit must reach over 30 times `lag`, 5 hours, or nothing is learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CrossCheck {
+    /// How far back all channels are looked at beside the present: about as long as heat takes from one sensor to the next.
+    #[serde(default = "ten_minutes")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub lag: Duration,
+    /// How many times as far apart as is usual in the fit, 1 or more: the square of a distance, of which one row of a thousand has more
+    /// than 1.
+    #[serde(default = "six")]
+    #[schemars(range(min = 1.0))]
+    pub limit: f64,
+    /// For how long a sensor must contradict the others.
+    #[serde(default = "minute")]
+    pub after: Duration,
+    /// For how long it must have agreed with them again. Below `lag` its past may still contradict.
+    #[serde(default = "ten_minutes")]
+    pub recover: Duration,
+}
+
+fn ten_minutes() -> Duration {
+    Duration::from_ns(600_000_000_000)
+}
+
+fn minute() -> Duration {
+    Duration::from_ns(60_000_000_000)
+}
+
+fn six() -> f64 {
+    6.0
+}
+
+/// So many times the lag the rows of a fit must reach over.
+const LEAST_LAGS: i64 = 30;
+
+/// The numbers of the port `reason`.
+mod reason {
+    pub(super) const AGREES: f64 = 0.0;
+    pub(super) const CONTRADICTS: f64 = 1.0;
+    pub(super) const RECOVERING: f64 = 2.0;
+    pub(super) const UNKNOWN: f64 = 3.0;
+}
+
+impl Feature for CrossCheck {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("signal", "the sensors that are compared"),
+                InputPort::truth("at whose instants it learns; what it is does not matter"),
+            ]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("signal", "each channel while it agrees with the others"),
+                PortSummary::new(
+                    "reason",
+                    "0 agrees, 1 contradicts the others, 2 recovering, 3 nothing was learned",
+                ),
+            ]
+        }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let signal = inputs.port("signal");
+        if signal.len() < 3 {
+            let message = format!(
+                "it compares {}, and needs three",
+                counted(signal.len() as u64, "channel")
+            );
+            let help = "of two that differ neither is known to be wrong";
+            return Err(vec![Mistake::at("inputs.signal", message).help(help)]);
+        }
+        Ok(vec![
+            OutputPort {
+                name: "signal",
+                channels: signal.to_vec(),
+            },
+            OutputPort {
+                name: "reason",
+                channels: signal.iter().map(limit::numbered).collect(),
+            },
+        ])
+    }
+
+    /// The others only say whether a value is there.
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
+    }
+
+    fn encoder(&self) -> Option<&dyn Encoder> {
+        Some(self)
+    }
+
+    fn memory(&self) -> Duration {
+        self.lag + self.after + self.recover
+    }
+
+    fn every_tick(&self) -> bool {
+        true
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        let count = inputs.port("signal").len();
+        let fit = inputs.fit::<Learned>();
+        let learned = fit.and_then(|(fit, places)| {
+            let agreement = fit.agreement.clone()?;
+            Some(Known::new(agreement, places, count))
+        });
+        Box::new(Checking {
+            spec: self.clone(),
+            is_fitted: fit.is_some(),
+            learned,
+            sensors: vec![Sensor::default(); count],
+        })
+    }
+}
+
+impl Encoder for CrossCheck {
+    fn lags(&self) -> Vec<Duration> {
+        vec![Duration::ZERO, self.lag]
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        let names = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone());
+        Box::new(Learning {
+            uses: names.collect(),
+            least: Duration::from_ns(self.lag.as_ns().saturating_mul(LEAST_LAGS)),
+            blocks: GramBlocks::with_row_memory(setup.regressors.len(), setup.memory),
+            reached: Duration::ZERO,
+            last: None,
+        })
+    }
+}
+
+/// Takes the rows of a fit.
+struct Learning {
+    uses: Vec<String>,
+    /// Over how much time the rows must reach.
+    least: Duration,
+    blocks: GramBlocks,
+    reached: Duration,
+    last: Option<Instant>,
+}
+
+impl Trainer for Learning {
+    fn row(&mut self, regressors: &[f64], _truth: f64) {
+        self.blocks.push(regressors, 0.0);
+    }
+
+    fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
+        if let Some(last) = self.last.replace(at) {
+            self.reached += at - last;
+        }
+        self.row(regressors, truth);
+    }
+
+    fn segment(&mut self) {
+        self.last = None;
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        let mut report = TrainingReport::default();
+        let mut agreement = None;
+        if self.reached < self.least {
+            report.notes.push(format!(
+                "the rows reach over {} and it takes {} to learn how sensors go together, so all will pass",
+                self.reached, self.least
+            ));
+        } else if let Some(rows) = self.blocks.rows() {
+            agreement = Agreement::of(&self.blocks.total(), rows);
+        } else {
+            report.notes.push(
+                "the rows did not fit in memory, so nothing is learned and all will pass"
+                    .to_owned(),
+            );
+        }
+        report.figure("learned", agreement.is_some());
+        let predictor = Box::new(Learned {
+            uses: self.uses,
+            agreement,
+        });
+        Ok(Trained { predictor, report })
+    }
+}
+
+/// How sensors go together, as a model file has it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Learned {
+    /// Channels, now and a lag ago.
+    uses: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    agreement: Option<Agreement>,
+}
+
+impl Predictor for Learned {
+    fn uses(&self) -> &[String] {
+        &self.uses
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let Some(agreement) = &self.agreement else {
+            return Vec::new();
+        };
+        let width = self.uses.len();
+        let lists = [("agreement.means", agreement.means.len())];
+        let mut mistakes = Mistake::of_lengths(width, &lists);
+        if !agreement.is_sound() {
+            let message = "`agreement` has not as many finite values as its parts need";
+            mistakes.push(Mistake::at("agreement", message));
+        }
+        mistakes
+    }
+
+    fn predict(&self, _regressors: &[f64]) -> f64 {
+        f64::NAN
+    }
+}
+
+athermal_core::predictor!(Learned, "cross_check");
+
+/// What was learned, at work.
+struct Known {
+    agreement: Agreement,
+    /// Where each column is among the values of the port.
+    places: Vec<usize>,
+    /// The columns of each channel; none of one that had no values in the fit.
+    columns: Vec<Option<(usize, Option<usize>)>>,
+    look: Look,
+}
+
+impl Known {
+    fn new(agreement: Agreement, places: &[usize], count: usize) -> Self {
+        let columns = (0..count).map(|channel| {
+            let mut own = (0..places.len()).filter(|&column| places[column] % count == channel);
+            own.next().map(|first| (first, own.next()))
+        });
+        Self {
+            columns: columns.collect(),
+            places: places.to_vec(),
+            look: agreement.look(),
+            agreement,
+        }
+    }
+
+    /// How far values are apart without some of the channels.
+    fn apart(&mut self, values: &[f64], is_out: impl Fn(usize) -> bool) -> f64 {
+        let count = self.columns.len();
+        let column = |nth: usize| {
+            let place = self.places[nth];
+            if is_out(place % count) {
+                f64::NAN
+            } else {
+                values[place]
+            }
+        };
+        self.agreement.apart(column, &mut self.look)
+    }
+
+    /// The channel that alone makes values that are so far apart be so, by a limit.
+    fn alone(&self, apart: f64, limit: f64) -> Option<usize> {
+        let share = |columns: Option<_>| {
+            columns.map_or(0.0, |columns| self.agreement.share(columns, &self.look))
+        };
+        let shares = self
+            .columns
+            .iter()
+            .map(|columns| share(*columns))
+            .enumerate();
+        let (most, share) =
+            shares.reduce(|most, next| if next.1 > most.1 { next } else { most })?;
+        (apart > limit && apart - share <= limit).then_some(most)
+    }
+}
+
+struct Checking {
+    spec: CrossCheck,
+    is_fitted: bool,
+    /// How sensors go together, where the rows of the fit said so.
+    learned: Option<Known>,
+    sensors: Vec<Sensor>,
+}
+
+/// What is known of one sensor.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Sensor {
+    /// The stamp of the last sample that was looked at.
+    last: Option<Instant>,
+    /// Since when it has been the one that contradicts the others.
+    since: Option<Instant>,
+    is_out: bool,
+    /// Whether its last value was let through.
+    passes: bool,
+    /// Since when it agrees, after it did not.
+    agrees_since: Option<Instant>,
+}
+
+impl Checking {
+    /// Finds which sensors contradict the others at a tick.
+    fn judge(&mut self, values: &[f64], now: Instant) {
+        let Self {
+            spec,
+            learned,
+            sensors,
+            ..
+        } = self;
+        let Some(known) = learned else { return };
+        let apart = known.apart(values, |channel| sensors[channel].is_out);
+        let suspect = known.alone(apart, spec.limit);
+        for (nth, sensor) in sensors.iter_mut().enumerate() {
+            if suspect != Some(nth) {
+                sensor.since = None;
+            } else if now - *sensor.since.get_or_insert(now) >= spec.after {
+                (sensor.is_out, sensor.since) = (true, None);
+            }
+        }
+        for nth in 0..sensors.len() {
+            if !sensors[nth].is_out || values[nth].is_nan() {
+                continue;
+            }
+            let apart = known.apart(values, |channel| channel != nth && sensors[channel].is_out);
+            let sensor = &mut sensors[nth];
+            if apart > spec.limit {
+                sensor.agrees_since = None;
+            } else if now - *sensor.agrees_since.get_or_insert(now) >= spec.recover {
+                (sensor.is_out, sensor.agrees_since) = (false, None);
+            }
+        }
+    }
+}
+
+impl Operator for Checking {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        if !self.is_fitted {
+            return;
+        }
+        let (values, stamps) = (tick.port(0), tick.stamps(0));
+        self.judge(values, tick.now);
+        let count = self.sensors.len();
+        for (nth, sensor) in self.sensors.iter_mut().enumerate() {
+            let is_new = !values[nth].is_nan() && sensor.last.is_none_or(|last| last < stamps[nth]);
+            let passes = !values[nth].is_nan() && !sensor.is_out;
+            if is_new {
+                sensor.last = Some(stamps[nth]);
+            }
+            if passes && is_new {
+                outputs.set_stamped(nth, values[nth], stamps[nth]);
+            } else if !passes && sensor.passes {
+                outputs.set_stamped(nth, ABSENT, tick.now);
+            }
+            sensor.passes = passes;
+            let reason = match (&self.learned, sensor.is_out, sensor.agrees_since) {
+                (None, ..) => reason::UNKNOWN,
+                (_, false, _) => reason::AGREES,
+                (_, true, None) => reason::CONTRADICTS,
+                (_, true, Some(_)) => reason::RECOVERING,
+            };
+            outputs.set_stamped(count + nth, reason, tick.now);
+        }
+    }
+
+    fn segment(&mut self) {
+        self.sensors.fill(Sensor::default());
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(Checked {
+            sensors: self.sensors.clone(),
+        }))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        state.accept(|state: Checked| {
+            if state.sensors.len() != self.sensors.len() {
+                return Err("the number of channels differs");
+            }
+            self.sensors = state.sensors;
+            Ok(())
+        })
+    }
+}
+
+/// The state of all channels.
+#[derive(Debug, Serialize, Deserialize)]
+struct Checked {
+    sensors: Vec<Sensor>,
+}
+
+athermal_core::state!(Checked, "cross_check/1");
+
+athermal_core::register!(CrossCheck, Feature, "cross_check");

@@ -1,0 +1,302 @@
+//! A die tester whose world changes after the fit: a door stands open, a lamp shines on a stage, two sensors come loose. What was
+//! learned is then hardly worse than no model, and the sensors that contradict the others are named.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::workbench::{Read, data, graph};
+use athermal::Engine;
+use athermal::core::compile::Plan;
+use athermal::core::engine::Fitted;
+use athermal::files::{Dataset, Options};
+use athermal::run::fit::{FitOptions, fit};
+use athermal::run::recording::{Event, Table};
+
+const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
+const LIMIT: f64 = 250.0;
+
+/// The folder of the changed world, or nothing, with a remark, where this machine lacks it.
+fn changed_world() -> Option<PathBuf> {
+    let folder = data()?.with_file_name("changed-world");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    eprintln!("skipped: {} is not there", folder.display());
+    None
+}
+
+fn dataset(file: PathBuf) -> Dataset {
+    Dataset::new(vec![file], Options::default())
+}
+
+fn fitted(plan: &Arc<Plan>, file: PathBuf) -> Fitted {
+    let options = FitOptions::default();
+    fit(plan, &dataset(file), &options, &mut |_| {}).unwrap().0
+}
+
+/// What happens, by name, from and to which second.
+fn events(folder: &Path) -> Vec<(String, f64, f64)> {
+    let text = std::fs::read_to_string(folder.join("events.txt")).unwrap();
+    let lines = text.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let hours = |nth: usize| cells[nth].parse::<f64>().unwrap() * 3600.0;
+        (cells[0].to_owned(), hours(1), hours(2))
+    });
+    lines.collect()
+}
+
+/// Steps over a recording, and hands on what the outputs of each tick are, by the names of their columns.
+fn run(
+    plan: &Arc<Plan>,
+    fitted: &Fitted,
+    table: &Table,
+    mut tick: impl FnMut(f64, &dyn Fn(&str) -> f64),
+) {
+    let mut engine = Engine::new(Arc::clone(plan), fitted).unwrap();
+    for (event, values) in table.events() {
+        let Event::Row(time) = *event else {
+            panic!("one segment")
+        };
+        let outputs = engine.step(time, values).unwrap();
+        let output = |name: &str| {
+            let place = plan.outputs.iter().position(|output| output.name == name);
+            outputs[place.unwrap_or_else(|| panic!("there is no output {name}"))]
+        };
+        tick(time.as_ns() as f64 / 1e9, &output);
+    }
+}
+
+/// A plan of a graph file that shows its drift too.
+fn plan(extends: &str, more: &str) -> Arc<Plan> {
+    let text = format!(
+        "schema = 1\nextends = '{}'\nname = \"changed-world\"\n[outputs]\ndrift = \"drift\"\n{more}",
+        graph(extends).display()
+    );
+    let mut read = Read::new(&text);
+    let plan = read.plan.take();
+    Arc::new(plan.unwrap_or_else(|| panic!("{}", read.told())))
+}
+
+/// The instant, the truth and the error of each prediction of an axis of which there is a truth below the limit.
+type Errors = [Vec<(f64, f64, f64)>; 6];
+
+fn errors(name: &str, train: PathBuf, test: &Table, limit: f64, of: &str, more: &str) -> Errors {
+    let plan = plan(name, more);
+    let fitted = fitted(&plan, train);
+    let mut errors = Errors::default();
+    run(&plan, &fitted, test, |now, output| {
+        for (errors, axis) in errors.iter_mut().zip(AXES) {
+            let truth = output(&format!("drift.{axis}"));
+            let error = output(&format!("{of}.{axis}")) - truth;
+            if truth.abs() < limit && !error.is_nan() {
+                errors.push((now, truth, error));
+            }
+        }
+    });
+    errors
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    (values.clone().map(|value| value * value).sum::<f64>() / values.count() as f64).sqrt()
+}
+
+#[test]
+fn reference_what_was_learned_is_hardly_worse_than_no_model_whatever_becomes_of_the_world() {
+    let Some(folder) = changed_world() else {
+        return;
+    };
+    let train = || folder.with_file_name("data").join("die-tester/train.csv");
+    let plain = plan("die-tester-sensor", "");
+    let test = Table::read(&dataset(folder.join("test.csv")), &plain).unwrap();
+    let of_sensor = errors(
+        "die-tester-virtual-sensor",
+        train(),
+        &test,
+        LIMIT,
+        "predicted",
+        "",
+    );
+    let of_vote = errors("die-tester-sensor", train(), &test, LIMIT, "predicted", "");
+    let mut wrong = Vec::new();
+    for ((axis, own), vote) in AXES.iter().zip(&of_sensor).zip(&of_vote) {
+        let rmse = |errors: &[(f64, f64, f64)]| {
+            root_mean_square(errors.iter().map(|(_, _, error)| *error))
+        };
+        let largest = own
+            .iter()
+            .map(|(_, _, error)| error.abs())
+            .fold(0.0, f64::max);
+        let (sensor, vote) = (rmse(own), rmse(vote));
+        println!(
+            "{axis}: RMSE {sensor:.2} beside {vote:.2} of the plain vote, at most {largest:.1} nm/min"
+        );
+        if sensor > 1.05 * vote {
+            wrong.push(format!(
+                "{axis} has {sensor} over all, the plain vote {vote}"
+            ));
+        }
+        if axis.starts_with('Z') && largest > 80.0 {
+            wrong.push(format!("{axis} is off by {largest} nm/min"));
+        }
+        for (event, from, to) in events(&folder) {
+            let within = own
+                .iter()
+                .filter(|(at, _, _)| (from..=to + 1800.0).contains(at));
+            let error = root_mean_square(within.clone().map(|(_, _, error)| *error));
+            let ratio = error / root_mean_square(within.map(|(_, truth, _)| *truth));
+            println!("  {event}: {ratio:.2} of no model");
+            if !(ratio <= 1.05) {
+                wrong.push(format!("{axis} has {ratio} of no model while: {event}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn reference_to_shrink_costs_little_at_chuck_steps_beyond_those_of_the_fit() {
+    let Some(folder) = data() else { return };
+    let folder = folder.join("die-tester");
+    let graph = |outside: &str| {
+        format!(
+            r#"
+            everything = "everything"
+            [nodes.everything]
+            type = "linear"
+            each = "axis"
+            inputs.features = "gradients"
+            inputs.truth = "drift.{{axis}}"
+            ahead = "0s"
+            train.abs_truth = {{ below = "850 nm/min" }}
+            outside = "{outside}"
+            "#
+        )
+    };
+    let test = Table::read(
+        &dataset(folder.join("test.csv")),
+        &plan("die-tester-sensor", ""),
+    )
+    .unwrap();
+    let [shrink, pass] = ["shrink", "pass"].map(|outside| {
+        let train = folder.join("train.csv");
+        errors(
+            "die-tester-sensor",
+            train,
+            &test,
+            f64::INFINITY,
+            "everything",
+            &graph(outside),
+        )
+    });
+    for (axis, (shrink, pass)) in AXES.iter().zip(shrink.iter().zip(&pass)) {
+        let rmse = |errors: &[(f64, f64, f64)]| {
+            root_mean_square(errors.iter().map(|(_, _, error)| *error))
+        };
+        let (shrink, pass) = (rmse(shrink), rmse(pass));
+        println!("{axis}: {shrink:.2} nm/min where predictions shrink, {pass:.2} where they pass");
+        assert!(shrink <= 1.05 * pass, "{axis}: {shrink} and {pass}");
+    }
+}
+
+/// The instants at which `cross_check` begins to name a channel, as a graph has its signal; fitted on one file, run over another.
+fn named(
+    graph: &str,
+    channels: &[&str],
+    truth: &str,
+    train: PathBuf,
+    test: PathBuf,
+) -> Vec<(f64, String)> {
+    let more = format!(
+        r#"
+        why = "compared:reason"
+        [nodes.compared]
+        type = "cross_check"
+        inputs.signal = "temperature"
+        inputs.truth = "{truth}"
+        ahead = "0s"
+        "#
+    );
+    let plan = plan(graph, &more);
+    let fitted = fitted(&plan, train);
+    let test = Table::read(&dataset(test), &plan).unwrap();
+    let (mut found, mut before) = (Vec::new(), vec![0.0; channels.len()]);
+    run(&plan, &fitted, &test, |now, output| {
+        for (channel, before) in channels.iter().zip(&mut before) {
+            let reason = output(&format!("why.{channel}"));
+            if reason == 1.0 && *before == 0.0 {
+                found.push((now, (*channel).to_owned()));
+            }
+            *before = reason;
+        }
+    });
+    found
+}
+
+const DIE_TESTER: [&str; 6] = ["plate1", "holder1", "plate2", "holder2", "room", "chuck"];
+
+#[test]
+fn reference_loose_sensors_are_named_and_no_other() {
+    let Some(folder) = changed_world() else {
+        return;
+    };
+    let train = folder.with_file_name("data").join("die-tester/train.csv");
+    let found = named(
+        "die-tester-sensor",
+        &DIE_TESTER,
+        "drift.Z1",
+        train,
+        folder.join("test.csv"),
+    );
+    println!("{found:?}");
+    let loose = events(&folder)
+        .into_iter()
+        .filter_map(|(event, from, to)| Some((event.strip_prefix("loose ")?.to_owned(), from, to)));
+    let mut left = found.clone();
+    for (sensor, from, to) in loose {
+        let latest = if sensor == "holder1" {
+            from + 120.0
+        } else {
+            to
+        };
+        let first = found
+            .iter()
+            .find(|(at, name)| *name == sensor && *at >= from);
+        assert!(
+            first.is_some_and(|(at, _)| *at <= latest),
+            "{sensor} is not named by {latest} s: {found:?}"
+        );
+        left.retain(|(at, name)| *name != sensor || !(from..=to).contains(at));
+    }
+    assert!(left.is_empty(), "these are named and were sound: {left:?}");
+}
+
+#[test]
+fn reference_no_sensor_is_named_on_undisturbed_days() {
+    let Some(folder) = data() else { return };
+    let train_and_test = |machine: &str| {
+        let file = |name: &str| folder.join(machine).join(name);
+        (file("train.csv"), file("test.csv"))
+    };
+    let (train, test) = train_and_test("die-tester");
+    assert_eq!(
+        named("die-tester-sensor", &DIE_TESTER, "drift.Z1", train, test),
+        []
+    );
+    let (train, test) = train_and_test("linear-axis");
+    let sensors = ["t1", "t2", "t3", "t4"];
+    assert_eq!(
+        named("linear-axis-sensor", &sensors, "drift.Z", train, test),
+        []
+    );
+    for (train, test) in [
+        ("GX-H12A.csv", "GX-H12A-covered.csv"),
+        ("superpinda.csv", "superpinda-covered.csv"),
+    ] {
+        let file = |name: &str| folder.join("z-probe").join(name);
+        let sensors = ["bed", "chamber", "extruder"];
+        assert_eq!(
+            named("z-probe", &sensors, "drift.z", file(train), file(test)),
+            []
+        );
+    }
+}
