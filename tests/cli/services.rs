@@ -126,7 +126,9 @@ fn by_run(scratch: &Scratch) -> String {
 fn plain(text: &str) -> String {
     let line = |line: &str| {
         let (time, rest) = line.split_once(',').unwrap();
-        let time = time.parse().map_or(time.to_owned(), |of: f64| of.to_string());
+        let time = time
+            .parse()
+            .map_or(time.to_owned(), |of: f64| of.to_string());
         format!("{time},{rest}\n")
     };
     text.lines().map(line).collect()
