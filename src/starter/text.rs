@@ -12,7 +12,13 @@ use super::group::{Group, groups};
 use super::range;
 use super::survey::Survey;
 use super::window::{Choice, ENOUGH};
-use athermal_analysis::figures::{count, number};
+use athermal_analysis::figures::count;
+
+/// Voters on halves of the sensors take at least so many.
+const FEWEST_SENSORS: usize = 4;
+
+/// Of more segments, neighbours make up one fold.
+const MOST_FOLDS: u64 = 10;
 
 /// The text of the graph.
 pub fn graph(
@@ -112,15 +118,6 @@ impl Writer<'_> {
     fn sloping(&self) -> impl Iterator<Item = &Group> {
         let causes = self.temperatures.iter().chain(&self.drives);
         causes.filter(|group| !self.is_rare(group))
-    }
-
-    /// What may explain the drift by the value that it has.
-    fn standing(&self) -> impl Iterator<Item = &Group> {
-        // What a heater does follows from how strong it is and how warm it has become, not only from how they change.
-        let all = !self.drives.is_empty() && self.temperatures.is_empty();
-        let drives = self.drives.iter();
-        let drives = drives.filter(move |group| all || self.is_rare(group));
-        drives.chain(self.drifting.iter().filter(move |_| all))
     }
 
     fn sets(&self, text: &mut String) {
@@ -294,7 +291,7 @@ impl Writer<'_> {
             });
         let _ = writeln!(
             text,
-            "\n[outputs]\npredicted = {}",
+            "\n[outputs]\nnow = {}",
             list(&nodes.collect::<Vec<_>>())
         );
     }
@@ -340,20 +337,26 @@ impl Writer<'_> {
             toml_string(&self.drift_unit()),
         );
         for (number, group) in self.sloping().enumerate() {
-            let why = if number == 0 {
-                "short windows see the fast part of the drift, long ones the slow"
-            } else {
-                "the same of another signal"
+            let why = match number {
+                0 => "short windows see the fast part of the drift, long ones the slow",
+                _ => "the same of another signal",
             };
+            let lagged = "how far it is ahead of masses that follow it: first-order lags";
             let _ = writeln!(
                 text,
                 "\n{}\n\
-                 type = \"slope\"\ninputs.signal = {}\n\
-                 windows = {{ dynamic_range = \"{width}\", shortest = \"{}\", steps = 4, harmonics = {} }}",
-                beside(&format!("[nodes.{}]", gradients(group)), why),
-                toml_string(&group.signal),
+                 type = \"slope\"\ninputs.signal = {signal}\n\
+                 windows = {{ dynamic_range = \"{width}\", shortest = \"{}\", steps = 4, harmonics = {} }}\n\
+                 \n{}\n\
+                 type = \"first_order\"\ninputs.signal = {signal}\n\
+                 time_constants = {{ from = \"{}\", to = \"{}\", steps = 3 }}",
+                beside(&format!("[nodes.{}]", of_signal(group, "gradients")), why),
                 self.clock.length(self.choice.shortest_s),
                 self.choice.harmonics,
+                beside(&format!("[nodes.{}]", of_signal(group, "masses")), lagged),
+                self.clock.length(0.5 * self.choice.drift_s),
+                self.clock.length(4.0 * self.choice.drift_s),
+                signal = toml_string(&group.signal),
             );
         }
     }
@@ -398,59 +401,79 @@ impl Writer<'_> {
         format!("{}/{period}", chosen.copied().unwrap_or(difference.text()))
     }
 
+    /// What is made of the channels for which `is_of` holds, by their number among all that may explain the drift.
+    fn regressors(&self, is_of: impl Fn(usize) -> bool) -> String {
+        // What a heater does follows from how strong it is and not only from how it changes.
+        let has_levels = self.temperatures.is_empty();
+        let temperatures = self.temperatures.iter().map(|group| (group, false));
+        let drives = self.drives.iter();
+        let drives = drives.map(|group| (group, has_levels || self.is_rare(group)));
+        let (mut number, mut regressors) = (0, Vec::new());
+        for (group, has_level) in temperatures.chain(drives) {
+            let own = (number..).zip(&group.channels);
+            let own = own.filter(|(number, _)| is_of(*number));
+            let own: Vec<&str> = own.map(|(_, name)| name.as_str()).collect();
+            number += group.channels.len();
+            let (channels, windows) = match own.as_slice() {
+                [] => continue,
+                own if own.len() == group.channels.len() => (String::new(), ""),
+                [one] => (format!(".{one}"), "@*"),
+                several => (format!(".{{{}}}", several.join(",")), "@*"),
+            };
+            let made =
+                ["gradients", "masses"].map(|node| of_signal(group, node) + &channels + windows);
+            let made = made.into_iter().filter(|_| !self.is_rare(group));
+            let level = has_level.then(|| format!("{}{channels}", group.signal));
+            regressors.extend(made.chain(level).map(|name| toml_string(&name)));
+        }
+        list(&regressors)
+    }
+
     fn estimators(&self, text: &mut String) {
-        let width = self.clock.length(self.choice.drift_s);
+        let drift_s = self.choice.drift_s;
+        let width = self.clock.length(drift_s);
         let (each, axis) = if self.many() {
             ("each = \"axis\"\n", "{axis}")
         } else {
             ("", *self.axes().first().unwrap_or(&"*"))
         };
-        let changes = self.sloping().map(|group| toml_string(&gradients(group)));
-        let levels = self.standing().map(|group| toml_string(&group.signal));
-        let features: Vec<String> = changes.chain(levels).collect();
-        let features = list(&features);
-        let lags = format!(
-            "[\"{}\", \"{width}\", \"{}\"]",
-            if self.clock.counts_samples() {
-                "0 samples"
-            } else {
-                "0s"
-            },
-            self.clock.length(2.0 * self.choice.drift_s)
-        );
-        let limit = self.largest(&self.choice.extreme);
-        let limit = self.in_drift_unit(limit);
-        let unit = self.drift_unit();
-        let selection = "selection = { method = \"forward\", folds = 3, tolerance = 1e-3 }";
-        let _ = write!(
-            text,
-            "\n[nodes.thermal]                    # from {causes}\n\
-             type = \"linear\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
-             {}\n{selection}\n\
-             # train.abs_truth = {{ below = \"{} {unit}\" }}   # leave out the wildest rows; 99 % are below\n\
-             \n[nodes.motion]                     # from the drift of the past alone\n\
-             type = \"ar\"\n{each}inputs.truth = \"drift.{axis}\"\nahead = \"{width}\"\nlags = {lags}\n\
-             \n[nodes.both]                       # from both\n\
-             type = \"arx\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
-             ahead = \"{width}\"\nlags = {lags}\n{selection}\n\
-             \n[nodes.vote]                       # who has been right of late counts more\n\
-             type = \"auto_weighted\"\n{each}\
-             inputs.voters = [\"thermal{member}\", \"motion{member}\", \"both{member}\"]\n\
-             inputs.truth = \"drift.{axis}\"\nmemory = \"{}\"\n\
-             \n[outputs]\npredicted = \"vote\"\n",
-            beside(
-                &format!("ahead = \"{width}\""),
-                &format!("the drift of the next {width}")
-            ),
-            number(limit),
-            self.clock.length(3.0 * self.choice.drift_s),
-            causes = if self.temperatures.is_empty() {
-                "the inputs and what they have come to"
-            } else {
-                "the temperatures alone"
-            },
-            member = if self.many() { ".{axis}" } else { "" },
-        );
+        let causes = self.temperatures.iter().chain(&self.drives);
+        let has_halves = causes.map(|group| group.channels.len()).sum::<usize>() >= FEWEST_SENSORS;
+        let module = include_str!("prediction.toml");
+        let mut module = module.replace("MEMORY", &self.clock.length(8.0 * drift_s));
+        if self.survey.segments > 1 {
+            let count = self.survey.segments.min(MOST_FOLDS);
+            let by = "by = \"cross_validation\"";
+            let folds = format!("{by}, folds = {{ type = \"segments\", count = {count} }}");
+            module = module.replace(by, &folds);
+        }
+        let halves = if has_halves {
+            text.push_str(&module);
+            let [one, other] = [0, 1].map(|half| self.regressors(|number| number % 2 == half));
+            format!("half-1 = {one}\nhalf-2 = {other}\n")
+        } else {
+            let parts = module.split("\n\n").filter(|part| !part.contains(".half-"));
+            let module = parts.collect::<Vec<_>>().join("\n\n");
+            text.push_str(&module.replace(", \"half-1\", \"half-2\"", ""));
+            String::new()
+        };
+        let none = self.clock.length(0.0);
+        for (node, ahead, first_lag, why) in [
+            ("now", &none, 1, "a virtual sensor: the drift of the last"),
+            ("next", &width, 0, "a forecast: the drift of the next"),
+        ] {
+            let lag = |nth: i32| self.clock.length(f64::from(first_lag + nth) * drift_s);
+            let lags = [0, 1, 2].map(|nth| toml_string(&lag(nth)));
+            let _ = write!(
+                text,
+                "\n{}\nmodule = \"prediction\"\n{each}ahead = \"{ahead}\"\nlags = {}\n\
+                 [nodes.{node}.inputs]\nsensors = {}\n{halves}drift = \"drift.{axis}\"\n",
+                beside(&format!("[nodes.{node}]"), &format!("{why} {width}")),
+                list(&lags),
+                self.regressors(|_| true),
+            );
+        }
+        text.push_str("\n[outputs]\nnow = \"now\"\nnext = \"next\"\n");
     }
 
     /// The largest of what was measured of each drifting column, in the unit of the first drifting signal.
@@ -467,16 +490,6 @@ impl Writer<'_> {
             Some(factor * value)
         });
         in_first.fold(0.0, f64::max)
-    }
-
-    /// A drift per second of the first drifting signal, in the unit of the drift node.
-    fn in_drift_unit(&self, per_s: f64) -> f64 {
-        let factor = || {
-            let unit = Unit::parse(&self.drifting.first()?.unit).ok()?;
-            let to = Unit::parse(&self.drift_unit()).ok()?;
-            unit.difference().per(&Unit::second()).factor_to(&to)
-        };
-        per_s * factor().unwrap_or(1.0)
     }
 }
 
@@ -539,11 +552,11 @@ fn beside(line: &str, comment: &str) -> String {
     format!("{line:<34} # {comment}")
 }
 
-/// The name of the node that takes the slopes of a signal.
-fn gradients(group: &Group) -> String {
+/// The name of the node that makes something of a signal.
+fn of_signal(group: &Group, what: &str) -> String {
     match group.signal.as_str() {
-        "temperature" => "gradients".to_owned(),
-        signal => format!("{signal}-gradients"),
+        "temperature" => what.to_owned(),
+        signal => format!("{signal}-{what}"),
     }
 }
 

@@ -51,8 +51,6 @@ pub struct Choice {
     pub candidates: Vec<(f64, Vec<f64>)>,
     /// Root mean square of the drift per s, for each drifting channel.
     pub spread: Vec<f64>,
-    /// The 99th percentile of the absolute drift per s, for each drifting channel.
-    pub extreme: Vec<f64>,
     /// Whether the drift rises above its standard error.
     pub enough: bool,
     /// Why what drifts is predicted as it stands, and not its slope: no window fits between the gaps.
@@ -211,7 +209,6 @@ impl Choice {
             shortest_s,
             harmonics,
             spread: drifts.iter().map(Drift::spread).collect(),
-            extreme: drifts.iter().map(Drift::extreme).collect(),
             candidates,
             enough,
             levels,

@@ -52,10 +52,10 @@ impl Started {
     #[track_caller]
     fn is_of_the_stage(&self) {
         assert_eq!(self.window_s(), 300.0, "{}", self.graph);
-        let none = self.score("thermal", "baseline_zero");
+        let none = self.score("next/thermal", "baseline_zero");
         assert!((250.5..252.5).contains(&none), "{none}\n{}", self.graph);
-        let r2 = self.score("thermal", "r2_zero");
-        assert!((0.91..0.94).contains(&r2), "{r2}");
+        let r2 = self.score("next/thermal", "r2_zero");
+        assert!((0.97..0.99).contains(&r2), "{r2}");
     }
 }
 
@@ -101,11 +101,11 @@ fn a_column_that_counts_rows_neither_drifts_nor_explains() {
     assert_eq!(with.window_s(), 300.0);
     let without = started("counter-column/without.csv").unwrap();
     for figure in ["baseline_zero", "r2_zero"] {
-        let both = [&with, &without].map(|of| of.score("thermal", figure));
+        let both = [&with, &without].map(|of| of.score("next/thermal", figure));
         assert_eq!(both[0], both[1], "{figure}");
     }
-    assert!((2.67..2.69).contains(&with.score("thermal", "baseline_zero")));
-    assert!((0.817..0.819).contains(&with.score("thermal", "r2_zero")));
+    assert!((2.67..2.69).contains(&with.score("next/thermal", "baseline_zero")));
+    assert!((0.866..0.868).contains(&with.score("next/thermal", "r2_zero")));
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn a_value_a_day_has_windows_of_days_and_months() {
     let month = widths.iter().find(|of| of["window_s"] == 30.0 * 86_400.0);
     let ratio = month.unwrap()["ratio"].as_f64().unwrap();
     assert!((8.5..9.5).contains(&ratio), "{ratio}");
-    assert!(long.score("thermal", "r2_zero") > 0.8);
+    assert!(long.score("next/thermal", "r2_zero") > 0.8);
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn rows_may_lack_their_last_cells() {
     logger.fit.tells(&["600 × row without its last cells"]);
     let padded = started("rows-without-trailing-cells/padded.csv").unwrap();
     for figure in ["rmse", "r2_zero"] {
-        let both = [&logger, &padded].map(|of| of.score("thermal", figure));
+        let both = [&logger, &padded].map(|of| of.score("next/thermal", figure));
         assert_eq!(both[0], both[1], "{figure}");
     }
 }
@@ -368,8 +368,8 @@ fn a_long_layout_is_read_one_entity_after_the_other() {
             assert!(long.graph.contains(&line), "{}", long.graph);
         }
         assert_eq!(long.window_s(), 300.0);
-        let r2 = long.score("thermal", "r2_zero");
-        assert!((0.91..0.94).contains(&r2), "{r2}");
+        let r2 = long.score("next/thermal", "r2_zero");
+        assert!((0.97..0.99).contains(&r2), "{r2}");
     }
 }
 

@@ -18,6 +18,7 @@ mod redundancy;
 mod reference_figures;
 mod scores_by_hand;
 mod shared;
+mod starter_against_ridge;
 mod starter_graphs;
 mod state_space;
 mod streaming;

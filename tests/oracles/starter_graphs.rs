@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::workbench::{Scratch, athermal, athermal_on, data};
 
-/// Writes a starter graph for one log, fits it, and scores it on another: (RMSE of the vote, without a model) per axis.
+/// Writes a starter graph for one log, fits it, and scores it on another: (RMSE of the forecast, without a model) per axis.
 fn scored(train: &Path, test: &Path) -> Vec<(f64, f64)> {
     let scratch = Scratch::new("starter-graph");
     let (graph, model) = (scratch.path("graph.toml"), scratch.path("model.json"));
@@ -14,7 +14,7 @@ fn scored(train: &Path, test: &Path) -> Vec<(f64, f64)> {
     let facts = athermal_on("evaluate", &model, test, &[&"--format", &"json"]).json();
     let votes = facts["scores"].as_array().unwrap().iter();
     votes
-        .filter(|score| score["node"].as_str().unwrap().starts_with("vote"))
+        .filter(|score| score["node"] == "next/result")
         .map(|score| {
             let figure = |name: &str| score[name].as_f64().unwrap();
             (figure("rmse"), figure("baseline_zero"))

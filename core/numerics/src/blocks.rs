@@ -40,6 +40,8 @@ pub struct GramBlocks {
     /// Whole chunks of [`BLOCK_ROWS`] rows, while all rows are kept.
     kept: Option<Vec<Chunk>>,
     scratch: Vec<f64>,
+    /// The rows at which segments begin, but for the first.
+    starts: Vec<u64>,
 }
 
 /// Up to [`BLOCK_ROWS`] rows one after the other.
@@ -76,6 +78,7 @@ impl GramBlocks {
             pending: Chunk::default(),
             kept: (row_memory > 0).then(Vec::new),
             scratch: Vec::new(),
+            starts: Vec::new(),
         }
     }
 
@@ -108,6 +111,14 @@ impl GramBlocks {
     /// How many rows a whole block has now: 256 times a power of two.
     pub fn block_rows(&self) -> usize {
         self.block_rows
+    }
+
+    /// The next row begins another segment of the data.
+    pub fn segment(&mut self) {
+        let row = self.count();
+        if row > self.starts.last().copied().unwrap_or(0) {
+            self.starts.push(row);
+        }
     }
 
     /// Adds one row.
@@ -226,7 +237,7 @@ impl GramBlocks {
             self.block_rows as u64
         };
         let count = folds.count();
-        let folds = folds.of_blocks(self.count(), size)?;
+        let folds = folds.of_blocks(self.count(), size, &self.starts)?;
         if folds.iter().any(|fold| fold.test.end - fold.test.start < 2) {
             let rows = self.count();
             return Err(NumericsError::FoldOfOneRow { folds: count, rows });

@@ -36,6 +36,12 @@ pub enum Folds {
         /// Rows left out between training and test.
         gap: u64,
     },
+    /// Up to `folds` contiguous parts of whole segments, of sizes as equal as these allow; each is the test once. Of a single segment
+    /// these are parts as of `Blocked`.
+    Segments {
+        /// How many parts at most, 2 or more.
+        folds: usize,
+    },
 }
 
 /// The rows of one fold.
@@ -65,7 +71,9 @@ impl Folds {
     /// How many folds there are.
     pub fn count(&self) -> usize {
         match *self {
-            Self::Blocked { folds, .. } | Self::Expanding { folds, .. } => folds,
+            Self::Blocked { folds, .. }
+            | Self::Expanding { folds, .. }
+            | Self::Segments { folds } => folds,
         }
     }
 
@@ -74,16 +82,21 @@ impl Folds {
     /// # Errors
     /// See [`Folds::of_blocks`].
     pub fn of(&self, rows: u64) -> Result<Vec<FoldRows>, NumericsError> {
-        self.of_blocks(rows, 1)
+        self.of_blocks(rows, 1, &[])
     }
 
     /// The same where rows come in blocks of `size` that cannot be cut: edges of tests move to the nearest edge of a
-    /// block, and gaps become no smaller than stated.
+    /// block, and gaps become no smaller than stated. Segments but for the first begin at the rows `starts`.
     ///
     /// # Errors
     /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsOfBlocks`] where rows
     /// one by one would do; [`NumericsError::FoldsApart`] for a fold without a row to train on.
-    pub fn of_blocks(&self, rows: u64, size: u64) -> Result<Vec<FoldRows>, NumericsError> {
+    pub fn of_blocks(
+        &self,
+        rows: u64,
+        size: u64,
+        starts: &[u64],
+    ) -> Result<Vec<FoldRows>, NumericsError> {
         let folds = self.count();
         let parts = self.parts() as u64;
         if folds < 2 || rows < parts {
@@ -94,7 +107,7 @@ impl Folds {
             _ => rows,
         };
         let cut: Vec<FoldRows> = self
-            .tests(rows)
+            .tests(rows, starts)
             .into_iter()
             .map(|test| snap(test.start)..snap(test.end))
             .map(|test| FoldRows {
@@ -112,10 +125,7 @@ impl Folds {
             let block = size;
             return Err(NumericsError::FoldsOfBlocks { folds, rows, block });
         }
-        let (gap, embargo) = match *self {
-            Self::Blocked { gap, embargo, .. } => (gap, embargo),
-            Self::Expanding { gap, .. } => (gap, 0),
-        };
+        let (gap, embargo) = self.apart();
         Err(NumericsError::FoldsApart {
             test: lacking.test.clone(),
             rows,
@@ -124,9 +134,30 @@ impl Folds {
         })
     }
 
-    fn tests(&self, rows: u64) -> Vec<Range<u64>> {
+    fn tests(&self, rows: u64, starts: &[u64]) -> Vec<Range<u64>> {
         match *self {
-            Self::Blocked { folds, .. } => {
+            Self::Segments { folds } if !starts.is_empty() => {
+                let k = folds as u64;
+                // No part is much smaller than the others, however short its segment.
+                let least = (rows / (2 * k)).max(1);
+                let mut edges = vec![0];
+                for part in 1..k {
+                    let nearest = starts
+                        .iter()
+                        .min_by_key(|start| start.abs_diff(part * rows / k));
+                    let from = edges[edges.len() - 1] + least;
+                    edges.extend(nearest.filter(|start| (from..=rows - least).contains(*start)));
+                }
+                match edges.as_slice() {
+                    [_] => Self::contiguous(folds).tests(rows, &[]),
+                    _ => edges
+                        .iter()
+                        .zip(edges[1..].iter().chain([&rows]))
+                        .map(|(a, b)| *a..*b)
+                        .collect(),
+                }
+            }
+            Self::Blocked { folds, .. } | Self::Segments { folds } => {
                 let k = folds as u64;
                 let start = |fold: u64| fold * (rows / k) + fold.min(rows % k);
                 (0..k).map(|fold| start(fold)..start(fold + 1)).collect()
@@ -140,17 +171,28 @@ impl Folds {
         }
     }
 
+    /// Rows left out beside a test, and behind that after it.
+    fn apart(&self) -> (u64, u64) {
+        match *self {
+            Self::Blocked { gap, embargo, .. } => (gap, embargo),
+            Self::Expanding { gap, .. } => (gap, 0),
+            Self::Segments { .. } => (0, 0),
+        }
+    }
+
     fn train(&self, test: &Range<u64>, rows: u64, size: u64) -> Vec<Range<u64>> {
-        let before = |gap: u64| 0..test.start.saturating_sub(gap) / size * size;
-        let both = match *self {
-            Self::Blocked { gap, embargo, .. } => {
-                let left_out = test.end.saturating_add(gap).saturating_add(embargo);
-                let start = left_out.min(rows).div_ceil(size).saturating_mul(size);
-                vec![before(gap), start.min(rows)..rows]
-            }
-            Self::Expanding { gap, .. } => vec![before(gap)],
+        let (gap, embargo) = self.apart();
+        let before = 0..test.start.saturating_sub(gap) / size * size;
+        let left_out = test.end.saturating_add(gap).saturating_add(embargo);
+        let start = left_out.min(rows).div_ceil(size).saturating_mul(size);
+        let after = match self {
+            Self::Expanding { .. } => rows..rows,
+            _ => start.min(rows)..rows,
         };
-        both.into_iter().filter(|range| !range.is_empty()).collect()
+        [before, after]
+            .into_iter()
+            .filter(|range| !range.is_empty())
+            .collect()
     }
 }
 
@@ -211,7 +253,7 @@ mod tests {
             gap: 1,
             embargo: 0,
         };
-        let folds = how.of_blocks(1000, 100).unwrap();
+        let folds = how.of_blocks(1000, 100, &[]).unwrap();
         assert_eq!(folds[0].test, 0..500);
         assert_eq!(folds[0].train, [600..1000]);
         assert_eq!(folds[1].train, [0..400]);
@@ -225,7 +267,7 @@ mod tests {
         assert!(
             refusal(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
         );
-        let blocks = refusal(three.of_blocks(12, 256));
+        let blocks = refusal(three.of_blocks(12, 256, &[]));
         assert!(blocks.contains("12 rows") && blocks.contains("in blocks of 256 rows"));
         let wide = Folds::Blocked {
             folds: 3,
@@ -233,12 +275,31 @@ mod tests {
             embargo: 7,
         };
         for size in [1, 4] {
-            let apart = refusal(wide.of_blocks(12, size));
+            let apart = refusal(wide.of_blocks(12, size, &[]));
             assert_eq!(
                 apart,
                 "of 12 rows none is left to train on where rows 1 to 4 are tested, with a gap of 2 rows and an embargo of 7"
             );
         }
+    }
+
+    #[test]
+    fn folds_by_segments_never_cut_one() {
+        let tests = |folds: usize, starts: &[u64]| {
+            let folds = Folds::Segments { folds }.of_blocks(100, 1, starts).unwrap();
+            folds.into_iter().map(|fold| fold.test).collect::<Vec<_>>()
+        };
+        assert_eq!(tests(2, &[40, 70]), [0..40, 40..100]);
+        assert_eq!(tests(3, &[40, 70]), [0..40, 40..70, 70..100]);
+        // There are two segments only, and more parts than these are none.
+        assert_eq!(tests(5, &[90]), [0..90, 90..100]);
+        assert_eq!(tests(2, &[40, 41]), [0..41, 41..100]);
+        assert_eq!(tests(2, &[3, 99]), [0..50, 50..100]);
+        assert_eq!(tests(4, &[]), [0..25, 25..50, 50..75, 75..100]);
+        let third = &Folds::Segments { folds: 3 }
+            .of_blocks(100, 1, &[40, 70])
+            .unwrap()[1];
+        assert_eq!(third.train, [0..40, 70..100]);
     }
 
     #[test]

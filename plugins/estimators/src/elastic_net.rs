@@ -243,6 +243,10 @@ impl Trainer for SparseTrainer {
         self.blocks.push(regressors, truth);
     }
 
+    fn segment(&mut self) {
+        self.blocks.segment();
+    }
+
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         let predictor = self.solve(&mut report).map_err(unsolved)?;

@@ -41,6 +41,12 @@ pub enum Cut {
         #[serde(default)]
         gap_rows: u64,
     },
+    /// Into whole segments of the data, each of which is tested on once; of a single segment into contiguous parts.
+    Segments {
+        /// How many parts at most, 2 to 1000: of more segments neighbours are put together.
+        #[schemars(range(min = 2, max = 1000))]
+        count: usize,
+    },
 }
 
 /// Tells, once, where the folds of a cross-validation end elsewhere than they would had the rows been kept.
@@ -100,6 +106,9 @@ impl Folds {
                 gap: gap_rows,
                 embargo: embargo_rows,
             },
+            Self::Cut(Cut::Segments { count }) => {
+                athermal_numerics::Folds::Segments { folds: count }
+            }
             Self::Cut(Cut::Expanding { count, gap_rows }) => athermal_numerics::Folds::Expanding {
                 folds: count,
                 gap: gap_rows,

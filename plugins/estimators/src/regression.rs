@@ -279,6 +279,10 @@ impl Trainer for LinearTrainer {
         self.blocks.push(regressors, truth);
     }
 
+    fn segment(&mut self) {
+        self.blocks.segment();
+    }
+
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         let predictor: Box<dyn Predictor> = match self.fitted(&mut report)? {

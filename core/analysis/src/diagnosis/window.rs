@@ -237,15 +237,6 @@ impl Drift {
         (self.noise_squares / self.windows()).sqrt()
     }
 
-    /// The 99th percentile of their sizes, per s; 0 of none.
-    #[must_use]
-    pub fn extreme(&self) -> f64 {
-        let mut sizes = self.sizes.clone();
-        sizes.sort_by(f64::total_cmp);
-        let place = (0.99 * sizes.len() as f64) as usize;
-        sizes.get(place).copied().unwrap_or(0.0)
-    }
-
     /// Spread of the drift without its noise, over its noise.
     #[must_use]
     pub fn ratio(&self) -> f64 {
