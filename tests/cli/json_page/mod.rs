@@ -281,6 +281,8 @@ fn printed(scratch: &Scratch) -> Vec<(&'static str, Value)> {
         athermal(&all).json()
     };
     let (sound, [one, two]) = recordings(scratch);
+    let pages = "core/serve/src/deployment/pages";
+    let service = format!("{}/{pages}/A207-right.toml", env!("CARGO_MANIFEST_DIR"));
     let several = scratch.file(
         "several.toml",
         format!(
@@ -358,6 +360,7 @@ wait = "wait"
         ("show", json(&[&"show", &kinds])),
         ("check", json(&[&"check", &several, &wrong])),
         ("nodes", json(&[&"nodes"])),
+        ("nodes", json(&[&"nodes", &"csv"])),
         ("a-node-type", json(&[&"nodes", &"slope"])),
         ("init", json(&[&"init", &sound, &"-o", &starter])),
         (
@@ -370,6 +373,7 @@ wait = "wait"
         ("diff", json(&[&"diff", &scarce, &otherwise])),
         ("explain", json(&[&"explain"])),
         ("explain", json(&[&"explain", &"A048"])),
+        ("explain", json(&[&"explain", &service])),
     ];
     printed.into_iter().chain(told).collect()
 }

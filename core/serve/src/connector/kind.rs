@@ -21,6 +21,7 @@ pub struct ConnectorKind<S: ?Sized + 'static> {
     /// The version of that crate.
     pub version: &'static str,
     /// Reads its parameters, or reports their mistakes: the table, how it is named in texts, and its keys that are read elsewhere.
+    #[allow(clippy::type_complexity)] // it is this once
     pub read: fn(&Value, &str, &[&str], &mut Diagnostics) -> Option<Box<S>>,
     /// The JSON Schema of its parameters, with their documentation.
     pub schema: fn() -> &'static serde_json::Value,

@@ -138,7 +138,7 @@ fn a_sink_is_given_outputs_by_name_column_or_pattern_and_all_without() {
         [x.clone(), y.clone(), room.clone()]
     );
     let column = outputs(&format!("outputs = [{plate:?}]"));
-    assert_eq!(column, [plate.clone()]);
+    assert_eq!(column, std::slice::from_ref(plate));
 }
 
 #[test]
