@@ -108,7 +108,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
     for (port, what) in &outputs {
         let name = format!("  {port:<17} ");
-        print!("{}", paragraph(&name, 6, &what));
+        print!("{}", paragraph(&name, 6, what));
     }
     let schema = (kind.schema)();
     println!("\nParameters:");
