@@ -58,6 +58,16 @@ pub struct SourceCounts {
     records: AtomicU64,
 }
 
+/// Where the samples of a channel go.
+#[derive(Debug, Clone, Copy)]
+struct FedChannel {
+    /// Its place in the feed.
+    place: u32,
+    conversion: Option<(f64, f64)>,
+    /// The newest stamp that is known.
+    after: Instant,
+}
+
 /// The end that a source holds.
 #[derive(Debug)]
 pub struct Outflow {
@@ -66,8 +76,8 @@ pub struct Outflow {
     counts: Arc<SourceCounts>,
     progress: Arc<Progress>,
     remarks: Remarks,
-    /// By channel of the source: its place in the feed, its conversion, and the newest stamp that is known.
-    channels: Vec<(u32, Option<(f64, f64)>, Instant)>,
+    /// By channel of the source.
+    channels: Vec<FedChannel>,
     stamps: Stamps,
     /// What was taken at a look, and the number of records that have it.
     look: (u64, u64),
@@ -100,7 +110,11 @@ pub(crate) fn link(
         progress,
         remarks,
         channels: wired
-            .map(|(wired, &place)| (place, wired.conversion, wired.after))
+            .map(|(wired, &place)| FedChannel {
+                place,
+                conversion: wired.conversion,
+                after: wired.after,
+            })
             .collect(),
         stamps,
         look: (0, 0),
@@ -127,8 +141,8 @@ impl Outflow {
 
     /// The times of what follows may start again.
     pub fn segment(&mut self) {
-        for (.., after) in &mut self.channels {
-            *after = Instant::MIN;
+        for channel in &mut self.channels {
+            channel.after = Instant::MIN;
         }
         self.send(Arrival::Segment);
     }
@@ -221,7 +235,11 @@ impl Outflow {
     }
 
     fn wired(&self, channel: usize, stamp: Instant, value: f64) -> Option<Sample> {
-        let (place, conversion, after) = *self.channels.get(channel)?;
+        let FedChannel {
+            place,
+            conversion,
+            after,
+        } = *self.channels.get(channel)?;
         // What is read again after a start is not new.
         if self.stamps == Stamps::Order && stamp <= after {
             return None;
