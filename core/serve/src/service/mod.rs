@@ -19,6 +19,7 @@ mod source_thread;
 mod status;
 #[cfg(test)]
 mod tests;
+mod wiring;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,16 +40,15 @@ pub use status::Snapshot;
 use crate::checkpoint::Checkpoints;
 use crate::compile::Plan;
 use crate::connector::{
-    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stamps, Stop, WiredChannel,
-    WiredOutput, link,
+    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stop, WiredChannel, link,
 };
-use crate::deployment::{Deployment, Runtime};
+use crate::deployment::Deployment;
 use crate::folder::StateFolder;
 use crate::journal::{FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, retire};
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
-use crate::sequencer::{Admission, ChannelRules, Rules, Sequencer, SourceRules};
+use crate::sequencer::{Admission, Sequencer};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use command::CommandGate;
@@ -57,6 +57,7 @@ use frames::frames;
 use sink_thread::SinkThread;
 use sinks::OpenSink;
 use status::Shared;
+use wiring::{fed, keep, outputs, rules};
 
 /// How many arrivals of a source may wait for the engine thread.
 const ARRIVALS: usize = 1 << 14;
@@ -522,63 +523,6 @@ impl std::fmt::Debug for Service {
             .field("sources", &self.sources)
             .field("sinks", &self.sinks)
             .finish_non_exhaustive()
-    }
-}
-
-/// The channels that samples are given for: those of what runs, then those of what is to run.
-fn fed(plan: &Plan, given: &[Feed]) -> Vec<Feed> {
-    let mut feed = Feed::of(plan);
-    for channel in given {
-        if !feed.contains(channel) {
-            feed.push(channel.clone());
-        }
-    }
-    feed
-}
-
-fn rules(runtime: &Runtime, sources: &[crate::deployment::DeclaredSource], feed: &[Feed]) -> Rules {
-    let channel = |of: &Feed| {
-        let mut wired = sources.iter().enumerate().flat_map(|(nth, source)| {
-            let channels = source.channels.iter();
-            channels.map(move |channel| (nth, channel))
-        });
-        let found = wired.find(|(_, channel)| channel.channel.name == of.name);
-        found.map_or_else(ChannelRules::default, |(source, channel)| ChannelRules {
-            source,
-            late: channel.late,
-        })
-    };
-    Rules {
-        wait: runtime.wait,
-        join: runtime.join,
-        settle: runtime.settle,
-        future: runtime.future,
-        heartbeat: runtime.heartbeat,
-        sources: sources
-            .iter()
-            .map(|of| SourceRules {
-                silent: of.silent,
-                clock: of.clock,
-                is_in_order: of.parameters.stamps() == Stamps::Order,
-            })
-            .collect(),
-        channels: feed.iter().map(channel).collect(),
-        ..Rules::default()
-    }
-}
-
-fn outputs(plan: &Plan) -> Vec<WiredOutput> {
-    let output = |of: &crate::compile::PlannedOutput| WiredOutput {
-        name: of.name.clone(),
-        unit: Some(plan.channels[of.slot].channel.unit.text().to_owned()),
-    };
-    plan.outputs.iter().map(output).collect()
-}
-
-fn keep(runtime: &Runtime) -> Keep {
-    Keep {
-        age: runtime.keep.journal.map_or(Wait::MAX, wait),
-        at_most: runtime.keep.at_most.unwrap_or(u64::MAX),
     }
 }
 
