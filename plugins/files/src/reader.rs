@@ -1,9 +1,11 @@
 //! Rows of a recording in either format: instants that advance, values or absence. Not how the bytes are cut into cells.
 
+mod commas;
+
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use athermal_core::document::{Arrangement, DecimalMark, TableFormat};
+use athermal_core::document::{Arrangement, TableFormat};
 use athermal_core::time::{Civil, Instant};
 
 use crate::cell;
@@ -18,6 +20,7 @@ use crate::long::Long;
 use crate::{
     Again, CellFault, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn,
 };
+use commas::Commas;
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -93,28 +96,6 @@ struct Reading {
     /// Where rows of one time are put together.
     joins: bool,
     lookahead: Lookahead,
-}
-
-/// Where `1,5` is a number.
-#[derive(Clone, Copy)]
-struct Commas {
-    /// In times.
-    times: bool,
-    /// In values.
-    values: bool,
-}
-
-impl Commas {
-    fn of(table: &TableFormat, separator: Option<u8>) -> Self {
-        let found = separator.is_some_and(|separator| separator != b',');
-        Self {
-            times: found || table.decimal == Some(DecimalMark::Comma),
-            values: match table.decimal {
-                Some(mark) => mark == DecimalMark::Comma,
-                None => found,
-            },
-        }
-    }
 }
 
 /// A row with the cell that its time is from.
