@@ -61,7 +61,7 @@ fn desk(name: &str, service: &str) -> Scratch {
     scratch.file("graph.toml", GRAPH);
     scratch.file(
         "line.toml",
-        &format!("schema = 1\nextends = \"graph.toml\"\n{service}"),
+        format!("schema = 1\nextends = \"graph.toml\"\n{service}"),
     );
     scratch
 }

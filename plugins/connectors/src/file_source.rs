@@ -38,7 +38,7 @@ impl Source for CsvSource {
     }
 
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
-        Ok(FileInlet::new(&self.path, Format::Csv, wiring))
+        Ok(FileInlet::open(&self.path, Format::Csv, wiring))
     }
 }
 
@@ -48,7 +48,7 @@ impl Source for JsonLinesSource {
     }
 
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
-        Ok(FileInlet::new(&self.path, Format::JsonLines, wiring))
+        Ok(FileInlet::open(&self.path, Format::JsonLines, wiring))
     }
 }
 
@@ -61,7 +61,7 @@ struct FileInlet {
 }
 
 impl FileInlet {
-    fn new(path: &std::path::Path, format: Format, wiring: SourceWiring) -> Box<dyn Inlet> {
+    fn open(path: &std::path::Path, format: Format, wiring: SourceWiring) -> Box<dyn Inlet> {
         Box::new(Self {
             path: in_folder(&wiring.folder, path),
             format,
