@@ -18,6 +18,8 @@ use crate::time::Instant;
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Arrival {
     Sample(Sample),
+    /// The next so many samples are of one row.
+    Row(usize),
     Connected,
     Away,
     /// The times of what follows may start again.
@@ -151,7 +153,7 @@ impl Outflow {
     /// the source's unit, NaN where the source says that there is none. False where there is no room, and the sample was dropped and
     /// counted.
     pub fn sample(&mut self, channel: usize, stamp: Instant, value: f64) -> bool {
-        let Some(sample) = self.wired(channel, stamp, value) else {
+        let Some(sample) = wired(&self.channels, self.stamps, channel, stamp, value) else {
             return true;
         };
         let is_given = self.ring.push(Arrival::Sample(sample)).is_ok();
@@ -169,23 +171,36 @@ impl Outflow {
     /// stop meanwhile. For sources that can hold back.
     #[must_use]
     pub fn row(&mut self, stamp: Instant, values: &[f64], stop: &Stop) -> bool {
-        while self.ring.slots() < values.len().max(1) {
+        while self.ring.slots() < values.len() + 2 {
             self.engine.unpark();
             if !stop.wait(Wait::from_millis(1)) {
                 return false;
             }
         }
-        let mut is_empty = true;
-        for (channel, value) in values.iter().enumerate() {
-            if !value.is_nan() {
-                is_empty = false;
-                self.sample(channel, stamp, *value);
-            }
-        }
         // Time passes also where nothing is measured.
-        if is_empty {
-            self.sample(0, stamp, f64::NAN);
+        let is_empty = values.iter().all(|value| value.is_nan());
+        let Self {
+            ring,
+            channels,
+            stamps,
+            ..
+        } = self;
+        let samples = values.iter().enumerate().filter_map(|(channel, value)| {
+            let is_there = !value.is_nan() || is_empty && channel == 0;
+            let sample = wired(channels, *stamps, channel, stamp, *value);
+            sample.filter(|_| is_there)
+        });
+        let count = samples.clone().count();
+        if count == 0 {
+            return true;
         }
+        // All of it can be seen at once: no tick is cut in the middle of a row.
+        if let Ok(chunk) = ring.write_chunk_uninit(count + 1) {
+            let row = std::iter::once(Arrival::Row(count));
+            chunk.fill_from_iter(row.chain(samples.map(Arrival::Sample)));
+        }
+        self.counts.given.fetch_add(count as u64, Ordering::Relaxed);
+        self.engine.unpark();
         true
     }
 
@@ -233,24 +248,30 @@ impl Outflow {
         }
         self.engine.unpark();
     }
+}
 
-    fn wired(&self, channel: usize, stamp: Instant, value: f64) -> Option<Sample> {
-        let FedChannel {
-            place,
-            conversion,
-            after,
-        } = *self.channels.get(channel)?;
-        // What is read again after a start is not new.
-        if self.stamps == Stamps::Order && stamp <= after {
-            return None;
-        }
-        let value = conversion.map_or(value, |(factor, offset)| value * factor + offset);
-        Some(Sample {
-            channel: place,
-            stamp,
-            value,
-        })
+fn wired(
+    channels: &[FedChannel],
+    stamps: Stamps,
+    channel: usize,
+    stamp: Instant,
+    value: f64,
+) -> Option<Sample> {
+    let FedChannel {
+        place,
+        conversion,
+        after,
+    } = *channels.get(channel)?;
+    // What is read again after a start is not new.
+    if stamps == Stamps::Order && stamp <= after {
+        return None;
     }
+    let value = conversion.map_or(value, |(factor, offset)| value * factor + offset);
+    Some(Sample {
+        channel: place,
+        stamp,
+        value,
+    })
 }
 
 impl SourceLink {

@@ -151,14 +151,19 @@ impl EngineThread {
 
     /// Takes what a source has given; true where there may be more.
     fn take(&mut self, nth: usize, left: &mut usize) -> Result<bool, EngineError> {
-        for _ in 0..BATCH {
+        // Samples of a row that are still to come: they are there already.
+        let (mut taken, mut together) = (0, 0);
+        while taken < BATCH || together > 0 {
+            taken += 1;
             let Some(arrival) = self.sources[nth].next() else {
                 self.recorded(nth);
                 return Ok(false);
             };
             let now = self.clock.now();
             match arrival {
+                Arrival::Row(samples) => together = samples,
                 Arrival::Sample(sample) => {
+                    together = together.saturating_sub(1);
                     let admission = self.worker.arrive(sample, now);
                     if !matches!(admission, Admission::Accepted(_) | Admission::Held) {
                         self.remark(sample.channel as usize, admission);
