@@ -9,16 +9,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal::Model;
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{GraphFile, Memory, declare, load_text};
 use athermal::serve::connector::{
     ConnectorError, Inlet, OutRow, Outflow, Outlet, Sink, SinkWiring, Source, SourceWiring, Stamps,
-    Stop, sink_kind, source_kind,
+    Stop,
 };
-use athermal::serve::deployment::{
-    DeclaredChannel, DeclaredSink, DeclaredSource, Deployment, Runtime,
-};
+use athermal::serve::deployment::Deployment;
 use athermal::serve::service::{Service, ServiceOptions};
-use athermal::{Duration, Instant};
+use athermal::{Instant, Model};
 use die_tester::{Tick, model, ticks};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -135,55 +134,25 @@ fn main() {
 
 fn serve(model: &Model) {
     let folder = std::env::temp_dir().join(format!("athermal-bench-{}", std::process::id()));
-    let nothing = serde_json::json!({});
-    let nothing = athermal::core::document::Value::from_json(
-        &nothing,
-        athermal::core::diagnostic::Place::new(athermal::core::diagnostic::SourceId(0), 0, 0),
+    let text = "schema = 1\nruntime = { wait = \"0 s\", settle = \"0 s\" }\n\
+         sources.metronome.type = \"metronome\"\nsinks.clerk.type = \"clerk\"\n";
+    let (mut files, mut mistakes) = (Sources::new(), Diagnostics::new());
+    let read = load_text(
+        &folder,
+        text.to_owned(),
+        &Memory::default(),
+        &mut files,
+        &mut mistakes,
     );
-    let nothing = nothing.unwrap_or_else(|_| unreachable!("a table is one"));
-    let mut mistakes = athermal::core::diagnostic::Diagnostics::new();
-    let channel = |of: &athermal::core::compile::SourceChannel| DeclaredChannel {
-        address: of.column.clone(),
-        channel: of.clone(),
-        conversion: None,
-        late: Duration::ZERO,
+    let said = read.and_then(|read| declare(read, &mut mistakes));
+    let graph = GraphFile {
+        deployment: said.expect("it has no mistake").deployment,
+        ..model.graph.clone()
     };
-    let kind = source_kind("metronome").expect("it is registered");
-    let source = DeclaredSource {
-        name: "metronome".to_owned(),
-        kind,
-        parameters: (kind.read)(&nothing, "it", &[], &mut mistakes).expect("it has none"),
-        silent: Duration::from_ns(30_000_000_000),
-        clock: None,
-        channels: model.plan.sources.iter().map(channel).collect(),
-    };
-    let kind = sink_kind("clerk").expect("it is registered");
-    let outputs: Vec<_> = model
-        .plan
-        .outputs
-        .iter()
-        .map(|of| of.name.clone())
-        .collect();
-    let sink = DeclaredSink {
-        name: "clerk".to_owned(),
-        kind,
-        parameters: (kind.read)(&nothing, "it", &[], &mut mistakes).expect("it has none"),
-        behind: None,
-        rate: vec![None; outputs.len()],
-        outputs,
-    };
-    let deployment = Deployment {
-        runtime: Runtime {
-            wait: Duration::ZERO,
-            settle: Duration::ZERO,
-            ..Runtime::default()
-        },
-        sources: vec![source],
-        sinks: vec![sink],
-    };
+    let deployment = Deployment::read(&graph, &model.plan, &files, &mut mistakes);
+    let deployment = deployment.expect("it has no mistake");
     let options = ServiceOptions {
         state: folder.clone(),
-        folder: folder.clone(),
         is_dry: false,
         frozen: false,
     };

@@ -9,7 +9,7 @@ use athermal::serve::recovery::Recovered;
 use clap::Args;
 use serde_json::json;
 
-use super::serve::events::recovered;
+use super::serve::events::damaged;
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Terminal};
 use athermal_analysis::figures::{counted, instant, seconds};
@@ -58,7 +58,7 @@ impl Replay {
         if let Some((writer, _)) = rows {
             writer.finish()?;
         }
-        recovered(terminal, &self.state, &found.report);
+        damaged(terminal, &found.report);
         let (ticks, differs) = (found.report.stepped, found.report.difference);
         let facts = json!({
             "ticks": ticks,

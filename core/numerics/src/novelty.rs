@@ -94,11 +94,8 @@ impl TryFrom<StoredNovelty> for Novelty {
             );
         }
         let above_zero = |value: f64| value > 0.0 && value.is_finite();
-        let finite = stored
-            .means
-            .iter()
-            .chain(&stored.directions)
-            .all(|value| value.is_finite());
+        let mut values = stored.means.iter().chain(&stored.directions);
+        let finite = values.all(|value| value.is_finite());
         if !(finite
             && above_zero(stored.edge)
             && stored.scales.iter().all(|&scale| above_zero(scale)))
@@ -176,9 +173,11 @@ impl Novelty {
         (novelty.edge > 0.0 && novelty.edge.is_finite()).then_some(novelty)
     }
 
-    /// The mean of each column.
-    pub fn means(&self) -> impl Iterator<Item = f64> {
-        self.columns.iter().map(|column| column.mean)
+    /// What a linear form of the columns gives in their middle.
+    #[must_use]
+    pub fn centre(&self, intercept: f64, coefficients: &[f64]) -> f64 {
+        let columns = self.columns.iter().zip(coefficients);
+        intercept + columns.map(|(column, b)| b * column.mean).sum::<f64>()
     }
 
     /// How many columns it is of.

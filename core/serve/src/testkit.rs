@@ -16,6 +16,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::mpsc::channel;
 use std::thread;
 use std::time::{Duration as Wait, Instant as Clock};
 
@@ -106,7 +107,7 @@ impl<'a> SourceTrial<'a> {
             *after = given.stamp.max(*after);
         }
         let places: Vec<u32> = (0..).take(wiring.channels.len()).collect();
-        let (remarks, _listens) = Remarks::new();
+        let remarks = Remarks::new("it", &channel().0);
         let engine = (thread::current(), Arc::<Progress>::default(), remarks);
         let stamps = self.source.stamps();
         let (mut out, link) = link(room, &wiring.channels, &places, stamps, engine);

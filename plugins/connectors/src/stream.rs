@@ -2,7 +2,7 @@
 
 use std::io;
 
-use athermal_files::{Flush, Format, STANDARD_INPUT, Writer};
+use athermal_files::{FileError, Flush, Format, STANDARD_INPUT, Writer};
 use athermal_serve::connector::{
     ConnectorError, Inlet, OutRow, Outflow, Outlet, Sink, SinkWiring, Source, SourceWiring, Stamps,
     Stop,
@@ -77,7 +77,11 @@ impl Inlet for StandardInlet {
             None,
             out,
         );
-        let mut reader = opened.map_err(ConnectorError::new)?;
+        let mut reader = match opened {
+            // It has ended, be it after a failure: it cannot be read again.
+            Err(FileError::Empty { .. }) => return Ok(()),
+            opened => opened.map_err(ConnectorError::new)?,
+        };
         out.connected();
         pass(&mut reader, out, stop, |_| true).map(|_| ())
     }

@@ -6,19 +6,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_core::diagnostic::{Diagnostics, Place, SourceId};
-use athermal_core::document::Value;
+use athermal_core::compile::Wanted;
+use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_core::engine::Engine;
 use athermal_core::prng::Prng;
-use athermal_core::time::{Duration, Instant};
+use athermal_core::time::Instant;
 use athermal_features as _;
 use athermal_run::model::Model;
-use athermal_serve::connector::{sink_kind, source_kind};
-use athermal_serve::deployment::{
-    DeclaredChannel, DeclaredSink, DeclaredSource, Deployment, Runtime,
-};
-use athermal_serve::service::{Ended, Service, ServiceEvent, ServiceOptions};
-use serde_json::json;
+use athermal_serve::deployment::Deployment;
+use athermal_serve::service::{Ended, Service, ServiceError, ServiceEvent, ServiceOptions};
 
 const GRAPH: &str = r#"
 schema = 1
@@ -53,17 +49,29 @@ impl Folder {
         self.0.join(name)
     }
 
-    fn start(&self, source: (&str, serde_json::Value), sink: (&str, serde_json::Value)) -> Service {
-        let model = self.model();
+    /// Starts a service with the keys of its source and its sink.
+    fn start(&self, source: &str, sink: &str) -> Result<Service, ServiceError> {
+        // A row of a recording is whole by itself.
+        let wait = if source.contains("replay") { 0 } else { 20 };
+        let text = format!(
+            "schema = 1\nextends = \"graph.toml\"\n\
+             [runtime]\nwait = \"{wait} ms\"\nsettle = \"0 s\"\n\
+             [sources.in]\n{source}\n[sinks.out]\n{sink}\n"
+        );
+        let path = self.file("machine.toml");
+        fs::write(&path, text).unwrap();
+        let (mut sources, mut mistakes) = (Sources::new(), Diagnostics::new());
+        let model = Model::load_from(&path, Wanted::default(), &mut sources, &mut mistakes);
+        let model = model.unwrap();
+        let declared = Deployment::read(&model.graph, &model.plan, &sources, &mut mistakes);
+        let declared =
+            declared.unwrap_or_else(|| panic!("{}", mistakes.render(&sources, false, 100)));
         let options = ServiceOptions {
-            state: self.0.join("state"),
-            folder: self.0.clone(),
+            state: self.file("state"),
             is_dry: false,
             frozen: false,
         };
-        Service::start(&model, deployment(&model, source, sink), &options)
-            .unwrap()
-            .0
+        Ok(Service::start(&model, declared, &options)?.0)
     }
 }
 
@@ -73,61 +81,8 @@ impl Drop for Folder {
     }
 }
 
-fn deployment(
-    model: &Model,
-    (source_kind_name, parameters): (&str, serde_json::Value),
-    (sink, of_sink): (&str, serde_json::Value),
-) -> Deployment {
-    let value =
-        |json: &serde_json::Value| Value::from_json(json, Place::new(SourceId(0), 0, 0)).unwrap();
-    let mut mistakes = Diagnostics::new();
-    let kind = source_kind(source_kind_name).unwrap();
-    let read = (kind.read)(&value(&parameters), "the source", &[], &mut mistakes);
-    let channel = |channel: &athermal_core::compile::SourceChannel| DeclaredChannel {
-        address: channel.column.clone(),
-        channel: channel.clone(),
-        conversion: None,
-        late: Duration::ZERO,
-    };
-    let source = DeclaredSource {
-        name: "in".to_owned(),
-        kind,
-        parameters: read.unwrap(),
-        silent: Duration::from_ns(30_000_000_000),
-        clock: None,
-        channels: model.plan.sources.iter().map(channel).collect(),
-    };
-    let kind = sink_kind(sink).unwrap();
-    let read = (kind.read)(&value(&of_sink), "the sink", &[], &mut mistakes);
-    let outputs: Vec<_> = model
-        .plan
-        .outputs
-        .iter()
-        .map(|of| of.name.clone())
-        .collect();
-    let sink = DeclaredSink {
-        name: "out".to_owned(),
-        kind,
-        parameters: read.unwrap(),
-        behind: None,
-        rate: vec![None; outputs.len()],
-        outputs,
-    };
-    Deployment {
-        runtime: Runtime {
-            // A row of a recording is whole by itself.
-            wait: Duration::from_ns(if source_kind_name == "replay" {
-                0
-            } else {
-                20_000_000
-            }),
-            settle: Duration::ZERO,
-            ..Runtime::default()
-        },
-        sources: vec![source],
-        sinks: vec![sink],
-    }
-}
+const FOLLOWED: &str = "type = \"csv\"\npath = \"log.csv\"";
+const KEPT: &str = "type = \"csv\"\npath = \"out.csv\"";
 
 /// Rows of a recording, some of them with holes, one after a break of an hour.
 fn rows(seed: u64, count: usize) -> Vec<(i64, [f64; 2])> {
@@ -227,8 +182,8 @@ fn a_recording_that_is_replayed_gives_the_bits_of_the_engine() {
     let folder = Folder::new();
     let rows = rows(1, 2_000);
     fs::write(folder.file("log.csv"), HEADER.to_owned() + &csv(&rows)).unwrap();
-    let source = ("replay", json!({ "path": "log.csv", "speed": "fastest" }));
-    let service = folder.start(source, ("csv", json!({ "path": "out.csv" })));
+    let source = "type = \"replay\"\npath = \"log.csv\"\nspeed = \"fastest\"";
+    let service = folder.start(source, KEPT).unwrap();
     let (ended, events) = serve_to_the_end(service);
     assert!(
         found(&folder.file("out.csv")) == expected(&folder.model(), &rows),
@@ -245,8 +200,7 @@ fn a_file_is_followed_as_it_grows_and_when_it_is_rotated() {
     let folder = Folder::new();
     let rows = rows(2, 300);
     let (log, out) = (folder.file("log.csv"), folder.file("out.csv"));
-    let source = ("csv", json!({ "path": "log.csv" }));
-    let mut service = folder.start(source, ("csv", json!({ "path": "out.csv" })));
+    let mut service = folder.start(FOLLOWED, KEPT).unwrap();
     // It is not there yet; then half a row stands in it; then it is moved away.
     fs::write(&log, HEADER.to_owned() + &csv(&rows[..100]) + "50.000,2").unwrap();
     until("the first file", Some(&mut service), || {
@@ -275,8 +229,7 @@ fn a_service_goes_on_where_it_was_stopped_without_a_row_twice() {
     let (log, out) = (folder.file("log.csv"), folder.file("out.csv"));
     for end in [300, 500, 900] {
         fs::write(&log, HEADER.to_owned() + &csv(&rows[..end])).unwrap();
-        let source = ("csv", json!({ "path": "log.csv" }));
-        let mut service = folder.start(source, ("csv", json!({ "path": "out.csv" })));
+        let mut service = folder.start(FOLLOWED, KEPT).unwrap();
         until("the file", Some(&mut service), || found(&out).len() >= end);
         service.stop().unwrap();
         // What a power cut left: half a row, and one that the journal does not know.
@@ -284,11 +237,7 @@ fn a_service_goes_on_where_it_was_stopped_without_a_row_twice() {
         text += "9999.5,1,2,3,4,5,6,7,8,0\n77";
         fs::write(&out, text).unwrap();
     }
-    let source = ("csv", json!({ "path": "log.csv" }));
-    folder
-        .start(source, ("csv", json!({ "path": "out.csv" })))
-        .stop()
-        .unwrap();
+    folder.start(FOLLOWED, KEPT).unwrap().stop().unwrap();
     assert!(found(&out) == expected(&folder.model(), &rows));
 }
 
@@ -296,18 +245,7 @@ fn a_service_goes_on_where_it_was_stopped_without_a_row_twice() {
 fn a_sink_refuses_a_file_with_other_columns() {
     let folder = Folder::new();
     fs::write(folder.file("out.csv"), "a,b\n1,2\n").unwrap();
-    let model = folder.model();
-    let options = ServiceOptions {
-        state: folder.0.join("state"),
-        folder: folder.0.clone(),
-        is_dry: false,
-        frozen: false,
-    };
-    let sink = ("csv", json!({ "path": "out.csv" }));
-    let declared = deployment(&model, ("csv", json!({ "path": "log.csv" })), sink);
-    let error = Service::start(&model, declared, &options)
-        .unwrap_err()
-        .to_string();
+    let error = folder.start(FOLLOWED, KEPT).unwrap_err().to_string();
     assert!(
         error.contains("has other columns") && error.contains("move it away"),
         "{error}"

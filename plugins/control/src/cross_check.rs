@@ -103,16 +103,7 @@ impl Feature for CrossCheck {
             let help = "of two that differ neither is known to be wrong";
             return Err(vec![Mistake::at("inputs.signal", message).help(help)]);
         }
-        Ok(vec![
-            OutputPort {
-                name: "signal",
-                channels: signal.to_vec(),
-            },
-            OutputPort {
-                name: "reason",
-                channels: signal.iter().map(limit::numbered).collect(),
-            },
-        ])
+        Ok(limit::with_reasons(signal))
     }
 
     /// The others only say whether a value is there.

@@ -178,16 +178,7 @@ impl Feature for Health {
         for channel in signal {
             self.limits(channel)?;
         }
-        Ok(vec![
-            OutputPort {
-                name: "signal",
-                channels: signal.to_vec(),
-            },
-            OutputPort {
-                name: "reason",
-                channels: signal.iter().map(limit::numbered).collect(),
-            },
-        ])
+        Ok(limit::with_reasons(signal))
     }
 
     fn warnings(&self, _inputs: &Inputs) -> Vec<Mistake> {

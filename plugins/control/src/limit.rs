@@ -1,7 +1,7 @@
 //! Decides how a limit given as a quantity becomes a number in a channel's unit; not what is done at the limit.
 
 use athermal_core::channel::Channel;
-use athermal_core::node::Mistake;
+use athermal_core::node::{Mistake, OutputPort};
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -46,6 +46,20 @@ pub(crate) fn brought(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> Opt
         (Some(from), Some(to)) if from != to => from.convert(value, to),
         _ => Some(value),
     }
+}
+
+/// Channels that are passed on, and a number for each that says why not.
+pub(crate) fn with_reasons(signal: &[Channel]) -> Vec<OutputPort> {
+    vec![
+        OutputPort {
+            name: "signal",
+            channels: signal.to_vec(),
+        },
+        OutputPort {
+            name: "reason",
+            channels: signal.iter().map(numbered).collect(),
+        },
+    ]
 }
 
 /// A channel of numbered states or reasons beside another channel.

@@ -409,13 +409,10 @@ impl Predictor for LinearPredictor {
     }
 
     fn centre(&self) -> f64 {
-        let means = self.novelty.iter().flat_map(Novelty::means);
-        let products = self
-            .coefficients
-            .iter()
-            .zip(means)
-            .map(|(b, mean)| b * mean);
-        self.intercept + products.sum::<f64>()
+        let novelty = self.novelty.as_ref();
+        novelty.map_or(self.intercept, |of| {
+            of.centre(self.intercept, &self.coefficients)
+        })
     }
 
     fn std_dev(&self, regressors: &[f64]) -> f64 {

@@ -109,9 +109,6 @@ impl Events<'_> {
 /// Reports how a service was found.
 pub fn recovered(terminal: &Terminal, state: &Path, report: &RecoveryReport) {
     let shown = state.display();
-    for refused in &report.refused {
-        terminal.warning(format_args!("{refused}; an older one is tried"));
-    }
     match report.start {
         Start::Nothing => {
             terminal.note(format_args!("{shown}: not there yet, the service begins cold"));
@@ -124,17 +121,25 @@ pub fn recovered(terminal: &Terminal, state: &Path, report: &RecoveryReport) {
             "{shown}: no checkpoint can be used, and the journal does not go back to the beginning: the service begins cold at its oldest tick"
         )),
     }
-    if let Some(torn) = &report.torn {
-        terminal.warning(format_args!("{torn}"));
-    }
-    for gap in &report.gaps {
-        terminal.warning(format_args!("{gap}"));
-    }
+    damaged(terminal, report);
     if let Some(difference) = report.difference {
         terminal.warning(format_args!(
             "the tick at {} does not give the bits that were written, on this processor or by this release",
             instant(seconds(difference.at))
         ));
+    }
+}
+
+/// Reports what of a state cannot be used, or differs.
+pub fn damaged(terminal: &Terminal, report: &RecoveryReport) {
+    for refused in &report.refused {
+        terminal.warning(format_args!("{refused}; an older one is tried"));
+    }
+    if let Some(torn) = &report.torn {
+        terminal.warning(format_args!("{torn}"));
+    }
+    for gap in &report.gaps {
+        terminal.warning(format_args!("{gap}"));
     }
     for (revision, _) in &report.swaps {
         terminal.note(format_args!("{revision} took over before"));

@@ -2,7 +2,7 @@
 
 pub(super) mod events;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use athermal::Model;
@@ -55,10 +55,8 @@ impl Serve {
         let beside = || usual_state(&self.machine);
         let declared = deployment.runtime.state.clone();
         let state = self.state.clone().or(declared).unwrap_or_else(beside);
-        let folder = self.machine.parent().unwrap_or(Path::new("."));
         let options = ServiceOptions {
             state: state.clone(),
-            folder: folder.to_owned(),
             is_dry: self.dry_run,
             frozen: self.frozen,
         };
@@ -95,8 +93,8 @@ impl Serve {
 
     fn load(&self, terminal: &Terminal) -> Result<(Model, Deployment), Failure> {
         let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
-        let loaded = Model::load_from(&self.machine, Wanted::default(), &mut sources, &mut doubts);
-        let model = loaded?;
+        let wanted = Wanted::default();
+        let model = Model::load_from(&self.machine, wanted, &mut sources, &mut doubts)?;
         let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut doubts);
         let Some(deployment) = deployment.filter(|_| !doubts.has_errors()) else {
             return Err(Failure::Graph {

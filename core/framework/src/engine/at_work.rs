@@ -36,7 +36,8 @@ impl AtWork {
 /// Where that panics: with a [`NodePanic`] that names the node at work.
 #[inline]
 pub(crate) fn naming<T>(plan: &Plan, when: When, work: impl FnOnce(&mut AtWork) -> T) -> T {
-    caught(work).unwrap_or_else(|(node, panic)| go_on(plan.nodes.get(node), when, panic))
+    caught(work)
+        .unwrap_or_else(|(node, panic)| resume_unwind(named(plan.nodes.get(node), when, panic)))
 }
 
 /// Does what takes the code of nodes; a panic comes back with the number of the node at work.
@@ -56,25 +57,17 @@ pub fn naming_one<T>(plan: &Plan, node: usize, when: When, work: impl FnOnce() -
     })
 }
 
-#[cold]
-fn go_on(node: Option<&PlannedNode>, when: When, panic: Box<dyn Any + Send>) -> ! {
-    match named(node, when, panic) {
-        Ok(panic) => resume_unwind(Box::new(panic)),
-        Err(panic) => resume_unwind(panic),
-    }
-}
-
 /// A panic with its node; as it is where it knows one already, or there is none.
 #[cold]
 pub(crate) fn named(
     node: Option<&PlannedNode>,
     when: When,
     panic: Box<dyn Any + Send>,
-) -> Result<NodePanic, Box<dyn Any + Send>> {
+) -> Box<dyn Any + Send> {
     let Some(node) = node.filter(|_| !panic.is::<NodePanic>()) else {
-        return Err(panic);
+        return panic;
     };
-    Ok(NodePanic {
+    Box::new(NodePanic {
         node: node.instance(),
         when: match when {
             When::Tick(now) => format!("at {now} s"),

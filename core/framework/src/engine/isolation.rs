@@ -8,41 +8,35 @@ use super::{Engine, When, Work};
 use crate::compile::Step;
 use crate::diagnostic::NodePanic;
 
-/// Whether nodes that panic are given up, and which were.
-#[derive(Debug, Default)]
-pub(super) struct Isolation {
-    is_on: bool,
-    panics: Vec<NodePanic>,
-}
-
 impl Engine {
     /// From here on a node that panics gives nothing any more, and the others go on. Without this the panic goes on to the caller.
     pub fn isolate_panics(&mut self) {
-        self.isolation.is_on = true;
+        self.panics.get_or_insert_default();
     }
 
     /// The nodes that were given up, in the order of their panics.
     #[must_use]
     pub fn panics(&self) -> &[NodePanic] {
-        &self.isolation.panics
+        self.panics.as_deref().unwrap_or_default()
     }
 
     /// Gives a node up, at the present tick.
     #[cold]
     pub(super) fn give_up(&mut self, node: usize, panic: Box<dyn Any + Send>) {
-        match named(self.plan.nodes.get(node), When::Tick(self.last), panic) {
-            Ok(panic) if self.isolation.is_on => self.isolation.panics.push(panic),
-            Ok(panic) => resume_unwind(Box::new(panic)),
-            Err(panic) => resume_unwind(panic),
+        let panic = named(self.plan.nodes.get(node), When::Tick(self.last), panic);
+        match (panic.downcast::<NodePanic>(), &mut self.panics) {
+            (Ok(panic), Some(panics)) => panics.push(*panic),
+            (Ok(panic), None) => resume_unwind(panic),
+            (Err(panic), _) => resume_unwind(panic),
         }
         for work in &mut self.work {
-            let is_its = match work {
-                Work::Step(Step::Run(of) | Step::Capture(of)) => *of == node,
-                Work::Bank(bank) => bank.has(node),
-                Work::Step(Step::Gather(_)) | Work::Nothing => false,
-            };
-            if is_its {
-                *work = Work::Nothing;
+            match work {
+                Work::Step(Step::Run(of) | Step::Capture(of)) if *of == node => {
+                    *work = Work::Nothing;
+                }
+                // The others of it miss this tick.
+                Work::Bank(bank) => bank.remove(node),
+                Work::Step(_) | Work::Nothing => {}
             }
         }
         for slot in self.plan.nodes[node].slots.clone() {

@@ -29,11 +29,11 @@ pub use tick::{Cursor, History};
 pub use idle::Answer;
 
 pub(crate) use at_work::{caught, naming};
-use isolation::Isolation;
 use tick::Gathered;
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits, origins};
+use crate::diagnostic::NodePanic;
 use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
 use tick::{Estimate, NodeRunner, OutputSlots, Slots, TickContext, Work, runners, work};
@@ -70,7 +70,8 @@ pub struct Engine {
     fed_back: Vec<(usize, usize)>,
     /// Whether learning has been frozen on command.
     frozen: bool,
-    isolation: Isolation,
+    /// The nodes that were given up after a panic; none where none may be.
+    panics: Option<Vec<NodePanic>>,
     /// Room for the regressors of any estimator.
     row: Vec<f64>,
     /// The lowest and highest sample that count, of each source.
@@ -118,7 +119,7 @@ impl Engine {
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
-            isolation: Isolation::default(),
+            panics: None,
             outputs: OutputSlots::new(&plan),
             ranges: plan.sources.iter().map(|source| source.range).collect(),
             fitted: fitted.clone(),

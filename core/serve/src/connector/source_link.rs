@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::Sender;
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
@@ -29,19 +29,24 @@ pub(crate) enum Arrival {
 
 /// Where a source reports what it leaves out.
 #[derive(Debug, Clone)]
-pub struct Remarks(Sender<String>);
+pub struct Remarks {
+    source: String,
+    to: Sender<(String, String)>,
+}
 
 impl Remarks {
-    /// Where reports are received.
-    pub(crate) fn new() -> (Self, Receiver<String>) {
-        let (send, receive) = channel();
-        (Self(send), receive)
+    /// Those of a source.
+    pub(crate) fn new(source: &str, to: &Sender<(String, String)>) -> Self {
+        Self {
+            source: source.to_owned(),
+            to: to.clone(),
+        }
     }
 
     /// Reports something that does not stop the source: what was left out and why, once of each kind.
     pub fn report(&self, words: impl fmt::Display) {
         // Nobody listens any more where the service has ended.
-        let _ = self.0.send(words.to_string());
+        let _ = self.to.send((self.source.clone(), words.to_string()));
     }
 }
 

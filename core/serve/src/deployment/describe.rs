@@ -87,7 +87,7 @@ impl Deployment {
                 "checkpoint": runtime.checkpoint,
                 "keep": {
                     "journal": runtime.keep.journal,
-                    "at_most_bytes": runtime.keep.at_most,
+                    "at_most_bytes": runtime.keep.at_most.0,
                     "checkpoints": runtime.keep.checkpoints,
                 },
             },
@@ -121,7 +121,11 @@ fn describe_source(
     if let Some(clock) = source.clock {
         write!(into, ", its clock within {}", clock.within)?;
     }
-    writeln!(into, ", started again after {} of silence", source.silent)?;
+    writeln!(
+        into,
+        ", waited for no longer than {} while away",
+        source.silent
+    )?;
     let width = widest(source.channels.iter().map(|of| &of.channel.name));
     for of in &source.channels {
         let (name, address) = (&of.channel.name, &of.address);

@@ -12,6 +12,9 @@ mod sources;
 
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
+pub use size::Size;
+
+use std::path::PathBuf;
 
 use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Sink, SinkKind, Source, SourceKind};
@@ -43,7 +46,9 @@ pub struct DeclaredSource {
     pub kind: &'static SourceKind,
     /// Its parameters.
     pub parameters: Box<dyn Source>,
-    /// A source that is away so long is not waited for, and one that gives nothing for so long is started again.
+    /// The folder of the file in which its `path` stands, if it has one: relative paths start there.
+    pub folder: PathBuf,
+    /// A source that is away so long is not waited for.
     pub silent: Duration,
     /// How its clock is judged; not at all without.
     pub clock: Option<ClockRule>,
@@ -73,6 +78,8 @@ pub struct DeclaredSink {
     pub kind: &'static SinkKind,
     /// Its parameters.
     pub parameters: Box<dyn Sink>,
+    /// As of a source.
+    pub folder: PathBuf,
     /// The columns of the outputs that it is given, as `run` writes them, in order.
     pub outputs: Vec<String>,
     /// A tick that lies further behind is not put out; for commands 5 s unless the file says otherwise.
@@ -109,10 +116,10 @@ impl Deployment {
         let section = |name: &str| graph.deployment.get(name);
         let runtime = runtime::read(section("runtime"), files, diagnostics);
         let sources = section("sources")
-            .map(|section| sources::read(section, graph, plan, diagnostics))
+            .map(|section| sources::read(section, graph, plan, files, diagnostics))
             .unwrap_or_default();
         let sinks = section("sinks")
-            .map(|section| sinks::read(section, graph, plan, diagnostics))
+            .map(|section| sinks::read(section, graph, plan, files, diagnostics))
             .unwrap_or_default();
         let deployment = Self {
             runtime: runtime?,

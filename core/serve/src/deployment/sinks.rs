@@ -14,7 +14,7 @@ use super::sources::of_kind;
 use super::{DeclaredSink, keys};
 use crate::compile::Plan;
 use crate::connector::{Purpose, sink_kinds};
-use crate::diagnostic::{Diagnostics, Names, Place};
+use crate::diagnostic::{Diagnostics, Names, Place, Sources};
 use crate::document::{Data, Entry, GraphFile, Pattern, Table, Value, decode};
 use crate::quantity::Quantity;
 use crate::time::Duration;
@@ -77,6 +77,7 @@ pub(super) fn read(
     section: &Value,
     graph: &GraphFile,
     plan: &Plan,
+    files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Vec<DeclaredSink> {
     let per_second = |slot: usize| {
@@ -95,7 +96,7 @@ pub(super) fn read(
         columns,
     };
     let named = section.as_table().into_iter().flat_map(Table::iter);
-    let sinks = named.filter_map(|(name, entry)| sink(name, entry, &outputs, diagnostics));
+    let sinks = named.filter_map(|(name, entry)| sink(name, entry, &outputs, files, diagnostics));
     sinks.collect()
 }
 
@@ -103,6 +104,7 @@ fn sink(
     name: &str,
     entry: &Entry,
     outputs: &Outputs<'_>,
+    files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<DeclaredSink> {
     let (own, others) = keys::split(&entry.value, &KEYS);
@@ -133,6 +135,7 @@ fn sink(
         name: name.to_owned(),
         kind,
         parameters,
+        folder: files.resolve(entry.value.place_of("path"), ""),
         outputs: columns
             .iter()
             .map(|&column| outputs.columns[column].0.clone())

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// A number of bytes, written and read with its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Size(pub(super) u64);
+pub struct Size(pub u64);
 
 /// The largest first: a size is written in the largest of which it is a whole number.
 const UNITS: [(&str, u64); 9] = [
@@ -26,7 +26,7 @@ const UNITS: [(&str, u64); 9] = [
 
 /// A text that is no size.
 #[derive(Debug)]
-pub(super) struct NotASize(String);
+pub struct NotASize(String);
 
 impl fmt::Display for NotASize {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

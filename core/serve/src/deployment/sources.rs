@@ -1,6 +1,7 @@
 //! `[sources.NAME]`: which there are, and which channels each gives.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -11,7 +12,7 @@ use super::problem::{ChannelTwice, NoAddress, NoSource, UnknownKind};
 use super::{DeclaredChannel, DeclaredSource, keys};
 use crate::compile::Plan;
 use crate::connector::{ConnectorKind, Source, SourceKind, source_kinds};
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::problem::MissingKey;
 use crate::document::{Entry, GraphFile, Table, Value};
 use crate::sequencer::{ClockRemedy, ClockRule};
@@ -29,7 +30,7 @@ pub(super) struct SourceKeys {
     #[serde(rename = "channels")]
     #[schemars(with = "Option<ChannelsForm>")]
     _channels: IgnoredAny,
-    /// A source that is away so long is not waited for, and one that gives nothing for so long is started again.
+    /// A source that is away so long is not waited for.
     #[schemars(extend("exclusiveMinimum" = 0))]
     silent: Duration,
     /// How its clock is judged by the time at which samples arrive; not at all without.
@@ -132,6 +133,7 @@ struct Part<'a> {
     place: Place,
     kind: Option<(&'static SourceKind, Box<dyn Source>)>,
     keys: Option<SourceKeys>,
+    folder: PathBuf,
     /// Where its `channels` stand; at its name without.
     at: Place,
     /// None where it takes all that no other names.
@@ -143,12 +145,13 @@ pub(super) fn read(
     section: &Value,
     graph: &GraphFile,
     plan: &Plan,
+    files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Vec<DeclaredSource> {
     let channels = GraphChannels::new(graph);
     let before = diagnostics.error_count();
     let named = section.as_table().into_iter().flat_map(Table::iter);
-    let parts = named.map(|(name, entry)| part(name, entry, &channels, diagnostics));
+    let parts = named.map(|(name, entry)| part(name, entry, &channels, files, diagnostics));
     let mut parts: Vec<Part<'_>> = parts.collect();
     let is_whole = diagnostics.error_count() == before;
     let taken = share(&mut parts, &channels, diagnostics);
@@ -175,6 +178,7 @@ fn part<'a>(
     name: &'a str,
     entry: &'a Entry,
     channels: &GraphChannels<'_>,
+    files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Part<'a> {
     let (own, others) = keys::split(&entry.value, &KEYS);
@@ -194,6 +198,7 @@ fn part<'a>(
             diagnostics,
         ),
         keys: keys::read::<SourceKeys>(&own, &what, diagnostics),
+        folder: files.resolve(entry.value.place_of("path"), ""),
         at: named.map_or(entry.key, |value| value.place),
         claims: named.map(|value| channels.read(value, diagnostics)),
     }
@@ -295,6 +300,7 @@ fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Optio
         name: part.name.to_owned(),
         kind,
         parameters,
+        folder: part.folder,
         silent: keys.silent,
         channels: claims.into_iter().map(channel).collect(),
         clock: keys.clock.map(ClockRule::from),

@@ -49,25 +49,29 @@ pub(super) struct EngineThread {
 }
 
 /// Where rows go.
+#[derive(Default)]
 pub(super) struct Sinks {
-    pub(super) senders: Vec<FrameSender>,
-    /// The columns of each sink.
-    pub(super) columns: Vec<Vec<String>>,
-    pub(super) threads: Vec<Thread>,
+    all: Vec<SinkEnd>,
     /// How many graphs had taken over when the columns were looked up.
     generation: Option<u64>,
     revision: u64,
 }
 
+/// A sink, as far as the engine thread knows it.
+struct SinkEnd {
+    sender: FrameSender,
+    columns: Vec<String>,
+    thread: Thread,
+}
+
 impl Sinks {
-    pub(super) fn new(senders: Vec<FrameSender>, columns: Vec<Vec<String>>) -> Self {
-        Self {
-            senders,
+    /// One more, with its columns.
+    pub(super) fn add(&mut self, sender: FrameSender, columns: Vec<String>, thread: Thread) {
+        self.all.push(SinkEnd {
+            sender,
             columns,
-            threads: Vec::new(),
-            generation: None,
-            revision: 0,
-        }
+            thread,
+        });
     }
 
     fn put(&mut self, output: &Output<'_>) {
@@ -77,17 +81,17 @@ impl Sinks {
             self.revision = u64::from_str_radix(stepped.revision, 16).unwrap_or_default();
             self.wire(stepped.plan);
         }
-        for (sender, thread) in self.senders.iter_mut().zip(&self.threads) {
-            sender.send(output, self.revision);
-            thread.unpark();
+        for sink in &mut self.all {
+            sink.sender.send(output, self.revision);
+            sink.thread.unpark();
         }
     }
 
     /// Looks up where the columns stand among the outputs of a graph that has taken over.
     fn wire(&mut self, plan: &Plan) {
-        for (sender, columns) in self.senders.iter_mut().zip(&self.columns) {
+        for sink in &mut self.all {
             let place = |column: &String| plan.outputs.iter().position(|of| of.name == *column);
-            sender.wire(columns.iter().map(place));
+            sink.sender.wire(sink.columns.iter().map(place));
         }
     }
 }

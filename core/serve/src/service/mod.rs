@@ -16,6 +16,7 @@ mod position;
 mod sink_thread;
 mod sinks;
 mod source_thread;
+mod sources;
 mod status;
 #[cfg(test)]
 mod tests;
@@ -24,7 +25,7 @@ mod wiring;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
 
@@ -39,9 +40,7 @@ pub use status::Snapshot;
 
 use crate::checkpoint::Checkpoints;
 use crate::compile::Plan;
-use crate::connector::{
-    Inlet, Outflow, Purpose, Remarks, SourceCounts, SourceWiring, Stop, WiredChannel, link,
-};
+use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
 use crate::folder::StateFolder;
 use crate::journal::{FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, retire};
@@ -49,20 +48,13 @@ use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Admission, Sequencer};
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 use crate::worker::Worker;
-use command::CommandGate;
-use engine_thread::{EngineThread, Order, Sinks};
-use frames::frames;
-use sink_thread::SinkThread;
+use engine_thread::{EngineThread, Order};
 use sinks::OpenSink;
 use status::Shared;
 use wiring::{fed, keep, outputs, rules};
 
-/// How many arrivals of a source may wait for the engine thread.
-const ARRIVALS: usize = 1 << 14;
-/// How many rows may wait for a sink.
-const ROWS: usize = 1 << 13;
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
 /// How long the threads may take to end.
@@ -73,8 +65,6 @@ const ENDS: Wait = Wait::from_secs(5);
 pub struct ServiceOptions {
     /// The state folder.
     pub state: PathBuf,
-    /// The folder that relative paths of sources and sinks start from.
-    pub folder: PathBuf,
     /// Whether commands are not put out.
     pub is_dry: bool,
     /// Whether estimators learn nothing.
@@ -87,7 +77,8 @@ pub struct Service {
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
     remarks: Consumer<(Admission, u64)>,
-    heard: Vec<(String, Receiver<String>)>,
+    /// What sources left out, by their names.
+    heard: Receiver<(String, String)>,
     shared: Arc<Shared>,
     progress: Arc<Progress>,
     stop_sources: Stop,
@@ -145,7 +136,7 @@ impl Service {
         let time = &model.plan.time;
         let units = outputs(&model.plan);
         let open = |declared: crate::deployment::DeclaredSink| {
-            let wiring = sinks::wiring(&declared, &units, &options.folder, time);
+            let wiring = sinks::wiring(&declared, &units, time);
             OpenSink::open(declared, wiring, &folder)
         };
         let sinks: Result<Vec<_>, _> = sinks.into_iter().map(open).collect();
@@ -182,7 +173,6 @@ impl Service {
         let progress = Arc::clone(recorder.progress());
         let clock = MonotonicClock::start();
         let feed = fed(recovered.engine.plan(), &given);
-        let place = |name: &str| feed.iter().position(|of| of.name == name);
         let rules = rules(&runtime, &sources, &feed);
         let stamps = recovered.timeline.stamps().to_vec();
         let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
@@ -192,6 +182,7 @@ impl Service {
             ..LiveOptions::default()
         };
         let differs = recovered.model.revision() != model.revision();
+        let was_frozen = recovered.engine.frozen();
         let (stepper, control) = pair_from(recovered.engine, live)?;
         let every = wait(runtime.checkpoint);
         let keeper = Keeper::new(
@@ -202,8 +193,8 @@ impl Service {
             every,
         );
         let mut worker = Worker::new(sequencer, stepper, recorder);
-        if options.frozen {
-            worker.freeze(true);
+        if was_frozen != options.frozen {
+            worker.freeze(options.frozen);
         }
         let (to_engine, orders) = RingBuffer::new(64);
         let (remarks, from_engine) = RingBuffer::new(256);
@@ -211,41 +202,8 @@ impl Service {
         let shared = Arc::new(Shared::new(feed.len()));
         let (stop_sources, stop_sinks) = (Stop::default(), Stop::default());
         // Sinks first: nothing that comes is put out into nowhere.
-        let (mut senders, mut columns, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
-        for sink in sinks {
-            let (sender, receiver) = frames(ROWS, sink.declared.outputs.len(), &sink.counts);
-            senders.push(sender);
-            columns.push(sink.declared.outputs.clone());
-            waiting.push((sink, receiver));
-        }
-        let mut out = Sinks::new(senders, columns);
-        let (mut sink_threads, mut sink_counts) = (Vec::new(), Vec::new());
-        for (mut sink, frames) in waiting {
-            let gate = (sink.declared.parameters.purpose() == Purpose::Command).then(|| {
-                let mut gate = CommandGate::new(sink.declared.behind, sink.declared.rate.clone());
-                let known = sink.was.as_ref().map(|of| applied(&of.applied));
-                if let Some(applied) = sink.outlet.applied().or(known) {
-                    gate.start_from(&applied);
-                }
-                gate
-            });
-            sink_counts.push((sink.declared.name.clone(), Arc::clone(&sink.counts)));
-            let thread = SinkThread {
-                is_dry: options.is_dry && gate.is_some(),
-                name: sink.declared.name,
-                outlet: sink.outlet,
-                frames,
-                counts: sink.counts,
-                gate,
-                position: sink.position,
-                progress: Arc::clone(&progress),
-                stop: stop_sinks.clone(),
-                events: tell.clone(),
-            };
-            let handle = spawn("sink", move || thread.run())?;
-            out.threads.push(handle.thread().clone());
-            sink_threads.push(handle);
-        }
+        let running = sinks::start(sinks, options.is_dry, (&progress, &stop_sinks, &tell))?;
+        let (out, sink_threads, sink_counts) = running;
         // The engine thread waits for the links of sources, which need to know it.
         let (hand_over, links) = channel();
         let engine_thread = {
@@ -265,70 +223,29 @@ impl Service {
                 thread.run()
             })?
         };
-        let (mut inlets, mut links, mut source_counts) = (Vec::new(), Vec::new(), Vec::new());
-        let mut heard = Vec::new();
-        for source in sources {
-            let after = |name: &str| place(name).map_or(Instant::MIN, |place| stamps[place]);
-            let unit = |name: &str| {
-                let mut sources = model.plan.sources.iter().zip(&model.plan.channels);
-                let found = sources.find(|(of, _)| of.name == name);
-                found.map_or_else(crate::unit::Unit::one, |(_, of)| of.channel.unit.clone())
-            };
-            let wired = source.channels.iter().map(|of| WiredChannel {
-                unit: unit(&of.channel.name),
-                channel: of.channel.clone(),
-                address: of.address.clone(),
-                conversion: of.conversion,
-                after: after(&of.channel.name),
-            });
-            let wired: Vec<_> = wired.collect();
-            let places = wired.iter().filter_map(|of| place(&of.channel.name));
-            let places: Vec<_> = places.map(|place| place as u32).collect();
-            let (remarks, words) = Remarks::new();
-            let (outflow, link) = link(
-                ARRIVALS,
-                &wired,
-                &places,
-                source.parameters.stamps(),
-                (
-                    engine_thread.thread().clone(),
-                    Arc::clone(&progress),
-                    remarks,
-                ),
-            );
-            heard.push((source.name.clone(), words));
-            let wiring = SourceWiring {
-                name: source.name.clone(),
-                folder: options.folder.clone(),
-                channels: wired,
-                time: time.clone(),
-                table: model.plan.table.clone(),
-            };
-            let inlet = source.parameters.open(wiring);
-            let inlet = inlet.map_err(|error| ServiceError::Source {
-                source: source.name.clone(),
-                error,
-            })?;
-            source_counts.push((source.name.clone(), Arc::clone(outflow.counts())));
-            links.push(link);
-            inlets.push((source.name, inlet, outflow));
-        }
-        let _ = hand_over.send(links);
-        let source_threads = inlets
-            .into_iter()
-            .map(|(name, inlet, outflow)| source(name, inlet, outflow, &stop_sources, &tell))
-            .collect::<Result<Vec<_>, _>>()?;
+        let open = sources::open(
+            sources,
+            model,
+            (&feed, &stamps),
+            (engine_thread.thread(), &progress),
+        )?;
+        let _ = hand_over.send(open.links);
+        let source_threads = open.inlets.into_iter().map(|source| {
+            let (stop, tell) = (stop_sources.clone(), tell.clone());
+            spawn("source", move || source.run(&stop, &tell))
+        });
+        let source_threads = source_threads.collect::<Result<Vec<_>, _>>()?;
         let mut service = Self {
             keeper,
             engine: engine_thread,
             orders: to_engine,
             remarks: from_engine,
-            heard,
+            heard: open.heard,
             shared,
             progress,
             stop_sources,
             stop_sinks,
-            sources: source_counts,
+            sources: open.counts,
             source_threads,
             sinks: sink_counts,
             sink_threads,
@@ -358,13 +275,8 @@ impl Service {
         while let Ok((admission, count)) = self.remarks.pop() {
             events.push(ServiceEvent::NotAccepted { admission, count });
         }
-        for (source, words) in &self.heard {
-            let remark = |words| ServiceEvent::SourceRemark {
-                source: source.clone(),
-                words,
-            };
-            events.extend(words.try_iter().map(remark));
-        }
+        let remark = |(source, words)| ServiceEvent::SourceRemark { source, words };
+        events.extend(self.heard.try_iter().map(remark));
         while let Ok(event) = self.events.try_recv() {
             self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
             events.push(event);
@@ -404,8 +316,7 @@ impl Service {
     /// What the engine thread knew within the last second or two.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
-        let snapshot = self.shared.snapshot.lock();
-        snapshot.map_or_else(|poisoned| poisoned.into_inner().clone(), |of| of.clone())
+        self.shared.read()
     }
 
     /// The channels, in the order of [`Snapshot::counts`].
@@ -479,9 +390,7 @@ impl Service {
             std::thread::sleep(Wait::from_millis(2));
         }
         self.stop_sinks.ask();
-        let snapshot = self.shared.snapshot.lock();
-        let snapshot =
-            snapshot.map_or_else(|poisoned| poisoned.into_inner().clone(), |of| of.clone());
+        let snapshot = self.shared.read();
         events.extend(self.events.try_iter());
         let ended = Ended {
             channels: self.channels.into_iter().zip(snapshot.counts).collect(),
@@ -528,24 +437,6 @@ impl std::fmt::Debug for Service {
 
 fn wait(duration: Duration) -> Wait {
     Wait::from_nanos(duration.as_ns().max(0) as u64)
-}
-
-fn applied(known: &[Option<f64>]) -> Vec<f64> {
-    let value = |of: &Option<f64>| of.unwrap_or(f64::NAN);
-    known.iter().map(value).collect()
-}
-
-fn source(
-    name: String,
-    mut inlet: Box<dyn Inlet>,
-    out: Outflow,
-    stop: &Stop,
-    events: &Sender<ServiceEvent>,
-) -> Result<JoinHandle<()>, ServiceError> {
-    let (stop, events) = (stop.clone(), events.clone());
-    spawn("source", move || {
-        source_thread::run(&name, &mut *inlet, out, &stop, &events);
-    })
 }
 
 fn spawn<T: Send + 'static>(

@@ -18,6 +18,14 @@ pub(super) struct Position {
     pub(super) applied: Vec<Option<f64>>,
 }
 
+impl Position {
+    /// What a command had applied; NaN where that is not known.
+    pub(super) fn applied(&self) -> Vec<f64> {
+        let value = |of: &Option<f64>| of.unwrap_or(f64::NAN);
+        self.applied.iter().map(value).collect()
+    }
+}
+
 /// The file of a sink's position.
 #[derive(Debug, Clone)]
 pub(super) struct PositionFile(PathBuf);

@@ -10,7 +10,7 @@ use super::ServiceEvent;
 use super::command::CommandGate;
 use super::frames::{FrameReceiver, SinkCounts, Ticket};
 use super::position::{Position, PositionFile};
-use crate::connector::{ConnectorError, OutRow, Outlet, Stop};
+use crate::connector::{ConnectorError, Outlet, Stop};
 use crate::diagnostic::panic_message;
 use crate::journal::Progress;
 
@@ -35,46 +35,27 @@ pub(super) struct SinkThread {
     pub(super) progress: Arc<Progress>,
     pub(super) stop: Stop,
     pub(super) events: Sender<ServiceEvent>,
+    /// Whether what it did last failed.
+    pub(super) has_failed: bool,
 }
 
 impl SinkThread {
     /// Puts rows out until no more will come.
     pub(super) fn run(mut self) {
-        let (mut is_dirty, mut kept, mut has_failed) = (false, Clock::now(), false);
-        let mut happenings = None;
+        let (mut is_dirty, mut kept, mut happenings) = (false, Clock::now(), None);
         loop {
             if self.frames.take() {
-                let (row, ticket) = self.frames.row();
-                let ended = put(
-                    &mut self.outlet,
-                    &mut self.gate,
-                    (&row, ticket),
-                    &self.counts,
-                    self.is_dry,
-                    &self.progress,
-                    |error, outlet_is_back| {
-                        let sink = self.name.clone();
-                        if outlet_is_back && has_failed {
-                            let _ = self.events.send(ServiceEvent::SinkBack { sink });
-                        } else if let Some(error) = error
-                            && !has_failed
-                        {
-                            let _ = self.events.send(ServiceEvent::SinkFailed { sink, error });
-                        }
-                        has_failed = !outlet_is_back;
-                        outlet_is_back || self.stop.wait(AGAIN)
-                    },
-                );
-                if !ended {
+                let Some(put) = self.put() else {
                     return;
-                }
-                happenings = Some(ticket.happenings);
+                };
+                happenings = Some(put);
                 is_dirty = true;
                 continue;
             }
             if is_dirty {
-                self.flush();
-                is_dirty = false;
+                let flushed = guarded(|| self.outlet.flush());
+                is_dirty = flushed.is_err();
+                self.report(flushed);
             }
             let is_over = self.frames.is_over();
             if (is_over || kept.elapsed() >= KEEP)
@@ -90,11 +71,54 @@ impl SinkThread {
         }
     }
 
-    fn flush(&mut self) {
-        if let Err(error) = guarded(|| self.outlet.flush()) {
-            let sink = self.name.clone();
-            let _ = self.events.send(ServiceEvent::SinkFailed { sink, error });
+    /// Puts out the row that was taken, however often that fails, and gives how many ticks, beats, breaks and freezes there were then.
+    /// None where it is to stop meanwhile.
+    fn put(&mut self) -> Option<u64> {
+        let (
+            row,
+            Ticket {
+                records,
+                happenings,
+            },
+        ) = self.frames.row();
+        // Where the journal fails the outputs go on; that is reported elsewhere.
+        let _ = self.progress.wait_written(records, PATIENCE);
+        let is_command = self.gate.is_some();
+        let row = match &mut self.gate {
+            None => row,
+            Some(gate) => match gate.pass(&row) {
+                Some(row) => row,
+                None => {
+                    self.counts.behind.fetch_add(1, Ordering::Relaxed);
+                    return Some(happenings);
+                }
+            },
+        };
+        loop {
+            if self.is_dry {
+                return Some(happenings);
+            }
+            let put = guarded(|| self.outlet.put(&row));
+            let is_put = put.is_ok();
+            let counts = if is_put {
+                &self.counts.put
+            } else {
+                &self.counts.failures
+            };
+            counts.fetch_add(1, Ordering::Relaxed);
+            report(&self.name, &mut self.has_failed, &self.events, put);
+            // An old command is none: the next tick has a newer one.
+            if is_put || is_command {
+                return Some(happenings);
+            }
+            if !self.stop.wait(AGAIN) {
+                return None;
+            }
         }
+    }
+
+    fn report(&mut self, done: Result<(), ConnectorError>) {
+        report(&self.name, &mut self.has_failed, &self.events, done);
     }
 
     /// Keeps how far the sink is. Where that fails it is tried again; what is kept is always true.
@@ -118,49 +142,21 @@ impl SinkThread {
     }
 }
 
-/// Puts a row out. `again` is given each failure, and says whether it is tried again; it is given the success after one, too.
-fn put(
-    outlet: &mut Box<dyn Outlet>,
-    gate: &mut Option<CommandGate>,
-    (row, ticket): (&OutRow<'_>, Ticket),
-    counts: &SinkCounts,
-    is_dry: bool,
-    progress: &Progress,
-    mut again: impl FnMut(Option<ConnectorError>, bool) -> bool,
-) -> bool {
-    // Where the journal fails the outputs go on; that is reported elsewhere.
-    let _ = progress.wait_written(ticket.records, PATIENCE);
-    let is_command = gate.is_some();
-    let row = match gate {
-        None => *row,
-        Some(gate) => match gate.pass(row) {
-            Some(row) => row,
-            None => {
-                counts.behind.fetch_add(1, Ordering::Relaxed);
-                return true;
-            }
-        },
+/// Reports the first failure, and the first success after one.
+fn report(
+    name: &str,
+    has_failed: &mut bool,
+    events: &Sender<ServiceEvent>,
+    done: Result<(), ConnectorError>,
+) {
+    let sink = name.to_owned();
+    let event = match (done, *has_failed) {
+        (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
+        (Ok(()), true) => ServiceEvent::SinkBack { sink },
+        _ => return,
     };
-    if is_dry {
-        return true;
-    }
-    loop {
-        match guarded(|| outlet.put(&row)) {
-            Ok(()) => {
-                counts.put.fetch_add(1, Ordering::Relaxed);
-                let _ = again(None, true);
-                return true;
-            }
-            Err(error) => {
-                counts.failures.fetch_add(1, Ordering::Relaxed);
-                let goes_on = again(Some(error), false);
-                // An old command is none: the next tick has a newer one.
-                if !goes_on || is_command {
-                    return goes_on;
-                }
-            }
-        }
-    }
+    *has_failed = !*has_failed;
+    let _ = events.send(event);
 }
 
 fn guarded(work: impl FnOnce() -> Result<(), ConnectorError>) -> Result<(), ConnectorError> {

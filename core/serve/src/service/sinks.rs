@@ -1,15 +1,24 @@
 //! The sinks of a service at its start: opened, and brought to where the journal is.
 
 use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::thread::JoinHandle;
 
-use super::ServiceError;
-use super::frames::SinkCounts;
+use super::command::CommandGate;
+use super::engine_thread::Sinks;
+use super::frames::{FrameReceiver, SinkCounts, frames};
 use super::position::{Position, PositionFile};
-use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, WiredOutput};
+use super::sink_thread::SinkThread;
+use super::{ServiceError, ServiceEvent, spawn};
+use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
 use crate::deployment::DeclaredSink;
 use crate::engine::Engine;
 use crate::folder::StateFolder;
+use crate::journal::Progress;
 use crate::time::{Duration, Instant};
+
+/// How many rows may wait for a sink.
+const ROWS: usize = 1 << 13;
 
 /// A sink that has been opened.
 pub(super) struct OpenSink {
@@ -131,7 +140,6 @@ impl OpenSink {
 pub(super) fn wiring(
     declared: &DeclaredSink,
     outputs: &[WiredOutput],
-    folder: &std::path::Path,
     time: &crate::document::TimeBase,
 ) -> SinkWiring {
     let of = |name: &String| {
@@ -143,8 +151,64 @@ pub(super) fn wiring(
     };
     SinkWiring {
         name: declared.name.clone(),
-        folder: folder.to_owned(),
+        folder: declared.folder.clone(),
         outputs: declared.outputs.iter().map(of).collect(),
         time: time.clone(),
+    }
+}
+
+/// What the engine thread hands rows to, the threads of sinks, and what each counts.
+type Running = (Sinks, Vec<JoinHandle<()>>, Vec<(String, Arc<SinkCounts>)>);
+
+/// Starts the threads of sinks.
+pub(super) fn start(
+    sinks: Vec<OpenSink>,
+    is_dry: bool,
+    (progress, stop, events): (&Arc<Progress>, &Stop, &Sender<ServiceEvent>),
+) -> Result<Running, ServiceError> {
+    let (mut out, mut threads, mut counts) = (Sinks::default(), Vec::new(), Vec::new());
+    for sink in sinks {
+        let (sender, frames) = frames(ROWS, sink.declared.outputs.len(), &sink.counts);
+        let (name, columns) = (sink.declared.name.clone(), sink.declared.outputs.clone());
+        counts.push((name, Arc::clone(&sink.counts)));
+        let thread = sink.thread(frames, is_dry, progress, stop, events);
+        let handle = spawn("sink", move || thread.run())?;
+        out.add(sender, columns, handle.thread().clone());
+        threads.push(handle);
+    }
+    Ok((out, threads, counts))
+}
+
+impl OpenSink {
+    fn thread(
+        mut self,
+        frames: FrameReceiver,
+        is_dry: bool,
+        progress: &Arc<Progress>,
+        stop: &Stop,
+        events: &Sender<ServiceEvent>,
+    ) -> SinkThread {
+        let is_command = self.declared.parameters.purpose() == Purpose::Command;
+        let gate = is_command.then(|| {
+            let mut gate = CommandGate::new(self.declared.behind, self.declared.rate.clone());
+            let known = self.was.as_ref().map(Position::applied);
+            if let Some(applied) = self.outlet.applied().or(known) {
+                gate.start_from(&applied);
+            }
+            gate
+        });
+        SinkThread {
+            is_dry: is_dry && is_command,
+            name: self.declared.name,
+            outlet: self.outlet,
+            frames,
+            counts: self.counts,
+            gate,
+            position: self.position,
+            progress: Arc::clone(progress),
+            stop: stop.clone(),
+            events: events.clone(),
+            has_failed: false,
+        }
     }
 }

@@ -12,49 +12,57 @@ use crate::diagnostic::panic_message;
 /// How long a source that failed is left alone: at first, and at most.
 const BACK_OFF: (Wait, Wait) = (Wait::from_millis(500), Wait::from_secs(30));
 
-/// Runs a source until it ends or is to stop.
-pub(super) fn run(
-    name: &str,
-    inlet: &mut dyn Inlet,
-    mut out: Outflow,
-    stop: &Stop,
-    events: &Sender<ServiceEvent>,
-) {
-    let mut pause = BACK_OFF.0;
-    loop {
-        let began = Clock::now();
-        let ran = catch_unwind(AssertUnwindSafe(|| inlet.run(&mut out, stop)));
-        let error = match ran {
-            Ok(Ok(())) => {
-                if !stop.is_asked() {
-                    let source = name.to_owned();
-                    let _ = events.send(ServiceEvent::SourceEnded { source });
+/// A source at work.
+pub(super) struct SourceThread {
+    pub(super) name: String,
+    pub(super) inlet: Box<dyn Inlet>,
+    pub(super) out: Outflow,
+}
+
+impl SourceThread {
+    /// Runs the source until it ends or is to stop.
+    pub(super) fn run(self, stop: &Stop, events: &Sender<ServiceEvent>) {
+        let Self {
+            name,
+            mut inlet,
+            mut out,
+        } = self;
+        let mut pause = BACK_OFF.0;
+        loop {
+            let began = Clock::now();
+            let ran = catch_unwind(AssertUnwindSafe(|| inlet.run(&mut out, stop)));
+            let error = match ran {
+                Ok(Ok(())) => {
+                    if !stop.is_asked() {
+                        let source = name.clone();
+                        let _ = events.send(ServiceEvent::SourceEnded { source });
+                    }
+                    out.end();
+                    return;
                 }
+                Ok(Err(error)) => error,
+                Err(panic) => ConnectorError::new(format_args!(
+                    "its code panicked: {}; tell its author",
+                    panic_message(&*panic)
+                )),
+            };
+            out.away();
+            if began.elapsed() >= BACK_OFF.1 {
+                pause = BACK_OFF.0;
+            }
+            out.counts().restarts.fetch_add(1, Ordering::Relaxed);
+            let again = pause.mul_f64(jitter(&name, out.counts().restarts.load(Ordering::Relaxed)));
+            let _ = events.send(ServiceEvent::SourceFailed {
+                source: name.clone(),
+                error,
+                again_s: again.as_secs_f64(),
+            });
+            if !stop.wait(again) {
                 out.end();
                 return;
             }
-            Ok(Err(error)) => error,
-            Err(panic) => ConnectorError::new(format_args!(
-                "its code panicked: {}; tell its author",
-                panic_message(&*panic)
-            )),
-        };
-        out.away();
-        if began.elapsed() >= BACK_OFF.1 {
-            pause = BACK_OFF.0;
+            pause = (pause * 2).min(BACK_OFF.1);
         }
-        out.counts().restarts.fetch_add(1, Ordering::Relaxed);
-        let again = pause.mul_f64(jitter(name, out.counts().restarts.load(Ordering::Relaxed)));
-        let _ = events.send(ServiceEvent::SourceFailed {
-            source: name.to_owned(),
-            error,
-            again_s: again.as_secs_f64(),
-        });
-        if !stop.wait(again) {
-            out.end();
-            return;
-        }
-        pause = (pause * 2).min(BACK_OFF.1);
     }
 }
 

@@ -32,6 +32,14 @@ impl Shared {
     }
 }
 
+impl Shared {
+    /// What was published last.
+    pub(super) fn read(&self) -> Snapshot {
+        let snapshot = self.snapshot.lock();
+        snapshot.map_or_else(|poisoned| poisoned.into_inner().clone(), |of| of.clone())
+    }
+}
+
 /// What the engine thread knew when it last published.
 #[derive(Debug, Clone)]
 pub struct Snapshot {

@@ -45,7 +45,11 @@ fn allocations(rows: usize) -> (u64, u64) {
         &wired,
         &[0, 1, 2],
         Stamps::Order,
-        (std::thread::current(), progress, Remarks::new().0),
+        (
+            std::thread::current(),
+            progress,
+            Remarks::new("it", &channel().0),
+        ),
     );
     out.connected();
     for nth in 0..rows {
@@ -66,8 +70,8 @@ fn allocations(rows: usize) -> (u64, u64) {
     let (_orders, orders) = RingBuffer::new(8);
     let (remarks, _remarks) = RingBuffer::new(8);
     let (events, _events) = channel();
-    let mut sinks = Sinks::new(vec![sender], vec![columns]);
-    sinks.threads.push(std::thread::current());
+    let mut sinks = Sinks::default();
+    sinks.add(sender, columns, std::thread::current());
     let thread = EngineThread {
         worker: Worker::new(sequencer, stepper, recorder),
         clock,

@@ -1,7 +1,5 @@
 //! What a graph and a machine file say of a service, as its parts need it.
 
-use std::time::Duration as Wait;
-
 use athermal_run::live::Feed;
 
 use super::wait;
@@ -63,7 +61,7 @@ pub(super) fn outputs(plan: &Plan) -> Vec<WiredOutput> {
 
 pub(super) fn keep(runtime: &Runtime) -> Keep {
     Keep {
-        age: runtime.keep.journal.map_or(Wait::MAX, wait),
-        at_most: runtime.keep.at_most.unwrap_or(u64::MAX),
+        age: wait(runtime.keep.journal),
+        at_most: runtime.keep.at_most.0,
     }
 }

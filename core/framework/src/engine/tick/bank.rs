@@ -104,7 +104,7 @@ impl<'a> Linear<'a> {
             slot: running.slot,
             trigger: running.trigger,
             learns: estimate.learning.is_some(),
-            edge: estimate.edge(),
+            edge: estimate.edge.as_ref(),
             novelty: running.novelty,
             form,
             shared,
@@ -148,9 +148,10 @@ struct Member {
 }
 
 impl Bank {
-    /// Whether a node is one of it.
-    pub(crate) fn has(&self, node: usize) -> bool {
-        self.members.iter().any(|member| member.node == node)
+    /// Lets a node go, where it is one of it.
+    pub(crate) fn remove(&mut self, node: usize) {
+        let members = std::mem::take(&mut self.members).into_iter();
+        self.members = members.filter(|member| member.node != node).collect();
     }
 
     fn new(members: &[Linear<'_>]) -> Self {

@@ -116,8 +116,7 @@ impl TickContext<'_> {
             self.slots.set(slot, known, stamp);
         }
         if let Some(slot) = node.novelty {
-            let novelty = estimate.edge().map_or(f64::NAN, |edge| edge.novelty(row));
-            self.slots.set(slot, novelty, stamp);
+            self.slots.set(slot, estimate.novelty, stamp);
         }
     }
 

@@ -44,10 +44,9 @@ impl Edge {
         }
     }
 
-    /// The standard deviation of the truth about what a prediction has become at a row, from that about the prediction `ŷ` of the
+    /// The standard deviation of the truth about what a prediction has become at a novelty, from that about the prediction `ŷ` of the
     /// fit: `√((ν σ)² + (ŷ − ŷ′)²)` where it has shrunk to `ŷ′`.
-    pub(crate) fn widened(&self, std_dev: f64, bounded: f64, row: &[f64]) -> f64 {
-        let novelty = self.novelty(row);
+    pub(crate) fn widened(&self, std_dev: f64, bounded: f64, novelty: f64) -> f64 {
         if novelty > 1.0 && self.outside == Outside::Shrink {
             let moved = (bounded - self.centre) * (novelty - 1.0);
             ((novelty * std_dev).powi(2) + moved * moved).sqrt()

@@ -74,7 +74,9 @@ pub(crate) struct Estimate {
     /// What goes on learning, where the plan wants it: it then predicts in place of the predictor.
     pub(crate) learning: Option<Box<GatedLearner>>,
     /// The edge of the rows of the fit, where anybody heeds it.
-    edge: Option<Edge>,
+    pub(crate) edge: Option<Edge>,
+    /// How far the row of this tick is outside of it; NaN where that is not known.
+    pub(crate) novelty: f64,
     /// What is read in place of measured past truths, in an evaluation of several steps.
     feedback: Option<Box<Feedback>>,
 }
@@ -127,6 +129,7 @@ impl Estimate {
             width: used.len(),
             plain: std_dev.is_none(),
             edge: heeded.then(|| Edge::new(&predictor, *outside)),
+            novelty: f64::NAN,
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -206,11 +209,12 @@ impl Estimate {
             oldest = oldest.min(now);
             self.feedback = Some(feedback);
         }
-        let prediction = if whole {
-            self.predict(row, now)
-        } else {
-            f64::NAN
-        };
+        let mut prediction = f64::NAN;
+        self.novelty = f64::NAN;
+        if whole {
+            self.novelty = self.novelty_of(row);
+            prediction = self.bounded(row, now, self.novelty);
+        }
         if let Some(mut feedback) = self.feedback.take() {
             let std_dev = self.std_dev_of_one(row, now);
             feedback.ran(row, prediction, std_dev, now, |row, at| {
@@ -224,11 +228,23 @@ impl Estimate {
     /// The prediction from regressors at an instant: that of what goes on learning, else of the fit.
     #[inline]
     fn predict(&self, row: &[f64], at: Instant) -> f64 {
+        self.bounded(row, at, self.novelty_of(row))
+    }
+
+    /// The same where it is known how far the row is outside.
+    #[inline]
+    fn bounded(&self, row: &[f64], at: Instant, novelty: f64) -> f64 {
         match (&self.learning, &self.edge) {
             (Some(learning), _) => learning.predict(row, at),
             (None, None) => self.predictor.predict(row),
-            (None, Some(edge)) => edge.bounded(self.predictor.predict(row), edge.novelty(row)),
+            (None, Some(edge)) => edge.bounded(self.predictor.predict(row), novelty),
         }
+    }
+
+    #[inline]
+    fn novelty_of(&self, row: &[f64]) -> f64 {
+        let edge = self.edge.as_ref();
+        edge.map_or(f64::NAN, |edge| edge.novelty(row))
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
@@ -255,7 +271,7 @@ impl Estimate {
         let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
         let mut std_dev = widened * self.std_dev_of_one(row, now);
         if let Some(edge) = &self.edge {
-            std_dev = edge.widened(std_dev, prediction, row);
+            std_dev = edge.widened(std_dev, prediction, self.novelty);
         }
         if std_dev.is_finite() {
             std_dev
@@ -270,11 +286,6 @@ impl Estimate {
             Some(learning) => learning.std_dev(row, now),
             None => self.predictor.std_dev(row),
         }
-    }
-
-    /// The edge of the rows of the fit, where predictions or somebody who reads them heed it.
-    pub(crate) fn edge(&self) -> Option<&Edge> {
-        self.edge.as_ref()
     }
 
     /// What goes on learning.

@@ -42,10 +42,14 @@ correction = "before"
 /// What a machine file with these lines behind [`MACHINE`] says, or all that is wrong with it, each with the text at its place.
 fn read(lines: &str) -> Result<Deployment, Vec<String>> {
     let text = format!("{MACHINE}{lines}");
-    let files = Memory::new().with("site/machine.toml", text);
+    read_from(&Memory::new().with("site/machine.toml", text))
+}
+
+/// What `site/machine.toml` of these files says, or all that is wrong with it.
+fn read_from(files: &Memory) -> Result<Deployment, Vec<String>> {
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
     let path = std::path::Path::new("site/machine.toml");
-    let graph = load(path, &files, &mut sources, &mut diagnostics)
+    let graph = load(path, files, &mut sources, &mut diagnostics)
         .and_then(|document| declare(document, &mut diagnostics))
         .expect("its declarations have no mistake");
     let plan = compile(&graph, Wanted::default(), &mut diagnostics);

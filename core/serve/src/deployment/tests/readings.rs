@@ -1,7 +1,8 @@
 use std::path::Path;
 
 use super::super::{DeclaredSource, Runtime};
-use super::read;
+use super::{MACHINE, read, read_from};
+use crate::document::Memory;
 use crate::sequencer::{ClockRemedy, ClockRule};
 use crate::time::Duration;
 
@@ -113,8 +114,34 @@ fn what_runtime_leaves_out_has_its_default_and_a_relative_state_starts_at_its_fi
     assert_eq!(runtime.heartbeat, Some(secs(1.0)));
     assert_eq!(runtime.join, secs(0.02));
     assert_eq!(runtime.wait, secs(0.2));
-    assert_eq!(runtime.keep.at_most, Some(500_000_000));
+    assert_eq!(runtime.keep.at_most.0, 500_000_000);
     assert_eq!(runtime.keep.checkpoints, 3);
+}
+
+#[test]
+fn a_relative_path_of_a_source_starts_at_the_file_in_which_it_stands() {
+    let folder = |lines: &str| read(lines).unwrap().sources.remove(0).folder;
+    assert_eq!(folder(TABLE), Path::new("site"));
+    let base = format!(
+        "{}[sources.log]\ntype = \"test_table\"\npath = \"log.csv\"\n",
+        MACHINE
+    );
+    let files = Memory::new().with("plant/base.toml", base).with(
+        "site/machine.toml",
+        "schema = 1\nextends = \"../plant/base.toml\"\n",
+    );
+    assert_eq!(
+        read_from(&files).unwrap().sources[0].folder,
+        Path::new("site/../plant")
+    );
+    let files = files.with(
+        "site/machine.toml",
+        "schema = 1\nextends = \"../plant/base.toml\"\nsources.log.path = \"own.csv\"\n",
+    );
+    assert_eq!(
+        read_from(&files).unwrap().sources[0].folder,
+        Path::new("site")
+    );
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! The sources of a service at its start: opened, and linked to the engine thread.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::Thread;
+
+use athermal_run::live::Feed;
+use athermal_run::model::Model;
+
+use super::ServiceError;
+use super::source_thread::SourceThread;
+use crate::connector::{Remarks, SourceCounts, SourceLink, SourceWiring, WiredChannel, link};
+use crate::deployment::DeclaredSource;
+use crate::journal::Progress;
+use crate::time::Instant;
+use crate::unit::Unit;
+
+/// How many arrivals of a source may wait for the engine thread.
+const ARRIVALS: usize = 1 << 14;
+
+/// Sources that have been opened.
+pub(super) struct OpenSources {
+    pub(super) inlets: Vec<SourceThread>,
+    pub(super) links: Vec<SourceLink>,
+    pub(super) counts: Vec<(String, Arc<SourceCounts>)>,
+    /// What they leave out, by their names.
+    pub(super) heard: Receiver<(String, String)>,
+}
+
+/// Opens sources, which go on behind the newest stamps of the feed.
+pub(super) fn open(
+    sources: Vec<DeclaredSource>,
+    model: &Model,
+    (feed, stamps): (&[Feed], &[Instant]),
+    (engine, progress): (&Thread, &Arc<Progress>),
+) -> Result<OpenSources, ServiceError> {
+    let (tell, heard) = channel();
+    let mut open = OpenSources {
+        inlets: Vec::new(),
+        links: Vec::new(),
+        counts: Vec::new(),
+        heard,
+    };
+    let place = |name: &str| feed.iter().position(|of| of.name == name);
+    let plan = &model.plan;
+    for source in sources {
+        let unit = |name: &str| {
+            let mut channels = plan.sources.iter().zip(&plan.channels);
+            let found = channels.find(|(of, _)| of.name == name);
+            found.map_or_else(Unit::one, |(_, of)| of.channel.unit.clone())
+        };
+        // Each channel of a source is one of the feed.
+        let wired = source.channels.into_iter().filter_map(|of| {
+            let place = place(&of.channel.name)?;
+            let channel = WiredChannel {
+                unit: unit(&of.channel.name),
+                channel: of.channel,
+                address: of.address,
+                conversion: of.conversion,
+                after: stamps[place],
+            };
+            Some((channel, place as u32))
+        });
+        let (wired, places): (Vec<_>, Vec<_>) = wired.unzip();
+        let (outflow, link) = link(
+            ARRIVALS,
+            &wired,
+            &places,
+            source.parameters.stamps(),
+            (
+                engine.clone(),
+                Arc::clone(progress),
+                Remarks::new(&source.name, &tell),
+            ),
+        );
+        let wiring = SourceWiring {
+            name: source.name.clone(),
+            folder: source.folder,
+            channels: wired,
+            time: plan.time.clone(),
+            table: plan.table.clone(),
+        };
+        let inlet = source.parameters.open(wiring);
+        let inlet = inlet.map_err(|error| ServiceError::Source {
+            source: source.name.clone(),
+            error,
+        })?;
+        let counts = Arc::clone(outflow.counts());
+        open.counts.push((source.name.clone(), counts));
+        open.links.push(link);
+        open.inlets.push(SourceThread {
+            name: source.name,
+            inlet,
+            out: outflow,
+        });
+    }
+    Ok(open)
+}
