@@ -52,9 +52,8 @@ impl Serve {
     /// When the file has mistakes, or the state cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let (model, deployment) = self.load(terminal)?;
-        let beside = || usual_state(&self.machine);
-        let declared = deployment.runtime.state.clone();
-        let state = self.state.clone().or(declared).unwrap_or_else(beside);
+        let named = self.state.as_ref().or(deployment.runtime.state.as_ref());
+        let state = named.map_or_else(|| usual_state(&self.machine), PathBuf::clone);
         let options = ServiceOptions {
             state: state.clone(),
             is_dry: self.dry_run,
