@@ -6,7 +6,7 @@ use athermal::core::channel::{ABSENT, COLD};
 use athermal::{Engine, Instant, Model};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use die_tester::by_hand::{Dense, Learning, Shipped};
-use die_tester::{Tick, dense, has_truth, model, ticks};
+use die_tester::{Tick, dense, has_truth, model, ticks, without_novelty};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -23,7 +23,7 @@ fn main() {
 
 /// A comparison with other results would be none.
 fn same_bits(model: &Model, ticks: &[Tick], mut by_hand: impl FnMut(&Tick) -> [f64; 6]) {
-    let mut engine = engine(model);
+    let mut engine = engine(&without_novelty(model));
     let mut predictions = 0;
     for tick in ticks {
         let engine = engine.step(tick.0, &tick.1).expect("ticks are in order");

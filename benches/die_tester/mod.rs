@@ -81,17 +81,16 @@ pub fn fitted(text: &str, ticks: &[Tick]) -> Model {
     };
     let plan = Arc::new(plan);
     let fitted = fit(&plan, &table(ticks), &FitOptions::default(), &mut |_| ());
-    let model = Model {
+    Model {
         graph,
         fitted: fitted.expect("a table in memory can be read").0,
         plan,
         card: None,
-    };
-    without_novelty(&model)
+    }
 }
 
 /// The model as one that does not know how far its fit reaches: by hand nothing is known of that.
-fn without_novelty(model: &Model) -> Model {
+pub fn without_novelty(model: &Model) -> Model {
     let text = model.to_text().expect("a model is text");
     let mut json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
     remove(&mut json["fitted"]);

@@ -254,13 +254,15 @@ fn dated(second: u32) -> String {
     format!("2026-03-02T{hour:02}:{minute:02}:{:02}Z", second % 60)
 }
 
-/// What `init` prints of these files, after which `fit` takes its graph with the same words.
+/// What `init` prints of these files, on one line however long their paths are, after which `fit` takes its graph with the same words.
 fn started(scratch: &Scratch, more: &[&str], files: &[&Path]) -> (String, String) {
     let graph = scratch.path("g.toml");
     let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"init", &"--force", &"-o", &graph];
     words.extend(more.iter().map(|of| of as &dyn AsRef<std::ffi::OsStr>));
     words.extend(files.iter().map(|of| of as &dyn AsRef<std::ffi::OsStr>));
     let told = athermal(&words).ended(0).told;
+    let told = told.split_whitespace().filter(|word| *word != "\\");
+    let told = told.collect::<Vec<_>>().join(" ");
     let model = scratch.path("m.json");
     let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"fit", &graph, &"-o", &model];
     words.extend(more.iter().map(|of| of as &dyn AsRef<std::ffi::OsStr>));
@@ -282,7 +284,6 @@ fn logs_that_count_from_one_instant_are_started_with_merge_and_the_next_command_
         .ended(2)
         .tells(&["give `--merge` if both count from the same instant"]);
     let (told, _) = started(&scratch, &["--merge"], &[&one, &other]);
-    let told = told.replace("\\\n      ", "");
     assert!(told.contains("g.toml --merge --data"), "{told}");
     let unknown = [&"init" as &dyn AsRef<std::ffi::OsStr>, &one, &other];
     let offset = ["--merge", "--offset", "third.csv=1s", "-o"];
@@ -306,7 +307,6 @@ fn parts_of_one_log_are_joined_and_a_column_of_two_logs_is_left_out() {
     let other = log("time,Z_um,battery_V", &positions, ",3.7");
     let other = scratch.file("other.csv", other);
     let (told, graph) = started(&scratch, &[], &[&late, &other, &early]);
-    let told = told.replace("\n  ", " ");
     assert!(
         told.contains("battery_V: left out, it stands in") && told.contains("rename it in one"),
         "{told}"
