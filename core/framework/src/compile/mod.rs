@@ -40,7 +40,7 @@ pub use keys::{EstimatorKeys, Outside};
 pub use kind_fault::KindFault;
 pub use plan::{
     AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
-    PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
+    Planned, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use plan::{Rows, admits};
 pub use port_channels::PortChannels;
