@@ -136,7 +136,10 @@ fn an_engine_that_goes_on_from_a_snapshot_knows_the_plan() {
 #[test]
 fn a_segment_begins_without_a_plan() {
     let mut engine = engine();
-    stepped(&mut engine, &rows(5, &[(0, (20.0, 0.0)), (1, (50.0, 600.0))]));
+    stepped(
+        &mut engine,
+        &rows(5, &[(0, (20.0, 0.0)), (1, (50.0, 600.0))]),
+    );
     engine.segment();
     let outputs = stepped(&mut engine, &rows(20, &[]));
     assert!(outputs.iter().all(|row| row[0].is_nan() && row[1].is_nan()));
@@ -185,14 +188,12 @@ fn what_is_measured_is_not_read_ahead_and_the_reason_is_given() {
 
 #[test]
 fn what_is_computed_from_a_plan_is_not_read_ahead_either() {
-    let nodes = "[nodes.rise]\ntype = \"difference\"\ninputs.signal = \"set_point\"\n\n[nodes.recipe]";
+    let nodes =
+        "[nodes.rise]\ntype = \"difference\"\ninputs.signal = \"set_point\"\n\n[nodes.recipe]";
     is_refused(
         &[
             ("[nodes.recipe]", nodes),
-            (
-                "lags = [\"-5min\"",
-                "max_age = \"1h\"\nlags = [\"-5min\"",
-            ),
+            ("lags = [\"-5min\"", "max_age = \"1h\"\nlags = [\"-5min\""),
             (
                 "type = \"lag\"\ninputs.signal = \"set_point\"",
                 "type = \"lag\"\ninputs.signal = \"rise\"",

@@ -10,9 +10,7 @@ use athermal_serve::connector::{
     SourceWiring, Stamps, Stop,
 };
 use athermal_serve::{register_sink, register_source};
-use athermal_trial::machine::{
-    Announcements, Machine, Row, Setup, Simulation, machine, plans,
-};
+use athermal_trial::machine::{Announcements, Machine, Row, Setup, Simulation, machine, plans};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -11,7 +11,8 @@ use super::instance::{Declared, Instance, ReadNode, context};
 use super::kind_fault::KindFault;
 use super::order::Order;
 use super::plan::{
-    Gather, Plan, Planned, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, TruthLink,
+    Gather, Plan, Planned, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    TruthLink,
 };
 use super::problem;
 use super::provenance::Provenance;
@@ -179,7 +180,11 @@ impl<'g> Resolver<'g> {
         }
         // From when planned values apply stands behind all that graphs refer to, since none refers to it.
         for signal in &self.graph.signals {
-            for (channel, _) in signal.channels.iter().filter(|_| signal.known_ahead.is_some()) {
+            for (channel, _) in signal
+                .channels
+                .iter()
+                .filter(|_| signal.known_ahead.is_some())
+            {
                 let name = format!("{}.{channel}", signal.name);
                 let (applies_at, of) = (self.sources.len(), self.sources.iter_mut());
                 let of = of.filter(|source| source.name == name);

@@ -37,7 +37,12 @@ impl Announcements {
     }
 
     /// Those of a set point, each so long before it applies; none where the machine has no set point of that name.
-    pub fn ahead(machine: &dyn Machine, setup: &Setup, name: &str, ahead: Duration) -> Option<Self> {
+    pub fn ahead(
+        machine: &dyn Machine,
+        setup: &Setup,
+        name: &str,
+        ahead: Duration,
+    ) -> Option<Self> {
         let set_point = machine.set_points().iter().find(|of| of.name == name)?;
         let own = machine.schedule();
         let schedule = setup.schedule.as_ref().or(own.as_ref());

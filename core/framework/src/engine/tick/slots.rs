@@ -17,7 +17,6 @@ pub struct Slots {
     pub(crate) tick: u64,
 }
 
-
 impl Slots {
     pub(crate) fn new(count: usize) -> Self {
         Self {
