@@ -65,6 +65,7 @@ use athermal_connectors as _;
 use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
+use athermal_kinematics as _;
 use athermal_simulation as _;
 
 /// The pages of the guide, so that their code is compiled and run as tests.

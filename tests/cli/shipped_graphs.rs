@@ -29,6 +29,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
             "athermal-features",
             "delay difference first_order hampel lag minimum_difference moving pick product resample sample_at scale slope sum",
         ),
+        ("athermal-kinematics", "kinematics"),
     ];
     let found = found
         .iter()

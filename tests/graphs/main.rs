@@ -11,6 +11,7 @@ mod closed_loop;
 mod determinism;
 mod diff;
 mod hostile;
+mod kinematics;
 mod language;
 mod leaks;
 mod learning;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::workbench::{Read, data, graph};
 use athermal::Engine;
+use athermal::chart::{Chart, Layer};
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fitted;
 use athermal::files::{Dataset, Options};
@@ -299,4 +300,152 @@ fn reference_no_sensor_is_named_on_undisturbed_days() {
             []
         );
     }
+}
+
+/// How much of the truths lies within the 90 % intervals of a graph's predictions, by axis; of all, and within each event.
+fn covered(train: PathBuf, test: PathBuf, events: &[(String, f64, f64)]) -> Vec<(String, f64)> {
+    /// Half of an interval that holds 90 % of what is normally distributed, in standard deviations.
+    const HALF: f64 = 1.644_853_626_951_472_7;
+    let plan = plan(
+        "die-tester-virtual-sensor",
+        "deviation = \"sensor:std_dev\"\n",
+    );
+    let fitted = fitted(&plan, train);
+    let test = Table::read(&dataset(test), &plan).unwrap();
+    let mut found: Vec<Vec<(f64, bool)>> = vec![Vec::new(); AXES.len()];
+    run(&plan, &fitted, &test, |now, output| {
+        for (found, axis) in found.iter_mut().zip(AXES) {
+            let of = |output: &dyn Fn(&str) -> f64, name: &str| output(&format!("{name}.{axis}"));
+            let (truth, predicted) = (of(output, "drift"), of(output, "predicted"));
+            let half = HALF * of(output, "deviation");
+            if truth.abs() < LIMIT && half.is_finite() && predicted.is_finite() {
+                found.push((now, (predicted - truth).abs() <= half));
+            }
+        }
+    });
+    let mut shares = Vec::new();
+    for (axis, found) in AXES.iter().zip(&found) {
+        let mut share = |name: String, from: f64, to: f64| {
+            let within: Vec<_> = found
+                .iter()
+                .filter(|(at, _)| (from..=to).contains(at))
+                .collect();
+            let hits = within.iter().filter(|(_, holds)| *holds).count();
+            assert!(within.len() > 30, "{name}: {} truths", within.len());
+            shares.push((name, hits as f64 / within.len() as f64));
+        };
+        share((*axis).to_owned(), 0.0, f64::INFINITY);
+        for (event, from, to) in events {
+            share(format!("{axis} while {event}"), *from, to + 1800.0);
+        }
+    }
+    shares
+}
+
+#[test]
+fn reference_intervals_of_90_percent_hold_85_to_95_on_undisturbed_days_and_80_while_the_world_is_another()
+ {
+    let Some(folder) = changed_world() else {
+        return;
+    };
+    let tester = folder.with_file_name("data").join("die-tester");
+    let train = || tester.join("train.csv");
+    let mut wrong = Vec::new();
+    for (axis, share) in covered(train(), tester.join("test.csv"), &[]) {
+        println!("{axis}: {:.1} %", 100.0 * share);
+        if !(0.85..=0.95).contains(&share) {
+            wrong.push(format!("{axis}: {share}"));
+        }
+    }
+    let events = events(&folder);
+    for (of, share) in covered(train(), folder.join("test.csv"), &events) {
+        println!("{of}: {:.1} %", 100.0 * share);
+        if of.contains(" while ") && share < 0.8 {
+            wrong.push(format!("{of}: {share}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The virtual sensor as it was before it knew what it does not know.
+const UNAWARE: &str = r#"
+[nodes]
+trusted = false
+gradients.inputs.signal = "temperature"
+masses.inputs.signal = "temperature"
+aligned.inputs.signal = ["temperature", "masses"]
+expansion.outside = "pass"
+creeping.outside = "pass"
+"#;
+
+/// The numbers in a text.
+fn numbers(text: &str) -> Vec<f64> {
+    let is_part = |letter: char| letter.is_ascii_digit() || letter == '.' || letter == '-';
+    let words = text.split(|letter| !is_part(letter));
+    words.filter_map(|word| word.parse().ok()).collect()
+}
+
+#[test]
+fn reference_the_picture_of_a_day_with_a_loose_sensor_is_that_of_the_guide() {
+    let Some(folder) = changed_world() else {
+        return;
+    };
+    let train = || folder.with_file_name("data").join("die-tester/train.csv");
+    let (name, all) = ("die-tester-virtual-sensor", f64::INFINITY);
+    let test = Table::read(&dataset(folder.join("test.csv")), &plan(name, "")).unwrap();
+    let day = |more: &str| -> (Vec<f64>, Vec<f64>) {
+        let axis = errors(name, train(), &test, all, "predicted", more)[2].clone();
+        let of_day = axis
+            .iter()
+            .filter(|(at, ..)| (20.0..37.5).contains(&(at / 3600.0)));
+        of_day.map(|(at, _, error)| (*at, *error)).unzip()
+    };
+    let ((at, with), (at_without, without)) = (day(""), day(UNAWARE));
+    let loose = events(&folder)
+        .into_iter()
+        .find(|(event, ..)| event == "loose holder1");
+    let (_, from, to) = loose.unwrap();
+    let chart = Chart {
+        title: "Errors of a virtual sensor on a day on which a temperature sensor comes loose"
+            .to_owned(),
+        x_label: "hours".to_owned(),
+        y_label: "error on Z1 in nm/min".to_owned(),
+        layers: vec![
+            Layer::line(
+                &at_without,
+                &without,
+                "c2",
+                "without novelty and cross_check",
+            ),
+            Layer::line(
+                &at,
+                &with,
+                "c1",
+                "with (graphs/die-tester-virtual-sensor.toml)",
+            ),
+        ],
+        bands: vec![(from, to, "s1")],
+        time: true,
+        ..Chart::default()
+    };
+    let drawn = chart.file();
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/loose-sensor.svg");
+    if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+        std::fs::write(&kept, &drawn).unwrap();
+    }
+    let (drawn, kept) = (
+        numbers(&drawn),
+        numbers(&std::fs::read_to_string(&kept).unwrap()),
+    );
+    assert_eq!(drawn.len(), kept.len(), "INSTA_UPDATE=always draws it anew");
+    // Other processors round otherwise.
+    let worst = drawn
+        .iter()
+        .zip(&kept)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(
+        worst <= 1.0,
+        "a figure differs by {worst}: INSTA_UPDATE=always draws it anew"
+    );
 }

@@ -1,0 +1,7 @@
+//! From what the parts of a machine do to what its tool point does: `kinematics`.
+
+mod chain;
+mod kinematics;
+
+pub use chain::{Chain, Freedom};
+pub use kinematics::{Kinematics, Link};
