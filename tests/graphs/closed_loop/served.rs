@@ -20,12 +20,13 @@ use serde::Deserialize;
 use super::Looped;
 use crate::workbench::{Scratch, graph};
 
-/// How fast an axis may move, in nm/s.
-const RATE: f64 = 20.0;
+/// How fast an axis may move: as written, and in the unit of the correction per second.
+const WRITTEN: &str = "20 nm/s";
+const RATE: f64 = 0.02;
 /// The machine's time from row to row.
 const PERIOD_S: f64 = 10.0;
 /// How many rows a machine may be ahead of the commands that it takes, where its time passes thousands of times as fast as ours.
-const LAG_S: f64 = 20.0 * PERIOD_S;
+const LAG_S: f64 = 10.0 * PERIOD_S;
 
 /// The axes of a simulated machine, at the end of a line that can be cut.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -125,8 +126,8 @@ fn model(
     by_rate: bool,
 ) -> (Model, Deployment) {
     let (blend, rate) = match by_rate {
-        true => (String::new(), format!("rate = \"{RATE} nm/s\"\n")),
-        false => (format!(", blend = \"{RATE} nm/s\""), String::new()),
+        true => (String::new(), format!("rate = \"{WRITTEN}\"\n")),
+        false => (format!(", blend = \"{WRITTEN}\""), String::new()),
     };
     let text = format!(
         "schema = 1\nextends = {:?}\nname = \"served\"\nruntime = {{ wait = \"0 s\", settle = \"0 s\", checkpoint = \"50ms\" }}\n\
@@ -167,13 +168,13 @@ fn session(
     prng: &mut Prng,
 ) -> usize {
     let by_rate = name.len() % 2 == 0;
-    let (model, deployment) = self::model(scratch, fitted, name, 100.0, by_rate);
+    let (model, deployment) = self::model(scratch, fitted, name, 1e5, by_rate);
     let options = ServiceOptions::new(state.to_owned());
     let (mut service, _) = Service::start(&model, deployment, &options).unwrap();
     let line = line(name);
     let came = || line.lock().unwrap().commands.len();
     let (began, before) = (Clock::now(), came());
-    let least = before + 5 + prng.between(0.0, 60.0) as usize;
+    let least = before + 10 + prng.between(0.0, 150.0) as usize;
     let (mut swaps, mut other) = (0, 1.0);
     while came() < least {
         for event in service.pump() {
@@ -195,7 +196,7 @@ fn session(
             }
             chance if chance < 0.06 => {
                 other = -other;
-                let factor = if other < 0.0 { -60.0 } else { 100.0 };
+                let factor = if other < 0.0 { -1e5 } else { 1e5 };
                 let (next, _) = self::model(scratch, fitted, name, factor, by_rate);
                 // One that is still on its way is not overtaken.
                 let _ = service.swap(&next);
@@ -282,13 +283,13 @@ fn history(fitted: &Model, nth: usize) -> History {
             let step = (command.asked[axis] - from).abs();
             assert!(
                 step <= RATE * (passed + slack) + 1e-6,
-                "{name}, axis {axis}: {step} nm\n{pair:?}"
+                "{name}, axis {axis}: {step} um\n{pair:?}"
             );
             // What the axis did.
             let moved = (command.applied[axis] - before.applied[axis]).abs();
             assert!(
                 moved <= RATE * (passed + LAG_S) + 1e-6,
-                "{name}, axis {axis}: {moved} nm\n{pair:?}"
+                "{name}, axis {axis}: {moved} um\n{pair:?}"
             );
             history.farthest = history.farthest.max(command.applied[axis].abs());
         }
@@ -306,7 +307,7 @@ fn over_random_kills_outages_and_swaps_no_axis_moves_faster_than_its_rate() {
     let looped = Looped::new("die-tester", &graph("die-tester-control"), 200_000.0, 50.0);
     let (next, all) = (Mutex::new(0), Mutex::new(History::default()));
     std::thread::scope(|scope| {
-        for _ in 0..4 {
+        for _ in 0..8 {
             scope.spawn(|| {
                 loop {
                     let nth = {
