@@ -414,13 +414,13 @@ fn reference_the_picture_of_a_day_with_a_loose_sensor_is_that_of_the_guide() {
             Layer::line(
                 &at_without,
                 &without,
-                "c2",
+                "c3",
                 "without novelty and cross_check",
             ),
             Layer::line(
                 &at,
                 &with,
-                "c1",
+                "c2",
                 "with (graphs/die-tester-virtual-sensor.toml)",
             ),
         ],
