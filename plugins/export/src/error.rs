@@ -13,7 +13,9 @@ pub enum ExportError {
     #[error("{}", listed(.0))]
     Nodes(Vec<Refusal>),
     /// Two samples come at the same time, or so slowly that nothing is left of a window.
-    #[error("the rate of `{signal}` is {given}: give the time between two samples, above 0, such as --rate {signal}=1s")]
+    #[error(
+        "the rate of `{signal}` is {given}: give the time between two samples, above 0, such as --rate {signal}=1s"
+    )]
     Rate {
         /// The signal.
         signal: String,
@@ -60,5 +62,8 @@ impl fmt::Display for Refusal {
 
 fn listed(refusals: &[Refusal]) -> String {
     let lines: Vec<String> = refusals.iter().map(|of| format!("\n  {of}")).collect();
-    format!("not everything in this graph can be exported:{}", lines.concat())
+    format!(
+        "not everything in this graph can be exported:{}",
+        lines.concat()
+    )
 }

@@ -204,9 +204,7 @@ impl Record {
     /// A parameter, which the kind has.
     fn field(&self, name: &str) -> Option<&Field> {
         let mut fields = self.fields.iter();
-        fields
-            .find(|(own, _)| *own == name)
-            .map(|(_, field)| field)
+        fields.find(|(own, _)| *own == name).map(|(_, field)| field)
     }
 
     /// A whole number; -1 where the kind has none of the name.

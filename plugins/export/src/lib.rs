@@ -9,9 +9,11 @@
 //! form, and what goes on learning unless it is exported as it was fitted ([`Options::frozen`]).
 
 pub mod c;
+mod command;
 mod error;
 mod form;
 mod lower;
+pub mod state;
 mod ticks;
 
 use athermal_core::engine::Engine;

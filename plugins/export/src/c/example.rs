@@ -26,7 +26,14 @@ pub(super) fn readme(form: &Form) -> String {
     let layout = form.layout;
     let text = named(include_str!("README.md.in"), form, false);
     let rates: Vec<String> = (form.sources.iter().zip(&form.periods_ns))
-        .map(|(source, &period)| format!("| `{}` | {} | {} |", source.name, source.unit, seconds(period)))
+        .map(|(source, &period)| {
+            format!(
+                "| `{}` | {} | {} |",
+                source.name,
+                source.unit,
+                seconds(period)
+            )
+        })
         .collect();
     let outputs: Vec<String> = (form.outputs.iter())
         .map(|output| format!("| `{}` | {} |", output.name, output.unit))
@@ -61,5 +68,9 @@ fn rows(form: &Form) -> String {
         )
     });
     let rows: Vec<String> = rows.collect();
-    if rows.is_empty() { "no windows are kept".to_owned() } else { rows.join(", ") }
+    if rows.is_empty() {
+        "no windows are kept".to_owned()
+    } else {
+        rows.join(", ")
+    }
 }

@@ -5,6 +5,7 @@ mod tables;
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::process::Command;
 
 use crate::error::ExportError;
 use crate::form::{Form, Port, Record};
@@ -56,6 +57,38 @@ pub fn write(files: &[File], folder: &Path) -> Result<(), ExportError> {
         written.map_err(|source| ExportError::Write { path, source })?;
     }
     Ok(())
+}
+
+/// The largest error of single precision in the self test of an exported folder, in units of the largest size of the output; none
+/// without a C compiler.
+#[must_use]
+pub fn single_precision_error(folder: &Path, form: &Form) -> Option<f64> {
+    let program = folder.join("single_precision_error");
+    let built = Command::new("cc")
+        .args(["-std=c99", "-O2", "-ffp-contract=off", "-DATHERMAL_FLOAT"])
+        .arg("-I")
+        .arg(folder)
+        .args([
+            folder.join("athermal_rt.c"),
+            folder.join(format!("{}.c", form.name)),
+            folder.join("example/main.c"),
+        ])
+        .arg("-lm")
+        .arg("-o")
+        .arg(&program)
+        .output();
+    let ran = built
+        .ok()
+        .filter(|built| built.status.success())
+        .and_then(|_| {
+            Command::new(std::path::absolute(&program).ok()?)
+                .output()
+                .ok()
+        });
+    let _ = std::fs::remove_file(&program);
+    let said = String::from_utf8(ran?.stdout).ok()?;
+    let millionths = said.split("error ").nth(1)?.split(' ').next()?;
+    millionths.parse::<f64>().ok().map(|error| error / 1e6)
 }
 
 /// What a tick takes, in operations on numbers: additions, products and the like.
@@ -192,15 +225,15 @@ fn source(form: &Form, ticks: &Ticks) -> String {
         ("input", &form.sources, "INPUTS"),
         ("output", &form.outputs, "OUTPUTS"),
     ] {
-        let lists: [(&str, fn(&Port) -> &String); 2] =
-            [("names", |port| &port.name), ("units", |port| &port.unit)];
-        for (which, of) in lists {
+        let names: Vec<&str> = ports.iter().map(|port| &*port.name).collect();
+        let units: Vec<&str> = ports.iter().map(|port| &*port.unit).collect();
+        for (which, of_ports) in [("names", names), ("units", units)] {
             let _ = writeln!(
                 text,
                 "const char *const {name}_{what}_{which}[{upper}_{upper_what}] = {{"
             );
-            for port in ports {
-                let _ = writeln!(text, "    \"{}\",", plain(of(port)));
+            for of_port in of_ports {
+                let _ = writeln!(text, "    \"{}\",", plain(of_port));
             }
             text.push_str("};\n\n");
         }

@@ -106,7 +106,11 @@ fn reading(form: &Form, text: &mut String) {
     let bundle = |gather: &Bundle| {
         let own = first;
         first += gather.entries.len();
-        format!("{{ {own}, {}, {} }}", gather.entries.len(), i32::from(gather.held))
+        format!(
+            "{{ {own}, {}, {} }}",
+            gather.entries.len(),
+            i32::from(gather.held)
+        )
     };
     let gathers: Vec<String> = form.gathers.iter().map(bundle).collect();
     list(text, "at_gather", "gathers", &gathers, String::clone, &[]);
@@ -121,7 +125,14 @@ fn reading(form: &Form, text: &mut String) {
             long(history.depth_ns)
         )
     };
-    list(text, "at_history", "histories", &form.histories, history, &[]);
+    list(
+        text,
+        "at_history",
+        "histories",
+        &form.histories,
+        history,
+        &[],
+    );
     let slots: Vec<i64> = form.output_slots.iter().map(|&slot| slot as i64).collect();
     list(text, "int32_t", "outputs", &slots, i64::to_string, &[]);
 }
@@ -163,7 +174,11 @@ fn list<T>(
 
 /// The name of a list, or NULL where it is empty.
 fn pointer(name: &str, is_empty: bool) -> String {
-    if is_empty { "NULL".to_owned() } else { name.to_owned() }
+    if is_empty {
+        "NULL".to_owned()
+    } else {
+        name.to_owned()
+    }
 }
 
 /// Structures of one kind, after what they point to.
@@ -230,7 +245,10 @@ fn structures(text: &mut String, kind: &str, name: &str, records: &[&Record]) {
 fn steps(form: &Form, text: &mut String) {
     let nth_of_kind = |node: usize| {
         let kind = form.nodes[node].kind;
-        form.nodes[..node].iter().filter(|of| of.kind == kind).count()
+        form.nodes[..node]
+            .iter()
+            .filter(|of| of.kind == kind)
+            .count()
     };
     let names: Vec<String> = (form.steps.iter())
         .map(|step| match step {
@@ -247,7 +265,11 @@ fn steps(form: &Form, text: &mut String) {
             format!("{{ {known}, {} }}", nth_of_kind(node))
         }
     };
-    let _ = writeln!(text, "static const at_step steps[{}] = {{", form.steps.len());
+    let _ = writeln!(
+        text,
+        "static const at_step steps[{}] = {{",
+        form.steps.len()
+    );
     for (of, name) in form.steps.iter().zip(names) {
         let remark = match name.is_empty() {
             true => String::new(),

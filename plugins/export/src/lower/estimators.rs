@@ -123,7 +123,10 @@ fn fixed(node: &PlannedNode, regressors: Vec<String>) -> Result<(Fit, Vec<String
             };
             Ok((same, regressors))
         }
-        _ => refuse("it has not been fitted", "fit the graph first: `athermal fit`"),
+        _ => refuse(
+            "it has not been fitted",
+            "fit the graph first: `athermal fit`",
+        ),
     }
 }
 
@@ -133,10 +136,7 @@ fn fitted(node: &PlannedNode, predictor: &dyn Predictor, heeded: bool) -> Result
         .filter(|form| form.coefficients.len() == predictor.uses().len());
     let Some(form) = form.filter(|_| !predictor.takes_absent()) else {
         return refuse(
-            format!(
-                "what `{}` was fitted to is no linear form",
-                node.kind.name
-            ),
+            format!("what `{}` was fitted to is no linear form", node.kind.name),
             "use `linear`, `ar` or `arx`, or run the graph with `athermal serve`",
         );
     };
@@ -144,7 +144,10 @@ fn fitted(node: &PlannedNode, predictor: &dyn Predictor, heeded: bool) -> Result
     let novelty = match &written["novelty"] {
         _ if !heeded => None,
         serde_json::Value::Null => {
-            if !predictor.novelty(&vec![0.0; form.coefficients.len()]).is_nan() {
+            if !predictor
+                .novelty(&vec![0.0; form.coefficients.len()])
+                .is_nan()
+            {
                 return refuse(
                     "how far it heeds that it is outside of its fit is not known",
                     "set `outside = \"pass\"`",

@@ -90,9 +90,7 @@ impl Lowering<'_> {
             ),
             ("athermal-features", "slope") => self.slope(&planned, &parameters(node)?),
             ("athermal-features", "lag") => self.lag(&planned, &parameters(node)?),
-            ("athermal-features", "first_order") => {
-                self.first_order(&planned, &parameters(node)?)
-            }
+            ("athermal-features", "first_order") => self.first_order(&planned, &parameters(node)?),
             ("athermal-features", "pick") => {
                 let (channels, gather) = planned.port("signal");
                 Ok(planned
@@ -138,7 +136,10 @@ impl Lowering<'_> {
         for channel in channels {
             let unit = match &spec.unit {
                 Some(unit) => unit.clone(),
-                None => channel.unit.difference().per(&fits(Unit::parse("min").ok())?),
+                None => channel
+                    .unit
+                    .difference()
+                    .per(&fits(Unit::parse("min").ok())?),
             };
             let per_second = channel.unit.difference().per(&Unit::second());
             let factor = fits(per_second.factor_to(&unit))?;
@@ -159,7 +160,10 @@ impl Lowering<'_> {
             .int("channels", count)
             .int("windows", widths.len())
             .with("needed_span", Field::Longs(spans.collect()))
-            .with("needed_open", Field::Longs(widths.iter().map(open).collect()))
+            .with(
+                "needed_open",
+                Field::Longs(widths.iter().map(open).collect()),
+            )
             .with("width", Field::Longs(widths))
             .with("order", Field::Ints(order))
             .reals("factors", factors)
@@ -191,7 +195,10 @@ impl Lowering<'_> {
             .int("slot", of.slot())
             .int("channels", channels.len())
             .int("lags", spec.lags.len())
-            .with("lag", Field::Longs(spec.lags.iter().map(|lag| lag.as_ns()).collect()))
+            .with(
+                "lag",
+                Field::Longs(spec.lags.iter().map(|lag| lag.as_ns()).collect()),
+            )
             .with("max_age", Field::Longs(channels.iter().map(age).collect()))
             .int("first_history", first_history))
     }

@@ -221,7 +221,13 @@ impl<'a> Lowering<'a> {
         let Some(node) = self.plan.channels[slot].node else {
             return true;
         };
-        let kinds = ["slope", "first_order", "compensate", "stability", "safe_state"];
+        let kinds = [
+            "slope",
+            "first_order",
+            "compensate",
+            "stability",
+            "safe_state",
+        ];
         kinds.contains(&self.plan.nodes[node].kind.name)
     }
 

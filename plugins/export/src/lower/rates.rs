@@ -60,7 +60,10 @@ impl Periods {
     pub(crate) fn new(plan: &Plan, rates: &Rates) -> Result<Self, ExportError> {
         let names = || plan.sources.iter().map(|source| &source.name);
         let signals = || names().map(|name| name.split('.').next().unwrap_or(name));
-        let all = rates.signals.iter().map(|(name, period)| (&**name, *period));
+        let all = rates
+            .signals
+            .iter()
+            .map(|(name, period)| (&**name, *period));
         for (name, period) in all.chain([("the signals", rates.period)]) {
             if period <= Duration::ZERO {
                 return Err(ExportError::Rate {

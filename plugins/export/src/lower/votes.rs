@@ -114,12 +114,10 @@ impl Lowering<'_> {
         let rooms = self.rooms(&rule, truth.as_ref(), period)?;
         let count = self.gathers[*voters].entries.len();
         let judged = if rule.number == 5 { 2 * count } else { count };
-        let ints = self.ints(
-            7 + rooms.runs + 2 * rooms.waiting + 2 * judged + judged * rooms.errors,
-        );
-        let reals = self.reals(
-            rooms.runs * count + rooms.waiting + judged * rooms.errors + 2 * judged + count,
-        );
+        let ints =
+            self.ints(7 + rooms.runs + 2 * rooms.waiting + 2 * judged + judged * rooms.errors);
+        let reals = self
+            .reals(rooms.runs * count + rooms.waiting + judged * rooms.errors + 2 * judged + count);
         self.scratch(4 * count);
         let heeded = beside.novelties.and(novelties.as_ref());
         let which = heeded.map_or(&[][..], |(_, which)| which);
@@ -157,12 +155,7 @@ impl Lowering<'_> {
             .int("reals", reals))
     }
 
-    fn rooms(
-        &self,
-        rule: &Rule,
-        truth: Option<&TruthLink>,
-        period: i64,
-    ) -> Result<Rooms, Refused> {
+    fn rooms(&self, rule: &Rule, truth: Option<&TruthLink>, period: i64) -> Result<Rooms, Refused> {
         let none = Rooms {
             runs: 1,
             waiting: 1,

@@ -1,0 +1,9 @@
+//! What is exported computes what the engine computes, to the bit.
+
+// Shared functions of tests are none of `cfg(test)`.
+#![allow(clippy::unwrap_used)]
+
+mod random;
+mod refusals;
+mod shipped;
+mod support;
