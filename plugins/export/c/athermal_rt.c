@@ -99,9 +99,9 @@ static double at_number(uint64_t bits)
 uint64_t at_hash(uint64_t hash, uint64_t bits)
 {
     uint64_t mixed = hash;
-    int32_t byte;
-    for (byte = 0; byte < 8; byte++) {
-        mixed = (mixed ^ ((bits >> (8 * byte)) & UINT64_C(0xff))) * UINT64_C(0x100000001b3);
+    uint32_t shift;
+    for (shift = 0; shift < 64u; shift += 8u) {
+        mixed = (mixed ^ ((bits >> shift) & UINT64_C(0xff))) * UINT64_C(0x100000001b3);
     }
     return mixed;
 }

@@ -147,6 +147,14 @@ fn plain(text: &str) -> String {
     text.replace("*/", "* /").replace("/*", "/ *")
 }
 
+/// How many ticks the longest window holds.
+fn window_ticks(form: &Form) -> i64 {
+    let slopes = form.nodes.iter().filter(|node| node.kind == "slope");
+    let widths = slopes.flat_map(|node| node.longs_of("width"));
+    let longest = widths.copied().max().unwrap_or(0);
+    longest / form.period_ns.max(1) + 1
+}
+
 fn header(form: &Form) -> String {
     let (name, upper) = (&form.name, form.name.to_uppercase());
     let mut text = String::new();
@@ -162,7 +170,9 @@ fn header(form: &Form) -> String {
          /* Bytes of the state. A tick takes about {} operations on numbers. */\n\
          #define {upper}_STATE_BYTES ({}u + ({}u * sizeof(at_real)))\n\
          #define {upper}_SAVED_BYTES {}u\n\
-         #define {upper}_TICKS {}\n\n",
+         #define {upper}_TICKS {}\n\
+         /* Nanoseconds between two ticks at least, and so many ticks to the longest window. */\n\
+         #define {upper}_PERIOD_NS INT64_C({})\n#define {upper}_WINDOW_TICKS {}\n\n",
         plain(&form.title),
         form.revision,
         form.revision,
@@ -173,6 +183,8 @@ fn header(form: &Form) -> String {
         layout.reals,
         8 * (layout.ints + layout.reals + 6),
         crate::ticks::TICKS,
+        form.period_ns,
+        window_ticks(form),
     );
     for (what, ports) in [("IN", &form.sources), ("OUT", &form.outputs)] {
         let _ = writeln!(text, "enum {{");

@@ -176,8 +176,9 @@ impl Lowering<'_> {
 
     fn lag(&mut self, of: &Planned<'_>, spec: &Lag) -> Result<Record, Refused> {
         let (channels, gather) = of.port("signal");
-        let longest = spec.lags.iter().copied().max().unwrap_or_default();
-        if spec.lags.iter().any(|lag| lag.is_negative()) {
+        let lags: Vec<Duration> = spec.lags.iter().map(|shift| shift.0).collect();
+        let longest = lags.iter().copied().max().unwrap_or_default();
+        if lags.iter().any(|lag| lag.is_negative()) {
             return refuse("it looks ahead", "give lags from 0 on");
         }
         let first_history = self.histories.len();
@@ -194,10 +195,10 @@ impl Lowering<'_> {
             .int("gather", gather)
             .int("slot", of.slot())
             .int("channels", channels.len())
-            .int("lags", spec.lags.len())
+            .int("lags", lags.len())
             .with(
                 "lag",
-                Field::Longs(spec.lags.iter().map(|lag| lag.as_ns()).collect()),
+                Field::Longs(lags.iter().map(|lag| lag.as_ns()).collect()),
             )
             .with("max_age", Field::Longs(channels.iter().map(age).collect()))
             .int("first_history", first_history))

@@ -57,16 +57,12 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
             })),
         }
     }
-    for (slot, channel) in plan.channels.iter().enumerate() {
-        let ahead = channel.history.is_some_and(Duration::is_negative);
-        if ahead || lowering.reads_ahead(slot) {
-            refusals.push(Refusal {
-                node: channel.name.clone(),
-                why: "it is read with a negative lag, before it is measured".to_owned(),
-                way: "read it at the present instant".to_owned(),
-            });
-        }
-    }
+    let planned = plan.sources.iter().filter(|of| of.planned.is_some());
+    refusals.extend(planned.map(|source| Refusal {
+        node: source.name.clone(),
+        why: "a signal that is known ahead cannot be exported".to_owned(),
+        way: "leave out `known_ahead`, and read it as it is measured".to_owned(),
+    }));
     if !refusals.is_empty() {
         return Err(ExportError::Nodes(refusals));
     }
@@ -229,11 +225,6 @@ impl<'a> Lowering<'a> {
             "safe_state",
         ];
         kinds.contains(&self.plan.nodes[node].kind.name)
-    }
-
-    fn reads_ahead(&self, slot: usize) -> bool {
-        let mut entries = self.gathers.iter().flat_map(|of| &of.entries);
-        entries.any(|entry| entry.slot == slot && entry.lag_ns < 0)
     }
 
     fn node(

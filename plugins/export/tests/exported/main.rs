@@ -3,6 +3,7 @@
 // Shared functions of tests are none of `cfg(test)`.
 #![allow(clippy::unwrap_used)]
 
+mod processors;
 mod random;
 mod refusals;
 mod shipped;

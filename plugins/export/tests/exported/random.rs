@@ -10,7 +10,7 @@ use athermal_core::time::Duration;
 use athermal_export::{Options, Rates, export_c, state};
 
 use crate::support::{
-    Event, Exhibit, LEVELS, Scratch, compilers, difference, made_up, plan, stepped,
+    Event, Exhibit, LEVELS, Scratch, compilers, difference, has, made_up, plan, ran, stepped,
 };
 
 fn one_of<'a>(random: &mut Prng, words: &[&'a str]) -> &'a str {
@@ -504,4 +504,49 @@ fn handed_over(
     let found = stepped(&mut engine, after);
     difference(&exhibit.form, &expected, &found)
         .map(|differs| format!("from C to the engine: {differs}"))
+}
+
+#[test]
+fn no_byte_is_touched_that_is_not_of_the_state_as_valgrind_and_sanitizers_see_it() {
+    if !["gcc", "valgrind"].iter().all(|program| has(program)) {
+        return;
+    }
+    let scratch = Scratch::new("memory");
+    let mut random = Prng::stream(77, "an exported graph");
+    let plan = plan(&graph(&mut random));
+    let fitted = made_up(&plan, &mut random);
+    let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+    let names: Vec<String> = plan.sources.iter().map(|of| of.name.clone()).collect();
+    let events = events(&mut random, &names, 2_500);
+    let expected = stepped(&mut engine, &events);
+    // With room for all ticks, and with room for one in ten: rings that are full.
+    for (name, period) in [("roomy", 240_000_000), ("tight", 2_400_000_000)] {
+        let options = Options {
+            rates: Rates::every(Duration::from_ns(period)),
+            ..Options::default()
+        };
+        let exported = export_c(&engine, &options, false).unwrap();
+        let exhibit = Exhibit::new(&exported, &scratch.path(name));
+        let sanitized = [
+            "-O1",
+            "-g",
+            "-fsanitize=address,undefined",
+            "-fno-sanitize-recover=all",
+        ];
+        let (found, said) = exhibit.stepped(&exhibit.built("gcc", &sanitized, "driver.c"), &events);
+        assert_eq!(said & 2 > 0, name == "tight", "{name}: full");
+        if name == "roomy" {
+            assert_eq!(difference(&exhibit.form, &expected, &found), None);
+        }
+        let program = exhibit.built("gcc", &["-O1", "-g"], "driver.c");
+        let words = [
+            exhibit.folder.join("events"),
+            exhibit.folder.join("valgrind.out"),
+        ];
+        let mut valgrind = std::process::Command::new("valgrind");
+        ran(valgrind
+            .args(["-q", "--error-exitcode=9"])
+            .arg(program)
+            .args(words));
+    }
 }

@@ -12,12 +12,12 @@ use crate::support::{
     Exhibit, Scratch, compilers, difference, has, made_up, plan, project, ran, stepped,
 };
 
-fn second(seconds: f64) -> Duration {
+pub fn second(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds).unwrap()
 }
 
 /// A shipped graph with a fit that is made up, as the tests of what it computes need no other.
-fn shipped(name: &str, rates: Rates) -> (Engine, Exported) {
+pub fn shipped(name: &str, rates: Rates) -> (Engine, Exported) {
     let text = std::fs::read_to_string(project().join("graphs").join(name)).unwrap();
     let plan = plan(&text);
     let fitted = made_up(&plan, &mut Prng::stream(3, name));
