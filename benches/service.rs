@@ -155,6 +155,7 @@ fn serve(model: &Model) {
         state: folder.clone(),
         is_dry: false,
         frozen: false,
+        machine: std::path::PathBuf::new(),
     };
     let (mut service, _) =
         Service::start(model, deployment, &options).expect("the folder can be written");

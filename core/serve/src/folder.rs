@@ -9,8 +9,14 @@ use std::{fmt, io};
 use athermal_run::live::store::write_whole;
 use athermal_run::model::{Model, ModelError};
 
+use crate::checkpoint::Checkpoints;
+
 /// How long a process that is ending is waited for.
 const ENDS: Wait = Wait::from_secs(1);
+
+/// Where graphs are kept as they were when they were handed over, and how many of them.
+const HANDOVERS: &str = "handovers";
+const KEPT: usize = 64;
 
 /// The state folder of a service. It is locked for as long as this lives; the lock goes with the process, however it ends.
 #[derive(Debug)]
@@ -73,7 +79,13 @@ impl StateFolder {
             paths: StatePaths::new(path),
             _lock: file,
         };
-        for part in [folder.journal(), folder.checkpoints(), folder.models()] {
+        let parts = [
+            folder.journal(),
+            folder.checkpoints(),
+            folder.models(),
+            folder.path().join(HANDOVERS),
+        ];
+        for part in parts {
             fs::create_dir_all(&part).map_err(not_written(&part))?;
         }
         Ok(folder)
@@ -103,6 +115,26 @@ impl StatePaths {
     #[must_use]
     pub fn checkpoints(&self) -> PathBuf {
         self.0.join("checkpoints")
+    }
+
+    /// Graphs as they were when they were handed over to the engine thread, so that a replay hands over the same bits.
+    #[must_use]
+    pub fn handovers(&self) -> Checkpoints {
+        Checkpoints::new(self.0.join(HANDOVERS), KEPT)
+    }
+
+    /// The revision of the graph that the service was given last and ran; none where that is not known.
+    #[must_use]
+    pub fn given(&self) -> Option<String> {
+        fs::read_to_string(self.0.join("given")).ok()
+    }
+
+    /// Notes the revision of the graph that the service was given.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn note_given(&self, revision: &str) -> io::Result<()> {
+        write_whole(&self.0.join("given"), revision.as_bytes())
     }
 
     /// Where models are.

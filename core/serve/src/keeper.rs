@@ -61,6 +61,25 @@ impl Keeper {
         Ok(notices)
     }
 
+    /// Takes a checkpoint now; it is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it
+    /// is; none where none can be taken.
+    pub fn take_now(&mut self) -> Option<u64> {
+        self.take();
+        self.waiting.as_ref().map(|of| of.happenings)
+    }
+
+    /// After how many ticks, beats, breaks and freezes the last checkpoint was saved.
+    #[must_use]
+    pub fn last(&self) -> u64 {
+        self.last
+    }
+
+    /// How many ticks, beats, breaks and freezes have been taken in, those before this run included.
+    #[must_use]
+    pub fn happenings(&self) -> u64 {
+        self.before + self.control.events()
+    }
+
     /// Saves what the replica knows now, once the journal is synced up to it. For the end, when the journal is finished.
     ///
     /// # Errors
@@ -79,15 +98,23 @@ impl Keeper {
     }
 
     /// The control of the graph.
+    #[must_use]
+    pub fn look(&self) -> &Control {
+        &self.control
+    }
+
+    /// The control of the graph.
     pub fn control(&mut self) -> &mut Control {
         &mut self.control
     }
 
     fn take(&mut self) {
         self.taken = Clock::now();
-        let happenings = self.before + self.control.events();
+        let happenings = self.happenings();
+        // Between a hand-over and the take-over there is none: a replay that began there would not know what was handed over.
         if let Some(replica) = self.control.replica()
             && happenings > self.last
+            && !self.control.is_busy()
             // What a node that was given up had learned is not whole: the journal goes on from before.
             && replica.panics().is_empty()
         {

@@ -259,6 +259,7 @@ impl Recovered {
         look: &mut impl FnMut(u64, &Engine),
     ) -> Result<Self, RecoveryError> {
         let mut log = Log::open_at(&folder.journal(), from)?;
+        let mut handovers = folder.handovers().read_after(from)?.into_iter().peekable();
         let mut seen = 0;
         let mut replay = Replay::new(engine, &Begin::nothing());
         while let Some(entry) = log.read()? {
@@ -271,13 +272,25 @@ impl Recovered {
                 }
                 Entry::Record(event, record) => (event, record),
             };
+            // What was handed over here is stepped along, until the journal says that it took over.
+            while let Some(next) = handovers.next_if(|of| of.happenings <= seen) {
+                let usable = usable(folder, None, next, 0);
+                usable.map_or_else(
+                    |error| report.refused.push(error),
+                    |(next, ..)| replay.hand_over(next),
+                );
+            }
             seen += u64::from(record.is_happening());
             match record {
                 Record::Swap { revision } if seen >= from => {
                     let revision = format!("{revision:016x}");
                     let next = folder.model(&revision);
                     model = next.map_err(|error| no_model(&revision, error))?;
-                    let carry = swap(&mut replay, &model)?;
+                    let (next, carry) = match replay.handed_over(&revision) {
+                        Some(next) => (next, Vec::new()),
+                        None => carried(replay.engine(), &model)?,
+                    };
+                    take_over(&mut replay, next);
                     report.swaps.push((revision, carry));
                 }
                 _ if seen > from || seen == from && !record.is_happening() => {
@@ -357,19 +370,23 @@ fn no_model(revision: &str, error: impl fmt::Display) -> RecoveryError {
     }
 }
 
-/// Lets another graph take over from the state of the one before, without a past to warm it by.
-fn swap(replay: &mut Replay, model: &Model) -> Result<Vec<NodeCarry>, RecoveryError> {
+/// Another graph with what it can take of the state of what runs, without a past to warm it by.
+fn carried(running: &Engine, model: &Model) -> Result<(Engine, Vec<NodeCarry>), RecoveryError> {
     let next = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut next = next.map_err(RecoveryError::Unfit)?;
     next.isolate_panics();
+    let transfer = StateTransfer::between(running, &next, false);
+    let carry = next.adopt(&running.state(), &transfer, false);
+    Ok((next, carry))
+}
+
+/// Lets another engine take over, as the engine thread does.
+fn take_over(replay: &mut Replay, mut next: Engine) {
     let before = replay.engine();
-    let transfer = StateTransfer::between(before, &next, false);
-    let carry = next.adopt(&before.state(), &transfer, false);
     let outputs = &before.plan().outputs;
     let place = |name: &String| outputs.iter().position(|output| output.name == *name);
     let plan = Arc::clone(next.plan());
     let places: Vec<_> = plan.outputs.iter().map(|of| place(&of.name)).collect();
     next.pass_over(before, &places);
     replay.replace(next);
-    Ok(carry)
 }

@@ -1,7 +1,5 @@
 //! A log through an engine: the same bits as when it was written.
 
-use std::sync::Arc;
-
 use athermal_run::live::Feed;
 
 use crate::channel::ABSENT;
@@ -13,14 +11,49 @@ use crate::time::Instant;
 /// An engine that a log is applied to.
 #[derive(Debug)]
 pub struct Replay {
-    engine: Engine,
+    running: Placed,
+    /// A graph that had been handed over, and has not taken over yet.
+    next: Option<Placed>,
     timeline: Timeline,
     feed: FeedNames,
-    /// Where each channel that the engine reads stands in the feed.
-    places: Vec<Option<usize>>,
-    samples: Vec<f64>,
     stepped: u64,
     difference: Option<Difference>,
+}
+
+/// An engine, and where what it reads stands in the feed.
+#[derive(Debug)]
+struct Placed {
+    engine: Engine,
+    places: Vec<Option<usize>>,
+    samples: Vec<f64>,
+}
+
+impl Placed {
+    fn new(engine: Engine, feed: &FeedNames) -> Self {
+        let mut placed = Self {
+            samples: Vec::new(),
+            places: Vec::new(),
+            engine,
+        };
+        placed.find(feed);
+        placed
+    }
+
+    fn find(&mut self, feed: &FeedNames) {
+        let place = |of: &Feed| {
+            let mut channels = feed.channels.iter();
+            channels.position(|(name, column)| *name == of.name && *column == of.column)
+        };
+        self.places = Feed::of(self.engine.plan()).iter().map(place).collect();
+        self.samples = vec![ABSENT; self.places.len()];
+    }
+
+    fn step(&mut self, at: Instant, row: &[f64]) -> Result<&[f64], EngineError> {
+        for (sample, place) in self.samples.iter_mut().zip(&self.places) {
+            *sample = place.map_or(ABSENT, |place| row[place]);
+        }
+        self.engine.step(at, &self.samples)
+    }
 }
 
 /// The first tick whose outputs differ from those in the log.
@@ -36,17 +69,14 @@ impl Replay {
     /// An engine at the beginning of a file of the log.
     #[must_use]
     pub fn new(engine: Engine, begin: &Begin) -> Self {
-        let mut replay = Self {
-            engine,
+        Self {
+            running: Placed::new(engine, &begin.feed),
+            next: None,
             timeline: begin.timeline(),
-            feed: FeedNames::default(),
-            places: Vec::new(),
-            samples: Vec::new(),
+            feed: begin.feed.clone(),
             stepped: 0,
             difference: None,
-        };
-        replay.find_places(&begin.feed);
-        replay
+        }
     }
 
     /// The next file begins. `has_gap`: records are missing before it, so that what waits is known from it alone.
@@ -55,8 +85,11 @@ impl Replay {
             self.timeline = begin.timeline();
         }
         if begin.feed != self.feed {
-            self.find_places(&begin.feed);
+            // What was on its way when the service ended never took over.
+            self.next = None;
+            self.feed = begin.feed.clone();
             self.timeline = begin.timeline();
+            self.running.find(&self.feed);
         }
     }
 
@@ -73,18 +106,19 @@ impl Replay {
         match record {
             Record::Tick { at, hash } | Record::Beat { at, hash } => {
                 let row = self.timeline.tick(*at);
-                for (sample, place) in self.samples.iter_mut().zip(&self.places) {
-                    *sample = place.map_or(ABSENT, |place| row[place]);
+                if let Some(next) = &mut self.next {
+                    // One that does not step is not what took over.
+                    let _ = next.step(*at, row);
                 }
-                let outputs = self.engine.step(*at, &self.samples)?;
+                let outputs = self.running.step(*at, row)?;
                 if output_hash(outputs) != *hash && self.difference.is_none() {
                     self.difference = Some(Difference { event, at: *at });
                 }
                 self.stepped += 1;
                 return Ok(true);
             }
-            Record::Break { .. } => self.engine.segment(),
-            Record::Freeze(frozen) => self.engine.freeze(*frozen),
+            Record::Break { .. } => self.for_all(Engine::segment),
+            Record::Freeze(frozen) => self.for_all(|engine| engine.freeze(*frozen)),
             _ => {}
         }
         record.apply(&mut self.timeline);
@@ -106,7 +140,7 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        &self.running.engine
     }
 
     /// What waits.
@@ -115,12 +149,21 @@ impl Replay {
         &self.timeline
     }
 
+    /// An engine as it was when it was handed over here: it is stepped along until it takes over.
+    pub fn hand_over(&mut self, mut engine: Engine) {
+        engine.freeze(self.running.engine.frozen());
+        self.next = Some(Placed::new(engine, &self.feed));
+    }
+
+    /// The engine that was handed over, if its graph is of this revision.
+    pub fn handed_over(&mut self, revision: &str) -> Option<Engine> {
+        let next = self.next.take_if(|of| of.engine.revision() == revision);
+        next.map(|of| of.engine)
+    }
+
     /// Lets another engine go on.
     pub fn replace(&mut self, engine: Engine) {
-        self.engine = engine;
-        self.difference = None;
-        let feed = std::mem::take(&mut self.feed);
-        self.find_places(&feed);
+        self.running = Placed::new(engine, &self.feed);
     }
 
     /// The channels and sources of the log.
@@ -132,17 +175,13 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn into_engine(self) -> Engine {
-        self.engine
+        self.running.engine
     }
 
-    fn find_places(&mut self, feed: &FeedNames) {
-        let plan = Arc::clone(self.engine.plan());
-        let place = |of: &Feed| {
-            let mut channels = feed.channels.iter();
-            channels.position(|(name, column)| *name == of.name && *column == of.column)
-        };
-        self.places = Feed::of(&plan).iter().map(place).collect();
-        self.samples = vec![ABSENT; self.places.len()];
-        self.feed = feed.clone();
+    fn for_all(&mut self, act: impl Fn(&mut Engine)) {
+        let next = self.next.iter_mut();
+        std::iter::once(&mut self.running)
+            .chain(next)
+            .for_each(|of| act(&mut of.engine));
     }
 }

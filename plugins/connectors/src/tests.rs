@@ -70,6 +70,7 @@ impl Folder {
             state: self.file("state"),
             is_dry: false,
             frozen: false,
+            machine: std::path::PathBuf::new(),
         };
         Ok(Service::start(&model, declared, &options)?.0)
     }

@@ -53,6 +53,10 @@ impl Events<'_> {
             ServiceEvent::NotStaged(reason) => terminal.warning(format_args!(
                 "another graph than the one that ran last was given, and cannot take over: {reason}; what ran last goes on"
             )),
+            ServiceEvent::Compared { verdict, .. } => terminal.note(swap_words::shadow(&verdict)),
+            ServiceEvent::NotTakenOver(reason) => terminal.warning(format_args!(
+                "the staged graph does not take over: {reason}; what runs goes on"
+            )),
             ServiceEvent::NoCheckpoint(error) => {
                 terminal.warning(format_args!("no checkpoint: {error}; tried again"));
             }

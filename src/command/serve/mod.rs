@@ -58,6 +58,7 @@ impl Serve {
             state: state.clone(),
             is_dry: self.dry_run,
             frozen: self.frozen,
+            machine: self.machine.clone(),
         };
         stop::listen_for_the_end();
         let started = Service::start(&model, deployment, &options);

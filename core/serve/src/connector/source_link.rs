@@ -65,6 +65,15 @@ pub struct SourceCounts {
     records: AtomicU64,
 }
 
+impl SourceCounts {
+    /// How many samples wait for the engine thread.
+    #[must_use]
+    pub fn waiting(&self) -> u64 {
+        let taken = self.taken.load(Ordering::Acquire);
+        self.given.load(Ordering::Acquire).saturating_sub(taken)
+    }
+}
+
 /// Where the samples of a channel go.
 #[derive(Debug, Clone, Copy)]
 struct FedChannel {

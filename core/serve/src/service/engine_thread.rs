@@ -217,9 +217,11 @@ impl EngineThread {
                 hurried,
                 last,
                 newest: known,
+                stamps,
                 ..
             } = &mut *snapshot;
             counts.clone_from_slice(sequencer.counts());
+            stamps.copy_from_slice(sequencer.timeline().stamps());
             *hurried = sequencer.hurried();
             *last = sequencer.timeline().last();
             *known = newest;

@@ -27,6 +27,7 @@ impl Shared {
                 happenings: 0,
                 last: Instant::MIN,
                 newest: None,
+                stamps: vec![Instant::MIN; channels],
             }),
         }
     }
@@ -53,4 +54,6 @@ pub struct Snapshot {
     pub last: Instant,
     /// The newest stamp, and the time since.
     pub newest: Option<Instant>,
+    /// The stamp of each channel's newest sample that was stepped; [`Instant::MIN`] before the first.
+    pub stamps: Vec<Instant>,
 }
