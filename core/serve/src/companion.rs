@@ -37,7 +37,7 @@ pub struct Beside {
 /// A kind of companion, as registered.
 #[derive(Debug)]
 pub struct CompanionKind {
-    /// The section of a machine file that is read for it; without the section it runs with what the section has by default.
+    /// The section of a machine file that is read for it, or `""`. Without the section it runs with what that has by default.
     pub section: &'static str,
     /// Reads the section, or reports its mistakes.
     pub read: fn(Option<&Value>, &str, &mut Diagnostics) -> Option<Box<dyn Companion>>,

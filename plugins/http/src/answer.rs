@@ -36,7 +36,11 @@ pub fn json_of(status: StatusCode, body: &Value) -> Answer {
 
 /// A text of a type.
 pub fn text(status: StatusCode, content_type: &'static str, text: String) -> Answer {
-    with_body(status, content_type, Full::from(text).boxed_unsync())
+    with_body(
+        status,
+        content_type,
+        Full::<Bytes>::from(text).boxed_unsync(),
+    )
 }
 
 /// A body of a type.

@@ -87,10 +87,12 @@ impl Address {
         let is_socket =
             |path: &&PathBuf| fs::metadata(path).is_ok_and(|of| of.file_type().is_socket());
         let found = tried.iter().find(is_socket).cloned();
-        found.map(Self::Socket).ok_or_else(|| ClientError::NoService {
-            name: name.to_owned(),
-            tried,
-        })
+        found
+            .map(Self::Socket)
+            .ok_or_else(|| ClientError::NoService {
+                name: name.to_owned(),
+                tried,
+            })
     }
 
     /// Asks for something.
@@ -119,7 +121,12 @@ impl Address {
         begun.map_err(|error| self.unreachable(error))
     }
 
-    fn request(&self, method: &str, path: &str, body: Option<&Value>) -> Result<Reply, ClientError> {
+    fn request(
+        &self,
+        method: &str,
+        path: &str,
+        body: Option<&Value>,
+    ) -> Result<Reply, ClientError> {
         let stream = self.send(method, path, body, Some(PATIENCE));
         let answered = stream.and_then(|stream| {
             let (status, rest) = begin(BufReader::new(stream))?;
@@ -144,7 +151,10 @@ impl Address {
     ) -> io::Result<Box<dyn Read>> {
         let body = body.map(ToString::to_string).unwrap_or_default();
         // Of HTTP/1.0, so that the end of the answer is the end of the connection.
-        let mut head = format!("{method} {path} HTTP/1.0\r\nContent-Length: {}\r\n", body.len());
+        let mut head = format!(
+            "{method} {path} HTTP/1.0\r\nContent-Length: {}\r\n",
+            body.len()
+        );
         let head_for = |host: &str| format!("{head}Host: {host}\r\n");
         match self {
             Self::Socket(path) => {
@@ -193,9 +203,8 @@ impl Reply {
     /// What was answered, as JSON.
     #[must_use]
     pub fn json(&self) -> Value {
-        serde_json::from_slice(&self.body).unwrap_or_else(|_| {
-            json!({ "error": String::from_utf8_lossy(&self.body) })
-        })
+        serde_json::from_slice(&self.body)
+            .unwrap_or_else(|_| json!({ "error": String::from_utf8_lossy(&self.body) }))
     }
 }
 

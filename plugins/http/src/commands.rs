@@ -1,5 +1,6 @@
 //! The commands that ask a running service. Each is a request and what is shown of the answer.
 
+use std::io::BufRead as _;
 use std::path::{Path, PathBuf};
 
 use athermal_command::{Answer, Command, Failure, Format, Terminal, println, register_command};
@@ -19,36 +20,25 @@ pub struct Service {
     token: Option<PathBuf>,
 }
 
-impl From<ClientError> for Refusal {
-    fn from(error: ClientError) -> Self {
-        Self(match error {
-            ClientError::NoService { .. } => Failure::Request(error.to_string()),
-            ClientError::Unreachable { .. } => Failure::Outside(error.to_string()),
-        })
-    }
-}
-
-/// Why a command does not do what was asked for.
-struct Refusal(Failure);
-
-impl From<Refusal> for Failure {
-    fn from(refusal: Refusal) -> Self {
-        refusal.0
+fn failed(error: ClientError) -> Failure {
+    match error {
+        ClientError::NoService { .. } => Failure::Request(error.to_string()),
+        ClientError::Unreachable { .. } => Failure::Outside(error.to_string()),
     }
 }
 
 impl Service {
     fn address(&self) -> Result<Address, Failure> {
-        Address::of(&self.service, self.token.as_deref()).map_err(|error| Refusal::from(error).0)
+        Address::of(&self.service, self.token.as_deref()).map_err(failed)
     }
 
     fn get(&self, terminal: &Terminal, path: &str) -> Result<Value, Failure> {
-        let reply = self.address()?.get(path).map_err(Refusal::from)?;
+        let reply = self.address()?.get(path).map_err(failed)?;
         answered(terminal, &reply)
     }
 
     fn post(&self, terminal: &Terminal, path: &str, body: &Value) -> Result<Value, Failure> {
-        let reply = self.address()?.post(path, body).map_err(Refusal::from)?;
+        let reply = self.address()?.post(path, body).map_err(failed)?;
         answered(terminal, &reply)
     }
 
@@ -75,7 +65,10 @@ fn answered(terminal: &Terminal, reply: &Reply) -> Result<Value, Failure> {
         return Err(Failure::Exit(2));
     }
     if let Some(text) = body["text"].as_str() {
-        terminal.warning(format!("the service refuses the graph:\n{}", text.trim_end()));
+        terminal.warning(format!(
+            "the service refuses the graph:\n{}",
+            text.trim_end()
+        ));
     }
     let words = body["error"].as_str().unwrap_or("it was refused");
     Err(Failure::Request(words.to_owned()))
@@ -99,7 +92,9 @@ fn revision(body: &Value) -> &str {
 
 /// Ask a running service how it is
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal status die-tester\n  athermal status machine.toml --format json")]
+#[command(
+    after_help = "Examples:\n  athermal status die-tester\n  athermal status machine.toml --format json"
+)]
 struct Status {
     #[command(flatten)]
     service: Service,
@@ -124,7 +119,9 @@ impl Command for Status {
 ///
 /// A line for each tick, until Ctrl-C. Whoever reads slowly misses some, which is reported; the service does not wait.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal tap die-tester\n  athermal tap die-tester --channel temperature.room --format json")]
+#[command(
+    after_help = "Examples:\n  athermal tap die-tester\n  athermal tap die-tester --channel temperature.room --format json"
+)]
 struct Tap {
     #[command(flatten)]
     service: Service,
@@ -141,15 +138,19 @@ impl Command for Tap {
         let mut path = "/v1/events?ticks=1".to_owned();
         for channel in &self.channel {
             let escaped = channel.bytes().map(|byte| match byte {
-                byte if byte.is_ascii_alphanumeric() || b"._-*".contains(&byte) => char::from(byte).to_string(),
+                byte if byte.is_ascii_alphanumeric() || b"._-*".contains(&byte) => {
+                    char::from(byte).to_string()
+                }
                 byte => format!("%{byte:02X}"),
             });
             path += "&channel=";
             path.extend(escaped);
         }
-        let (status, lines) = self.service.address()?.listen(&path).map_err(Refusal::from)?;
+        let (status, lines) = self.service.address()?.listen(&path).map_err(failed)?;
         if status != 200 {
-            return Err(Failure::Request(format!("the service refuses that ({status})")));
+            return Err(Failure::Request(format!(
+                "the service refuses that ({status})"
+            )));
         }
         let (mut event, mut ticks) = (String::new(), 0);
         for line in lines.lines() {
@@ -179,7 +180,9 @@ impl Command for Tap {
 /// The service makes it ready: nodes that mean the same go on as they were, the others are warmed by the past. What runs goes on until
 /// it is committed. All mistakes of the graph are reported with their places, and what runs is untouched.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal swap die-tester new.toml\n  athermal swap die-tester new.json --shadow 30min --margin 2% --commit")]
+#[command(
+    after_help = "Examples:\n  athermal swap die-tester new.toml\n  athermal swap die-tester new.json --shadow 30min --margin 2% --commit"
+)]
 struct Swap {
     #[command(flatten)]
     service: Service,
@@ -197,9 +200,13 @@ struct Swap {
 }
 
 fn percent(text: &str) -> Result<f64, String> {
-    let number = text.strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
+    let number = text
+        .strip_suffix('%')
+        .and_then(|number| number.trim().parse::<f64>().ok());
     let number = number.filter(|number| (0.0..1e5).contains(number));
-    number.map(|of| of / 100.0).ok_or_else(|| "give a percentage of 0 or more, such as 5%".to_owned())
+    number
+        .map(|of| of / 100.0)
+        .ok_or_else(|| "give a percentage of 0 or more, such as 5%".to_owned())
 }
 
 impl Command for Swap {
@@ -214,11 +221,14 @@ impl Command for Swap {
         }
         let next = match &self.shadow {
             Some(duration) => {
-                let order = json!({ "duration": duration, "margin": self.margin, "commit": self.commit });
+                let order =
+                    json!({ "duration": duration, "margin": self.margin, "commit": self.commit });
                 self.service.post(terminal, "/v1/shadow", &order)?;
                 let then = match self.commit {
                     true => "it takes over then, if it is no worse",
-                    false => "`athermal status` shows the comparison, `athermal commit` lets it take over",
+                    false => {
+                        "`athermal status` shows the comparison, `athermal commit` lets it take over"
+                    }
                 };
                 format!("in the shadow for {duration}; {then}")
             }
@@ -226,7 +236,8 @@ impl Command for Swap {
                 self.service.post(terminal, "/v1/commit", &json!({}))?;
                 "it takes over before the next tick; `athermal rollback` takes it back".to_owned()
             }
-            None => "staged; `athermal commit` lets it take over, `athermal discard` lets it go".to_owned(),
+            None => "staged; `athermal commit` lets it take over, `athermal discard` lets it go"
+                .to_owned(),
         };
         staged["next"] = json!(next);
         show(terminal, &staged, || next)

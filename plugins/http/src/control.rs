@@ -27,7 +27,9 @@ const PATIENCE: Wait = Wait::from_secs(10);
 
 impl Companion for Control {
     fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
-        let failed = |what: String| move |error: io::Error| ConnectorError::new(format!("[control] {what}: {error}"));
+        let failed = |what: String| {
+            move |error: io::Error| ConnectorError::new(format!("[control] {what}: {error}"))
+        };
         let (path, unix) = self.socket(beside)?;
         let tcp = self.http.map(|of| {
             let listener = TcpListener::bind(of.0).map_err(failed(of.0.to_string()))?;
@@ -36,13 +38,18 @@ impl Companion for Control {
         });
         let tcp = tcp.transpose()?;
         // Whoever asks finds the socket by the state folder, wherever it is.
-        let noted = fs::write(beside.state.join("socket"), path.as_os_str().as_encoded_bytes());
+        let noted = fs::write(
+            beside.state.join("socket"),
+            path.as_os_str().as_encoded_bytes(),
+        );
         noted.map_err(failed("socket".to_owned()))?;
         let hub = Arc::new(Hub::default());
         let looker = Looker::new(Arc::clone(&hub));
         let handle = beside.handle.clone();
         // The service answers once it is pumped, which is after this.
-        std::thread::spawn(move || handle.ask(PATIENCE, move |service| service.observe(Box::new(looker))));
+        std::thread::spawn(move || {
+            handle.ask(PATIENCE, move |service| service.observe(Box::new(looker)))
+        });
         let routes = Routes::new(beside.clone(), hub);
         let doors = Doors { unix, tcp, path };
         let server = Server::start(doors, routes).map_err(failed("thread".to_owned()))?;

@@ -90,7 +90,13 @@ mod tests {
 
     #[test]
     fn only_literal_names_of_the_machine_itself_are_hosts() {
-        for host in ["127.0.0.1", "127.0.0.1:9464", "[::1]:1", "localhost", "localhost:80"] {
+        for host in [
+            "127.0.0.1",
+            "127.0.0.1:9464",
+            "[::1]:1",
+            "localhost",
+            "localhost:80",
+        ] {
             assert!(is_loopback(host), "{host}");
         }
         for host in [

@@ -119,15 +119,16 @@ impl Inner {
         }
         let item = Arc::new(item());
         let dropped = &mut self.known.dropped;
-        self.listeners.retain(|(to, count)| match to.try_send(Arc::clone(&item)) {
-            Ok(()) => true,
-            Err(mpsc::error::TrySendError::Full(_)) => {
-                count.fetch_add(1, Ordering::Relaxed);
-                *dropped += 1;
-                true
-            }
-            Err(mpsc::error::TrySendError::Closed(_)) => false,
-        });
+        self.listeners
+            .retain(|(to, count)| match to.try_send(Arc::clone(&item)) {
+                Ok(()) => true,
+                Err(mpsc::error::TrySendError::Full(_)) => {
+                    count.fetch_add(1, Ordering::Relaxed);
+                    *dropped += 1;
+                    true
+                }
+                Err(mpsc::error::TrySendError::Closed(_)) => false,
+            });
     }
 }
 
@@ -176,7 +177,9 @@ impl Observer for Looker {
                 at,
                 revision: engine.revision().to_owned(),
                 outputs: engine.outputs().to_vec(),
-                values: (0..plan.channels.len()).map(|slot| engine.value(slot)).collect(),
+                values: (0..plan.channels.len())
+                    .map(|slot| engine.value(slot))
+                    .collect(),
                 plan,
             })
         });
@@ -187,7 +190,10 @@ fn look_at_novelty(novelty: &mut Vec<(String, f64)>, engine: &Engine) {
     use athermal_core::compile::PlannedRole::Estimator;
     let nodes = engine.plan().nodes.iter();
     let given = nodes.filter_map(|node| match &node.role {
-        Estimator { novelty: Some(slot), .. } => Some((node, *slot)),
+        Estimator {
+            novelty: Some(slot),
+            ..
+        } => Some((node, *slot)),
         _ => None,
     });
     let mut count = 0;

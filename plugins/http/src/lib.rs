@@ -22,16 +22,18 @@ mod guard;
 mod hub;
 mod metrics;
 mod prediction_error;
+mod reload;
 mod routes;
 mod server;
-mod shown;
 pub mod settings;
+mod shown;
 mod stage;
 mod status;
 mod stream;
 mod token;
 mod words;
 
+pub use reload::reload;
 pub use routes::{OPENAPI, ROUTES};
 
 #[cfg(test)]

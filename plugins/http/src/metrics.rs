@@ -54,7 +54,10 @@ impl Page {
 }
 
 fn escaped(label: &str) -> String {
-    label.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
+    label
+        .replace('\\', "\\\\")
+        .replace('"', "\\\"")
+        .replace('\n', "\\n")
 }
 
 fn number(value: f64) -> String {
@@ -108,7 +111,11 @@ fn ticks(page: &mut Page, service: &Service, known: &Known) {
         "Time since the service started.",
         Some(service.uptime().as_secs_f64()),
     );
-    page.counter("athermal_ticks_total", "Ticks since the service started.", known.ticks);
+    page.counter(
+        "athermal_ticks_total",
+        "Ticks since the service started.",
+        known.ticks,
+    );
     page.counter(
         "athermal_missed_ticks_total",
         "Ticks that the control thread missed.",
@@ -184,26 +191,80 @@ fn connectors(page: &mut Page, service: &Service) {
     }
     type Source = std::sync::Arc<athermal_serve::connector::SourceCounts>;
     let sources = service.sources();
-    each!(sources, "source", "athermal_source_samples_total", "counter", "Samples that a source gave.",
-        |of: &Source| of.given.load(Ordering::Relaxed));
-    each!(sources, "source", "athermal_source_dropped_samples_total", "counter",
-        "Samples of a source that there was no room for.", |of: &Source| of.dropped.load(Ordering::Relaxed));
-    each!(sources, "source", "athermal_source_restarts_total", "counter",
-        "How often a source was started again after a failure.", |of: &Source| of.restarts.load(Ordering::Relaxed));
-    each!(sources, "source", "athermal_source_queue_length", "gauge",
-        "Samples that wait for the engine thread.", |of: &Source| of.waiting());
+    each!(
+        sources,
+        "source",
+        "athermal_source_samples_total",
+        "counter",
+        "Samples that a source gave.",
+        |of: &Source| of.given.load(Ordering::Relaxed)
+    );
+    each!(
+        sources,
+        "source",
+        "athermal_source_dropped_samples_total",
+        "counter",
+        "Samples of a source that there was no room for.",
+        |of: &Source| of.dropped.load(Ordering::Relaxed)
+    );
+    each!(
+        sources,
+        "source",
+        "athermal_source_restarts_total",
+        "counter",
+        "How often a source was started again after a failure.",
+        |of: &Source| of.restarts.load(Ordering::Relaxed)
+    );
+    each!(
+        sources,
+        "source",
+        "athermal_source_queue_length",
+        "gauge",
+        "Samples that wait for the engine thread.",
+        |of: &Source| of.waiting()
+    );
     type Sink = std::sync::Arc<athermal_serve::service::SinkCounts>;
     let sinks = service.sinks();
-    each!(sinks, "sink", "athermal_sink_rows_total", "counter", "Rows that a sink put out.",
-        |of: &Sink| of.put.load(Ordering::Relaxed));
-    each!(sinks, "sink", "athermal_sink_dropped_rows_total", "counter",
-        "Rows that a sink was too far behind for.", |of: &Sink| of.dropped.load(Ordering::Relaxed));
-    each!(sinks, "sink", "athermal_sink_old_commands_total", "counter",
-        "Commands that were not sent because they were too old.", |of: &Sink| of.behind.load(Ordering::Relaxed));
-    each!(sinks, "sink", "athermal_sink_failures_total", "counter", "How often a sink failed.",
-        |of: &Sink| of.failures.load(Ordering::Relaxed));
-    each!(sinks, "sink", "athermal_sink_queue_length", "gauge", "Rows that wait for a sink.",
-        |of: &Sink| of.waiting());
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_rows_total",
+        "counter",
+        "Rows that a sink put out.",
+        |of: &Sink| of.put.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_dropped_rows_total",
+        "counter",
+        "Rows that a sink was too far behind for.",
+        |of: &Sink| of.dropped.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_old_commands_total",
+        "counter",
+        "Commands that were not sent because they were too old.",
+        |of: &Sink| of.behind.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_failures_total",
+        "counter",
+        "How often a sink failed.",
+        |of: &Sink| of.failures.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_queue_length",
+        "gauge",
+        "Rows that wait for a sink.",
+        |of: &Sink| of.waiting()
+    );
 }
 
 fn predictions(page: &mut Page, known: &Known) {
@@ -228,14 +289,26 @@ fn predictions(page: &mut Page, known: &Known) {
 
 fn kept(page: &mut Page, service: &Service, known: &Known) {
     let journal = service.journal();
-    page.counter("athermal_journal_records_total", "Records that were written.", journal.written);
+    page.counter(
+        "athermal_journal_records_total",
+        "Records that were written.",
+        journal.written,
+    );
     page.gauge(
         "athermal_journal_unsynced_records",
         "Records that are written and not on the disk yet.",
         Some(journal.written.saturating_sub(journal.synced) as f64),
     );
-    page.counter("athermal_journal_lost_records_total", "Records that were never written.", journal.lost);
-    page.counter("athermal_journal_failures_total", "How often writing failed.", journal.failures);
+    page.counter(
+        "athermal_journal_lost_records_total",
+        "Records that were never written.",
+        journal.lost,
+    );
+    page.counter(
+        "athermal_journal_failures_total",
+        "How often writing failed.",
+        journal.failures,
+    );
     page.gauge(
         "athermal_journal_degraded",
         "1 while the service goes on without its journal.",
@@ -256,7 +329,11 @@ fn kept(page: &mut Page, service: &Service, known: &Known) {
 }
 
 fn model(page: &mut Page, service: &Service, known: &Known, created: Option<&str>) {
-    page.counter("athermal_swaps_total", "Graphs that took over since the start.", known.swaps);
+    page.counter(
+        "athermal_swaps_total",
+        "Graphs that took over since the start.",
+        known.swaps,
+    );
     page.counter(
         "athermal_refused_swaps_total",
         "Graphs that were to take over and did not.",

@@ -73,7 +73,9 @@ impl PredictionError {
         if predicted.is_nan() {
             return;
         }
-        let passed = self.last.map_or(0.0, |last| (now - last).as_ns() as f64 / 1e9);
+        let passed = self
+            .last
+            .map_or(0.0, |last| (now - last).as_ns() as f64 / 1e9);
         self.last = Some(now);
         let kept = 0.5_f64.powf(passed / HALF_LIFE_S);
         self.squares = self.squares * kept + (predicted - truth).powi(2);
@@ -90,7 +92,9 @@ fn predictions(plan: &Plan) -> Vec<PredictionError> {
             slot: truth_slot,
             ahead: channel.channel.ahead,
             span: truth.channel.span,
-            limit: own.map(|link| link.limit).or(truth.channel.default_max_age())?,
+            limit: own
+                .map(|link| link.limit)
+                .or(truth.channel.default_max_age())?,
         };
         Some(PredictionError {
             name: channel.name.clone(),
@@ -103,5 +107,9 @@ fn predictions(plan: &Plan) -> Vec<PredictionError> {
             last: None,
         })
     };
-    plan.channels.iter().enumerate().filter_map(prediction).collect()
+    plan.channels
+        .iter()
+        .enumerate()
+        .filter_map(prediction)
+        .collect()
 }

@@ -31,7 +31,7 @@ use crate::stream::{Life, Stream, Wanted};
 pub const OPENAPI: &str = include_str!("openapi.json");
 
 /// All that is answered: method and path.
-pub const ROUTES: [(&str, &str); 16] = [
+pub static ROUTES: [(&str, &str); 16] = [
     ("GET", "/v1/status"),
     ("GET", "/v1/channels"),
     ("GET", "/v1/outputs"),
@@ -107,20 +107,26 @@ impl Routes {
         if parts.method.as_str() != *method {
             let words = format!("this takes {method}");
             let mut answer = Answer::from(Refused::new(StatusCode::METHOD_NOT_ALLOWED, &words));
-            answer.headers_mut().insert(ALLOW, HeaderValue::from_static(method));
+            answer
+                .headers_mut()
+                .insert(ALLOW, HeaderValue::from_static(method));
             return Ok(answer);
         }
         if parts.method == Method::GET {
-            return self.get(path, parts.uri.query().unwrap_or_default(), life).await;
+            return self
+                .get(path, parts.uri.query().unwrap_or_default(), life)
+                .await;
         }
         let body = tokio::time::timeout(BODY_TIME, Limited::new(body, BODY).collect());
-        let body = body.await.map_err(|_| {
-            Refused::new(StatusCode::REQUEST_TIMEOUT, "the body takes too long")
-        })?;
-        let body = body.map_err(|error| match error.is::<http_body_util::LengthLimitError>() {
-            true => Refused::new(StatusCode::PAYLOAD_TOO_LARGE, "a body has at most 8 MB"),
-            false => not_understood("the body ends before its end"),
-        })?;
+        let body = body
+            .await
+            .map_err(|_| Refused::new(StatusCode::REQUEST_TIMEOUT, "the body takes too long"))?;
+        let body = body.map_err(
+            |error| match error.is::<http_body_util::LengthLimitError>() {
+                true => Refused::new(StatusCode::PAYLOAD_TOO_LARGE, "a body has at most 8 MB"),
+                false => not_understood("the body ends before its end"),
+            },
+        )?;
         self.post(path, &body.to_bytes(), peer.name()).await
     }
 
@@ -146,13 +152,15 @@ impl Routes {
             }
             "/v1/status" => {
                 let (name, known) = (self.beside.name.clone(), self.hub.known());
-                self.ask(move |service| status::status(&name, service, &known)).await?
+                self.ask(move |service| status::status(&name, service, &known))
+                    .await?
             }
-            "/v1/channels" => self.ask(|service| status::channels(service)).await?,
-            "/v1/outputs" => self.ask(|service| status::outputs(service)).await?,
+            "/v1/channels" => self.ask(status::channels).await?,
+            "/v1/outputs" => self.ask(status::outputs).await?,
             _ => {
                 let known = self.hub.known();
-                self.ask(move |service| status::nodes(service, &known)).await?
+                self.ask(move |service| status::nodes(service, &known))
+                    .await?
             }
         };
         Ok(json_of(StatusCode::OK, &body))
@@ -204,7 +212,9 @@ impl Routes {
             "/v1/rollback" => {
                 let rollback = move |service: &mut Service| {
                     let previous = service.previous().map(|of| of.revision().to_owned());
-                    service.rollback(&by).map(|()| json!({ "revision": previous }))
+                    service
+                        .rollback(&by)
+                        .map(|()| json!({ "revision": previous }))
                 };
                 self.swapped(rollback).await?
             }
@@ -306,7 +316,11 @@ fn wanted(query: &str) -> Result<Wanted, Refused> {
                 wanted.ticks = true;
                 wanted.channels.push(decoded(name)?);
             }
-            _ => return Err(not_understood("`ticks=1` and `channel=NAME` are what there is")),
+            _ => {
+                return Err(not_understood(
+                    "`ticks=1` and `channel=NAME` are what there is",
+                ));
+            }
         }
     }
     Ok(wanted)

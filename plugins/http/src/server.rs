@@ -157,7 +157,9 @@ fn open<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
             let _ = stream.write_all(text.as_bytes()).await;
         };
         // It fits the buffer of any socket; whoever does not take it is not waited for.
-        tokio::spawn(async { tokio::time::timeout(Duration::from_millis(100), refusal).await });
+        tokio::spawn(async move {
+            let _ = tokio::time::timeout(Duration::from_millis(100), refusal).await;
+        });
         return;
     }
     door.fetch_add(1, Ordering::Relaxed);

@@ -14,7 +14,9 @@ fn text(value: &Value) -> String {
 }
 
 fn seconds(value: &Value) -> String {
-    value.as_f64().map_or_else(|| "none".to_owned(), |of| format!("{of:.1} s"))
+    value
+        .as_f64()
+        .map_or_else(|| "none".to_owned(), |of| format!("{of:.1} s"))
 }
 
 /// How a service is.
@@ -29,7 +31,10 @@ pub fn status(of: &Value) -> String {
     let _ = writeln!(
         all,
         "{} ticks since the start, the last one {} behind; checkpoint after {} of {}",
-        of["ticks"], seconds(&of["behind_s"]), of["last_checkpoint"], of["happenings"]
+        of["ticks"],
+        seconds(&of["behind_s"]),
+        of["last_checkpoint"],
+        of["happenings"]
     );
     if of["frozen"] == true {
         all += "learning is frozen\n";
@@ -41,7 +46,11 @@ pub fn status(of: &Value) -> String {
         let _ = writeln!(
             all,
             "in the shadow: {}, error relative to what runs {}",
-            if of["verdict"]["over"] == true { "over" } else { "under way" },
+            if of["verdict"]["over"] == true {
+                "over"
+            } else {
+                "under way"
+            },
             text(&of["verdict"]["ratio"])
         );
     }
@@ -50,10 +59,18 @@ pub fn status(of: &Value) -> String {
     }
     let journal = &of["journal"];
     if journal["is_degraded"] == true {
-        let _ = writeln!(all, "the journal cannot be written: {}", text(&journal["error"]));
+        let _ = writeln!(
+            all,
+            "the journal cannot be written: {}",
+            text(&journal["error"])
+        );
     }
     if journal["lost"] != 0 {
-        let _ = writeln!(all, "{} records were never written to the journal", journal["lost"]);
+        let _ = writeln!(
+            all,
+            "{} records were never written to the journal",
+            journal["lost"]
+        );
     }
     for panic in of["given_up"].as_array().into_iter().flatten() {
         let _ = writeln!(all, "given up: {}", text(panic));
@@ -62,24 +79,37 @@ pub fn status(of: &Value) -> String {
         let _ = writeln!(
             all,
             "source {}: {} samples, {} wait, {} dropped, {} restarts",
-            text(&source["source"]), source["given"], source["waiting"], source["dropped"], source["restarts"]
+            text(&source["source"]),
+            source["given"],
+            source["waiting"],
+            source["dropped"],
+            source["restarts"]
         );
     }
     for sink in of["sinks"].as_array().into_iter().flatten() {
         let _ = writeln!(
             all,
             "sink {}: {} rows, {} wait, {} dropped, {} too old, {} failures",
-            text(&sink["sink"]), sink["put"], sink["waiting"], sink["dropped"], sink["behind"], sink["failures"]
+            text(&sink["sink"]),
+            sink["put"],
+            sink["waiting"],
+            sink["dropped"],
+            sink["behind"],
+            sink["failures"]
         );
     }
     for channel in of["channels"].as_array().into_iter().flatten() {
         let left_out = ["late", "repeated", "future", "clock"];
         let left_out = left_out.iter().filter(|why| channel[**why] != 0);
-        let left_out: Vec<_> = left_out.map(|why| format!("{} {why}", channel[*why])).collect();
+        let left_out: Vec<_> = left_out
+            .map(|why| format!("{} {why}", channel[*why]))
+            .collect();
         let _ = write!(
             all,
             "{}: {} samples, age {}",
-            text(&channel["channel"]), channel["accepted"], seconds(&channel["age_s"])
+            text(&channel["channel"]),
+            channel["accepted"],
+            seconds(&channel["age_s"])
         );
         match left_out.is_empty() {
             true => all += "\n",
@@ -100,7 +130,15 @@ pub fn item(event: &str, data: &Value) -> String {
             let mut line = text(&data["time_s"]);
             for part in ["outputs", "channels"] {
                 for (name, value) in data[part].as_object().into_iter().flatten() {
-                    let _ = write!(line, "  {name}={}", if value.is_null() { "-".to_owned() } else { value.to_string() });
+                    let _ = write!(
+                        line,
+                        "  {name}={}",
+                        if value.is_null() {
+                            "-".to_owned()
+                        } else {
+                            value.to_string()
+                        }
+                    );
                 }
             }
             line
@@ -115,14 +153,22 @@ pub fn staged(path: &Path, of: &Value) -> String {
     let nodes = of["nodes"].as_array().map_or(&[][..], Vec::as_slice);
     let mut all = format!(
         "{} (revision {}): {} of {} nodes go on as they were",
-        path.display(), text(&of["revision"]), of["carried"], nodes.len()
+        path.display(),
+        text(&of["revision"]),
+        of["carried"],
+        nodes.len()
     );
     for node in nodes {
         let Some(reason) = reason(node) else { continue };
         let _ = write!(all, "\n  {}: {reason}", text(&node["node"]));
     }
     for silent in of["silent"].as_array().into_iter().flatten() {
-        let _ = write!(all, "\n  {} had no value over the past {}", text(silent), seconds(&of["past_s"]));
+        let _ = write!(
+            all,
+            "\n  {} had no value over the past {}",
+            text(silent),
+            seconds(&of["past_s"])
+        );
     }
     all
 }

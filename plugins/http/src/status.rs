@@ -14,12 +14,16 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
     let snapshot = service.snapshot();
     let journal = service.journal();
     let running = service.running();
-    let panics: Vec<_> = running.map_or(&[][..], Engine::panics).iter().map(ToString::to_string).collect();
-    let state = match () {
-        () if journal.is_degraded || !panics.is_empty() || running.is_none() => "degraded",
-        () => "running",
-    };
-    let staged = service.staged().map(|of| json!({ "revision": of.revision(), "nodes": of.carry() }));
+    let panics: Vec<_> = running
+        .map_or(&[][..], Engine::panics)
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let is_degraded = journal.is_degraded || !panics.is_empty() || running.is_none();
+    let state = if is_degraded { "degraded" } else { "running" };
+    let staged = service
+        .staged()
+        .map(|of| json!({ "revision": of.revision(), "nodes": of.carry() }));
     json!({
         "name": name,
         "version": env!("CARGO_PKG_VERSION"),
@@ -56,17 +60,18 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
 pub fn channels(service: &mut Service) -> Value {
     let snapshot = service.snapshot();
     let counts = snapshot.counts.iter().zip(&snapshot.stamps);
-    let channel = |(name, (of, stamp)): (&String, (&athermal_serve::sequencer::Counts, &Instant))| {
-        json!({
-            "channel": name,
-            "accepted": of.accepted,
-            "late": of.late,
-            "repeated": of.twice,
-            "future": of.future,
-            "clock": of.clock,
-            "age_s": age_s(snapshot.newest, *stamp),
-        })
-    };
+    let channel =
+        |(name, (of, stamp)): (&String, (&athermal_serve::sequencer::Counts, &Instant))| {
+            json!({
+                "channel": name,
+                "accepted": of.accepted,
+                "late": of.late,
+                "repeated": of.twice,
+                "future": of.future,
+                "clock": of.clock,
+                "age_s": age_s(snapshot.newest, *stamp),
+            })
+        };
     let all: Vec<_> = service.channels().iter().zip(counts).map(channel).collect();
     json!({ "channels": all })
 }
@@ -97,8 +102,15 @@ pub fn nodes(service: &mut Service, known: &Known) -> Value {
         let node = |node: &athermal_core::compile::PlannedNode| {
             let instance = node.instance();
             let novelty = known.novelty.iter().find(|(name, _)| *name == instance);
-            let channels: Vec<_> = node.slots.clone().map(|slot| &*plan.channels[slot].name).collect();
-            let errors = known.errors.iter().filter(|of| channels.contains(&&*of.name));
+            let channels: Vec<_> = node
+                .slots
+                .clone()
+                .map(|slot| &*plan.channels[slot].name)
+                .collect();
+            let errors = known
+                .errors
+                .iter()
+                .filter(|of| channels.contains(&&*of.name));
             let errors: Vec<_> = errors
                 .map(|of| json!({ "prediction": of.name, "unit": of.unit, "rmse": of.rmse() }))
                 .collect();
@@ -115,7 +127,10 @@ pub fn nodes(service: &mut Service, known: &Known) -> Value {
 }
 
 fn sources(service: &Service) -> Vec<Value> {
-    let source = |(name, of): &(String, std::sync::Arc<athermal_serve::connector::SourceCounts>)| {
+    let source = |(name, of): &(
+        String,
+        std::sync::Arc<athermal_serve::connector::SourceCounts>,
+    )| {
         json!({
             "source": name,
             "given": of.given.load(Ordering::Relaxed),

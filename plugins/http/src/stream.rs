@@ -137,7 +137,9 @@ fn message(event: &str, data: &Value) -> String {
 /// A tick, with its outputs and the channels that are asked for. What is absent is null.
 fn tick_json(tick: &Tick, channels: &[String]) -> Value {
     let outputs = tick.plan.outputs.iter().zip(&tick.outputs);
-    let outputs: Map<_, _> = outputs.map(|(of, value)| (of.name.clone(), json!(value))).collect();
+    let outputs: Map<_, _> = outputs
+        .map(|(of, value)| (of.name.clone(), json!(value)))
+        .collect();
     let mut all = json!({
         "time_s": tick.at.as_ns() as f64 / 1e9,
         "time_ns": tick.at.as_ns(),
@@ -148,7 +150,9 @@ fn tick_json(tick: &Tick, channels: &[String]) -> Value {
         let is_wanted = |name: &str| channels.iter().any(|of| of == "*" || of == name);
         let known = tick.plan.channels.iter().zip(&tick.values);
         let wanted = known.filter(|(of, _)| is_wanted(&of.name));
-        let wanted: Map<_, _> = wanted.map(|(of, value)| (of.name.clone(), json!(value))).collect();
+        let wanted: Map<_, _> = wanted
+            .map(|(of, value)| (of.name.clone(), json!(value)))
+            .collect();
         all["channels"] = Value::Object(wanted);
     }
     all

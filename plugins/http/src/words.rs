@@ -74,7 +74,9 @@ pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
             "compared",
             json!({ "revision": revision, "verdict": verdict }),
             match verdict.ratio {
-                Some(ratio) => format!("{revision} in the shadow: its error is {ratio:.3} times that of what runs"),
+                Some(ratio) => format!(
+                    "{revision} in the shadow: its error is {ratio:.3} times that of what runs"
+                ),
                 None => format!("{revision} in the shadow: there was nothing to compare"),
             },
         ),
@@ -83,9 +85,11 @@ pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
             Value::Null,
             format!("the staged graph does not take over: {reason}"),
         ),
-        ServiceEvent::NoCheckpoint(error) => {
-            ("no_checkpoint", Value::Null, format!("no checkpoint: {error}"))
-        }
+        ServiceEvent::NoCheckpoint(error) => (
+            "no_checkpoint",
+            Value::Null,
+            format!("no checkpoint: {error}"),
+        ),
         ServiceEvent::Journal(status) => (
             "journal",
             json!({ "is_degraded": status.is_degraded, "lost": status.lost }),

@@ -371,6 +371,11 @@ impl Service {
         self.is_asked_to_end = true;
     }
 
+    /// Reports something that happened, as if it had happened here.
+    pub fn report(&mut self, event: ServiceEvent) {
+        self.own.push(event);
+    }
+
     /// To ask it from other threads.
     #[must_use]
     pub fn handle(&self) -> ServiceHandle {

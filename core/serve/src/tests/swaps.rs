@@ -334,7 +334,7 @@ fn what_took_over_goes_on_after_a_restart_with_the_same_file_and_another_file_ta
         next.revision().unwrap()
     );
     service.stop().unwrap();
-    let third = GRAPH.replace("\"1min\"", "\"2min\"");
+    let third = GRAPH.replace("max_age = \"3s\"", "max_age = \"4s\"");
     let mut service = bench.start(&third);
     let revision = bench.model(&third).revision().unwrap();
     assert_eq!(took_over(&bench.more(&mut service, 50)), [revision]);
