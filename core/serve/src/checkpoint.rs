@@ -116,6 +116,14 @@ impl Checkpoints {
         Ok(())
     }
 
+    /// Removes those taken before so many ticks, beats, breaks and freezes. One that stays does no harm.
+    pub fn forget(&self, happenings: u64) {
+        let files = self.files().unwrap_or_default();
+        for (_, path) in files.iter().filter(|(of, _)| *of < happenings) {
+            let _ = fs::remove_file(path);
+        }
+    }
+
     /// All that can be used, newest first, and why others cannot.
     ///
     /// # Errors
@@ -128,32 +136,12 @@ impl Checkpoints {
         Ok(newest_first.map(|(_, path)| Checkpoint::read(&path)))
     }
 
-    /// Those that were taken after so many ticks, beats, breaks and freezes or more, oldest first. One that cannot be read is left out.
-    ///
-    /// # Errors
-    /// When the folder cannot be read.
-    pub fn read_after(&self, happenings: u64) -> Result<Vec<Checkpoint>, CheckpointError> {
-        if !self.folder.exists() {
-            return Ok(Vec::new());
+    /// Removes those that were taken after more than so many ticks, beats, breaks and freezes.
+    pub fn remove_after(&self, happenings: u64) {
+        let files = self.files().unwrap_or_default();
+        for (_, path) in files.iter().filter(|(of, _)| *of > happenings) {
+            let _ = fs::remove_file(path);
         }
-        let files = self.files()?.into_iter();
-        let files = files.filter(|(of, _)| *of >= happenings);
-        Ok(files
-            .filter_map(|(_, path)| Checkpoint::read(&path).ok())
-            .collect())
-    }
-
-    /// Removes those that were taken after more than so many.
-    ///
-    /// # Errors
-    /// When the folder cannot be read.
-    pub fn remove_after(&self, happenings: u64) -> Result<(), CheckpointError> {
-        for (of, path) in self.files()? {
-            if of > happenings {
-                let _ = fs::remove_file(path);
-            }
-        }
-        Ok(())
     }
 
     /// After how many ticks, beats, breaks and freezes the oldest one was taken: the journal is needed from there.

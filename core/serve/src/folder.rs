@@ -14,10 +14,6 @@ use crate::checkpoint::Checkpoints;
 /// How long a process that is ending is waited for.
 const ENDS: Wait = Wait::from_secs(1);
 
-/// Where graphs are kept as they were when they were handed over, and how many of them.
-const HANDOVERS: &str = "handovers";
-const KEPT: usize = 64;
-
 /// The state folder of a service. It is locked for as long as this lives; the lock goes with the process, however it ends.
 #[derive(Debug)]
 pub struct StateFolder {
@@ -83,7 +79,7 @@ impl StateFolder {
             folder.journal(),
             folder.checkpoints(),
             folder.models(),
-            folder.path().join(HANDOVERS),
+            folder.swaps(),
         ];
         for part in parts {
             fs::create_dir_all(&part).map_err(not_written(&part))?;
@@ -117,10 +113,22 @@ impl StatePaths {
         self.0.join("checkpoints")
     }
 
-    /// Graphs as they were when they were handed over to the engine thread, so that a replay hands over the same bits.
+    /// Where models are.
     #[must_use]
-    pub fn handovers(&self) -> Checkpoints {
-        Checkpoints::new(self.0.join(HANDOVERS), KEPT)
+    pub fn models(&self) -> PathBuf {
+        self.0.join("models")
+    }
+
+    /// Where graphs are as they were when they were committed: what a replay lets take over.
+    #[must_use]
+    pub fn swaps(&self) -> PathBuf {
+        self.0.join("swaps")
+    }
+
+    /// Graphs as they were when they were committed; all are kept that the journal goes back to.
+    #[must_use]
+    pub fn commits(&self) -> Checkpoints {
+        Checkpoints::new(self.swaps(), usize::MAX)
     }
 
     /// The revision of the graph that the service was given last and ran; none where that is not known.
@@ -135,12 +143,6 @@ impl StatePaths {
     /// When it cannot be written.
     pub fn note_given(&self, revision: &str) -> io::Result<()> {
         write_whole(&self.0.join("given"), revision.as_bytes())
-    }
-
-    /// Where models are.
-    #[must_use]
-    pub fn models(&self) -> PathBuf {
-        self.0.join("models")
     }
 
     /// Keeps a model by its revision, so that a checkpoint of it is of use.

@@ -3,6 +3,7 @@
 use athermal_run::live::Feed;
 
 use crate::channel::ABSENT;
+use crate::compile::PlannedOutput;
 use crate::engine::{Engine, EngineError};
 use crate::journal::{Begin, FeedNames, Record, output_hash};
 use crate::sequencer::Timeline;
@@ -11,35 +12,36 @@ use crate::time::Instant;
 /// An engine that a log is applied to.
 #[derive(Debug)]
 pub struct Replay {
-    running: Placed,
-    /// A graph that had been handed over, and has not taken over yet.
-    next: Option<Placed>,
+    runs: Fed,
+    /// Engines that may take over, and see all that the one that runs does.
+    beside: Vec<Fed>,
     timeline: Timeline,
     feed: FeedNames,
     stepped: u64,
     difference: Option<Difference>,
 }
 
-/// An engine, and where what it reads stands in the feed.
+/// An engine, and what it is given.
 #[derive(Debug)]
-struct Placed {
+struct Fed {
     engine: Engine,
+    /// Where each channel that the engine reads stands in the feed.
     places: Vec<Option<usize>>,
     samples: Vec<f64>,
 }
 
-impl Placed {
+impl Fed {
     fn new(engine: Engine, feed: &FeedNames) -> Self {
-        let mut placed = Self {
-            samples: Vec::new(),
-            places: Vec::new(),
+        let mut fed = Self {
             engine,
+            places: Vec::new(),
+            samples: Vec::new(),
         };
-        placed.find(feed);
-        placed
+        fed.find_places(feed);
+        fed
     }
 
-    fn find(&mut self, feed: &FeedNames) {
+    fn find_places(&mut self, feed: &FeedNames) {
         let place = |of: &Feed| {
             let mut channels = feed.channels.iter();
             channels.position(|(name, column)| *name == of.name && *column == of.column)
@@ -70,8 +72,8 @@ impl Replay {
     #[must_use]
     pub fn new(engine: Engine, begin: &Begin) -> Self {
         Self {
-            running: Placed::new(engine, &begin.feed),
-            next: None,
+            runs: Fed::new(engine, &begin.feed),
+            beside: Vec::new(),
             timeline: begin.timeline(),
             feed: begin.feed.clone(),
             stepped: 0,
@@ -85,11 +87,9 @@ impl Replay {
             self.timeline = begin.timeline();
         }
         if begin.feed != self.feed {
-            // What was on its way when the service ended never took over.
-            self.next = None;
-            self.feed = begin.feed.clone();
+            self.feed.clone_from(&begin.feed);
+            self.all().for_each(|fed| fed.find_places(&begin.feed));
             self.timeline = begin.timeline();
-            self.running.find(&self.feed);
         }
     }
 
@@ -106,19 +106,16 @@ impl Replay {
         match record {
             Record::Tick { at, hash } | Record::Beat { at, hash } => {
                 let row = self.timeline.tick(*at);
-                if let Some(next) = &mut self.next {
-                    // One that does not step is not what took over.
-                    let _ = next.step(*at, row);
-                }
-                let outputs = self.running.step(*at, row)?;
+                self.beside.retain_mut(|fed| fed.step(*at, row).is_ok());
+                let outputs = self.runs.step(*at, row)?;
                 if output_hash(outputs) != *hash && self.difference.is_none() {
                     self.difference = Some(Difference { event, at: *at });
                 }
                 self.stepped += 1;
                 return Ok(true);
             }
-            Record::Break { .. } => self.for_all(Engine::segment),
-            Record::Freeze(frozen) => self.for_all(|engine| engine.freeze(*frozen)),
+            Record::Break { .. } => self.all().for_each(|fed| fed.engine.segment()),
+            Record::Freeze(frozen) => self.all().for_each(|fed| fed.engine.freeze(*frozen)),
             _ => {}
         }
         record.apply(&mut self.timeline);
@@ -140,7 +137,7 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn engine(&self) -> &Engine {
-        &self.running.engine
+        &self.runs.engine
     }
 
     /// What waits.
@@ -149,21 +146,25 @@ impl Replay {
         &self.timeline
     }
 
-    /// An engine as it was when it was handed over here: it is stepped along until it takes over.
-    pub fn hand_over(&mut self, mut engine: Engine) {
-        engine.freeze(self.running.engine.frozen());
-        self.next = Some(Placed::new(engine, &self.feed));
+    /// Lets an engine see all that the one that runs does from now on.
+    pub fn follow(&mut self, engine: Engine) {
+        self.beside.push(Fed::new(engine, &self.feed));
     }
 
-    /// The engine that was handed over, if its graph is of this revision.
-    pub fn handed_over(&mut self, revision: &str) -> Option<Engine> {
-        let next = self.next.take_if(|of| of.engine.revision() == revision);
-        next.map(|of| of.engine)
+    /// The engine of a revision that has followed, the last one where there are several. The others are let go.
+    pub fn followed(&mut self, revision: &str) -> Option<Engine> {
+        let mut beside = self.beside.drain(..).rev();
+        let found = beside.find(|fed| fed.engine.revision() == revision);
+        found.map(|fed| fed.engine)
     }
 
-    /// Lets another engine go on.
-    pub fn replace(&mut self, engine: Engine) {
-        self.running = Placed::new(engine, &self.feed);
+    /// Lets another engine go on, whose outputs pass over from those of the one that runs.
+    pub fn replace(&mut self, mut engine: Engine) {
+        let outputs = &self.runs.engine.plan().outputs;
+        let place = |of: &PlannedOutput| outputs.iter().position(|output| output.name == of.name);
+        let places: Vec<_> = engine.plan().outputs.iter().map(place).collect();
+        engine.pass_over(&self.runs.engine, &places);
+        self.runs = Fed::new(engine, &self.feed);
     }
 
     /// The channels and sources of the log.
@@ -175,13 +176,10 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn into_engine(self) -> Engine {
-        self.running.engine
+        self.runs.engine
     }
 
-    fn for_all(&mut self, act: impl Fn(&mut Engine)) {
-        let next = self.next.iter_mut();
-        std::iter::once(&mut self.running)
-            .chain(next)
-            .for_each(|of| act(&mut of.engine));
+    fn all(&mut self) -> impl Iterator<Item = &mut Fed> {
+        std::iter::once(&mut self.runs).chain(&mut self.beside)
     }
 }

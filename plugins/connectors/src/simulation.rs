@@ -91,16 +91,20 @@ impl Source for SimulationSource {
             seed: self.seed,
             schedule: None,
         };
-        let simulation = known.start(&setup).map_err(ConnectorError::new)?;
+        let mut simulation = known.start(&setup).map_err(ConnectorError::new)?;
         let axes = axes(&wiring.name);
         let names = known.channels().iter().filter(|of| of.is_axis());
         let names: Vec<_> = names.map(|of| of.name).collect();
+        let mut applied = Vec::new();
         with(&axes, |axes| {
             if axes.names != names {
                 axes.asked = vec![f64::NAN; names.len()];
                 axes.applied = vec![0.0; names.len()];
                 axes.names.clone_from(&names);
             }
+            // Its axes stand where they stood.
+            applied.clone_from(&axes.applied);
+            simulation.correct(&applied, &mut axes.applied);
         });
         Ok(Box::new(MachineInlet {
             feeds: feeds(known, &names, &wiring)?,
@@ -109,7 +113,7 @@ impl Source for SimulationSource {
             known: wiring.channels.iter().map(|of| of.after).max(),
             pace: Pace::new(self.speed),
             values: vec![f64::NAN; wiring.channels.len()],
-            applied: vec![0.0; names.len()],
+            applied,
             axes,
         }))
     }

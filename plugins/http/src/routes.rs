@@ -9,7 +9,7 @@ use athermal_run::live::Staged;
 use athermal_run::model::Model;
 use athermal_serve::companion::Beside;
 use athermal_serve::folder::StatePaths;
-use athermal_serve::service::{NoAnswer, Service, SwapError};
+use athermal_serve::service::{CommitError, NoAnswer, Service};
 use http_body_util::{BodyExt as _, Limited};
 use hyper::body::Incoming;
 use hyper::header::{ALLOW, HeaderValue};
@@ -271,7 +271,7 @@ impl Routes {
     /// Has something done that may be refused.
     async fn swapped<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&mut Service) -> Result<T, SwapError> + Send + 'static,
+        work: impl FnOnce(&mut Service) -> Result<T, CommitError> + Send + 'static,
     ) -> Result<T, Refused> {
         let done = self.ask(move |service| work(service).map_err(|error| error.to_string()));
         let refused = |words: String| Refused::new(StatusCode::CONFLICT, &words);

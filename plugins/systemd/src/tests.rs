@@ -87,10 +87,8 @@ fn child() {
     let model = model.unwrap_or_else(|error| panic!("{error}"));
     let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut mistakes);
     let options = ServiceOptions {
-        state: folder.join("state"),
-        is_dry: false,
-        frozen: false,
         machine: path,
+        ..ServiceOptions::new(folder.join("state"))
     };
     let (mut service, _) = Service::start(&model, deployment.unwrap(), &options).unwrap();
     while !service.is_over() && !folder.join("end").exists() {

@@ -57,6 +57,11 @@ impl Events<'_> {
             ServiceEvent::NotTakenOver(reason) => terminal.warning(format_args!(
                 "the staged graph does not take over: {reason}; what runs goes on"
             )),
+            ServiceEvent::HostClock { is_synchronised } => terminal.note(if is_synchronised {
+                "the host's clock is synchronised: stamps are compared with it from now on"
+            } else {
+                "the host's clock is not synchronised: until it is, the clocks of sources are not judged, and the first stamp may be any"
+            }),
             ServiceEvent::NoCheckpoint(error) => {
                 terminal.warning(format_args!("no checkpoint: {error}; tried again"));
             }
@@ -145,7 +150,7 @@ pub fn damaged(terminal: &Terminal, report: &RecoveryReport) {
     for gap in &report.gaps {
         terminal.warning(format_args!("{gap}"));
     }
-    for (revision, _) in &report.swaps {
+    for revision in &report.swaps {
         terminal.note(format_args!("{revision} took over before"));
     }
 }

@@ -273,6 +273,13 @@ impl Control {
         self.staged.as_ref()
     }
 
+    /// The graph that is staged and the one before the last swap, as each would take over after [`events`](Self::events).
+    #[must_use]
+    pub fn beside(&self) -> [Option<&Engine>; 2] {
+        let staged = self.staged.as_ref().map(|of| &of.live.engine);
+        [staged, self.previous.as_ref().map(|of| &of.live.engine)]
+    }
+
     /// Lets go of what is staged; what runs goes on.
     pub fn discard(&mut self) {
         self.staged = None;
@@ -323,18 +330,6 @@ impl Control {
     #[must_use]
     pub fn replica(&self) -> Option<&Engine> {
         self.replica.as_ref().map(|replica| &replica.engine)
-    }
-
-    /// The graph before the last swap, while it is warm.
-    #[must_use]
-    pub fn previous(&self) -> Option<&Engine> {
-        self.previous.as_ref().map(|previous| &previous.live.engine)
-    }
-
-    /// Whether a graph is on its way to the engine thread.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.committed.is_some()
     }
 
     /// How many ticks, segment breaks and freezes have been taken in: the replica is that of the running graph after so many.

@@ -25,12 +25,6 @@ impl Staged {
         &self.carry
     }
 
-    /// The graph, as it is after the ticks that have been taken in.
-    #[must_use]
-    pub fn engine(&self) -> &Engine {
-        &self.live.engine
-    }
-
     /// The revision of the graph.
     #[must_use]
     pub fn revision(&self) -> &str {

@@ -71,6 +71,11 @@ pub enum ServiceEvent {
     },
     /// A graph was to take over after its comparison, and does not; what runs goes on.
     NotTakenOver(String),
+    /// Whether the host's clock is known to be right, where that matters to a source: at the start, and once it is.
+    HostClock {
+        /// Until it is, clocks of sources are not judged, and the first stamp may be any.
+        is_synchronised: bool,
+    },
     /// A checkpoint was not written; it is tried again.
     NoCheckpoint(CheckpointError),
     /// The journal cannot be written, or can again.

@@ -13,6 +13,7 @@ mod error;
 mod event;
 mod frames;
 mod handle;
+mod host_clock;
 mod observer;
 mod position;
 mod replacing;
@@ -23,6 +24,7 @@ mod sources;
 mod status;
 #[cfg(test)]
 mod tests;
+mod watch;
 mod wiring;
 
 use std::path::{Path, PathBuf};
@@ -36,12 +38,12 @@ use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+pub use crate::keeper::CommitError;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
-pub use replacing::SwapError;
 pub use status::Snapshot;
 
 use crate::checkpoint::Checkpoints;
@@ -50,18 +52,23 @@ use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
 use crate::folder::StateFolder;
-use crate::journal::{FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, retire};
+use crate::host;
+use crate::journal::{
+    FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
+};
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Admission, Sequencer};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order};
+use host_clock::HostClock;
 use observer::Observers;
 use replacing::Comparison;
 use sinks::OpenSink;
 use status::Shared;
+use watch::Watch;
 use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
@@ -80,6 +87,22 @@ pub struct ServiceOptions {
     pub frozen: bool,
     /// The machine file.
     pub machine: PathBuf,
+    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
+    pub host_time: fn() -> Option<Instant>,
+}
+
+impl ServiceOptions {
+    /// A service that puts everything out and learns, with its state in a folder.
+    #[must_use]
+    pub fn new(state: PathBuf) -> Self {
+        Self {
+            state,
+            is_dry: false,
+            frozen: false,
+            machine: PathBuf::new(),
+            host_time: host::synchronised,
+        }
+    }
 }
 
 /// A service at work.
@@ -104,6 +127,8 @@ pub struct Service {
     stop_sinks: Stop,
     sources: Vec<(String, Arc<SourceCounts>)>,
     source_threads: Vec<JoinHandle<()>>,
+    watches: Vec<Watch>,
+    host: HostClock,
     sinks: Vec<(String, Arc<SinkCounts>)>,
     sink_threads: Vec<JoinHandle<()>>,
     channels: Vec<String>,
@@ -196,7 +221,11 @@ impl Service {
         let feed = fed(recovered.engine.plan(), &given);
         let rules = rules(&runtime, &sources, &feed);
         let stamps = recovered.timeline.stamps().to_vec();
-        let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
+        let mut sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
+        let mut host = HostClock::new(options.host_time, clock, &sources);
+        if let Some((time, now)) = host.look(true) {
+            sequencer.synchronise(time, now);
+        }
         let live = LiveOptions {
             isolates: true,
             channels: given.clone(),
@@ -206,10 +235,7 @@ impl Service {
         let given = model.revision().unwrap_or_default();
         let is_another = recovered.model.revision() != model.revision();
         let differs = is_another && folder.given().as_ref() != Some(&given);
-        let handovers = folder.handovers();
-        handovers
-            .remove_after(happenings)
-            .map_err(|error| ServiceError::Recovery(error.into()))?;
+        folder.commits().remove_after(happenings);
         let was_frozen = recovered.engine.frozen();
         let (stepper, mut control) = pair_from(recovered.engine, live)?;
         let observers = Observers::default();
@@ -218,7 +244,7 @@ impl Service {
         let every = wait(runtime.checkpoint);
         let keeper = Keeper::new(
             control,
-            checkpoints,
+            (checkpoints, folder.commits()),
             Arc::clone(&progress),
             happenings,
             every,
@@ -286,6 +312,8 @@ impl Service {
             stop_sinks,
             sources: open.counts,
             source_threads,
+            watches: open.watches,
+            host,
             sinks: sink_counts,
             sink_threads,
             channels: feed.iter().map(|of| of.name.clone()).collect(),
@@ -299,6 +327,7 @@ impl Service {
             has_failed: false,
             began: Clock::now(),
         };
+        service.own.extend(service.host.first());
         if differs {
             service.replace(model);
         } else if !is_another {
@@ -343,11 +372,23 @@ impl Service {
             self.is_degraded = status.is_degraded;
             events.push(ServiceEvent::Journal(status));
         }
+        if let Some((time, now)) = self.host.look(false) {
+            self.order(Order::Synchronise(time, now));
+            self.note("the host's clock is synchronised");
+            events.push(ServiceEvent::HostClock {
+                is_synchronised: true,
+            });
+        }
+        let now = Clock::now();
+        self.watches.iter_mut().for_each(|watch| watch.look(now));
         if self.retired.elapsed() >= RETIRE {
             self.retired = Clock::now();
             let needed = self.keeper.oldest().unwrap_or_default();
             // What stays does no harm.
             let _ = retire(&self.folder.journal(), self.keep, needed);
+            if let Ok(Some(oldest)) = oldest(&self.folder.journal()) {
+                self.keeper.forget(oldest);
+            }
         }
         self.compare(&mut events);
         for event in &events {

@@ -1,54 +1,12 @@
 //! How the graph of a running service is replaced: staged, compared, handed over, taken back. Who does it stands in the journal.
 
-use std::fmt;
-
-use athermal_run::live::{Control, StageError, Staged, Verdict};
+use athermal_run::live::{StageError, Staged, Verdict};
 use athermal_run::model::Model;
 
 use super::{Service, ServiceEvent};
-use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::engine::Engine;
-use crate::folder::FolderError;
+use crate::keeper::CommitError;
 use crate::time::Duration;
-
-/// Why the graph is not replaced; what runs is untouched.
-#[derive(Debug)]
-pub enum SwapError {
-    /// It cannot take over.
-    Stage(StageError),
-    /// It cannot be kept in the state folder, so that a restart would not know it.
-    NotKept(CheckpointError),
-    /// The same, of its model.
-    NoModel(FolderError),
-    /// It was compared, and its error is larger by more than the margin.
-    Worse {
-        /// Its error relative to that of what runs.
-        ratio: Option<f64>,
-    },
-}
-
-impl fmt::Display for SwapError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stage(error) => error.fmt(f),
-            Self::NotKept(error) => error.fmt(f),
-            Self::NoModel(error) => error.fmt(f),
-            Self::Worse { ratio: Some(ratio) } => write!(
-                f,
-                "its error is {ratio:.3} times that of what runs, more than the margin allows"
-            ),
-            Self::Worse { ratio: None } => f.write_str("there was nothing to compare it by"),
-        }
-    }
-}
-
-impl std::error::Error for SwapError {}
-
-impl From<StageError> for SwapError {
-    fn from(error: StageError) -> Self {
-        Self::Stage(error)
-    }
-}
 
 /// A comparison under way.
 #[derive(Debug, Clone)]
@@ -64,7 +22,7 @@ impl Service {
     ///
     /// # Errors
     /// When it cannot take over, or be kept; what runs, and what was staged before, is untouched.
-    pub fn stage(&mut self, model: &Model, by: &str) -> Result<&Staged, SwapError> {
+    pub fn stage(&mut self, model: &Model, by: &str) -> Result<&Staged, CommitError> {
         let revision = self
             .keeper
             .control()
@@ -74,7 +32,7 @@ impl Service {
         self.comparison = None;
         self.folder
             .keep_model(model, &revision)
-            .map_err(SwapError::NoModel)?;
+            .map_err(CommitError::NotKept)?;
         self.note(&format!("{by}: staged {revision}"));
         let staged = self.keeper.look().staged();
         Ok(staged.ok_or(StageError::NothingStaged)?)
@@ -91,7 +49,7 @@ impl Service {
         margin: f64,
         commits: bool,
         by: &str,
-    ) -> Result<(), SwapError> {
+    ) -> Result<(), CommitError> {
         self.keeper.control().shadow(duration, margin)?;
         let by = by.to_owned();
         self.note(&format!("{by}: shadow for {duration}, margin {margin}"));
@@ -103,8 +61,10 @@ impl Service {
     ///
     /// # Errors
     /// When nothing is staged, or it cannot be kept; what is staged stays so.
-    pub fn commit(&mut self, by: &str) -> Result<(), SwapError> {
-        self.hand_over(by, |of| of.staged().map(Staged::engine), Control::commit)?;
+    pub fn commit(&mut self, by: &str) -> Result<(), CommitError> {
+        let revision = self.staged().map(|of| of.revision().to_owned());
+        self.keeper.commit()?;
+        self.hand_over(by, revision);
         self.comparison = None;
         Ok(())
     }
@@ -113,15 +73,18 @@ impl Service {
     ///
     /// # Errors
     /// When there is none that is still warm, or it cannot be kept.
-    pub fn rollback(&mut self, by: &str) -> Result<(), SwapError> {
-        self.hand_over(by, Control::previous, Control::rollback)
+    pub fn rollback(&mut self, by: &str) -> Result<(), CommitError> {
+        let revision = self.previous().map(|of| of.revision().to_owned());
+        self.keeper.rollback()?;
+        self.hand_over(by, revision);
+        Ok(())
     }
 
     /// Lets go of what is staged.
     ///
     /// # Errors
     /// When nothing is.
-    pub fn discard(&mut self, by: &str) -> Result<(), SwapError> {
+    pub fn discard(&mut self, by: &str) -> Result<(), CommitError> {
         let control = self.keeper.control();
         let revision = control.staged().map(|of| of.revision().to_owned());
         let revision = revision.ok_or(StageError::NothingStaged)?;
@@ -152,28 +115,12 @@ impl Service {
     /// The graph before the last swap, while it is warm: it can be taken back.
     #[must_use]
     pub fn previous(&self) -> Option<&Engine> {
-        self.keeper.look().previous()
+        self.keeper.look().beside()[1]
     }
 
-    /// Keeps a graph as it is, so that a replay hands over the same bits, and hands it over.
-    fn hand_over(
-        &mut self,
-        by: &str,
-        which: fn(&Control) -> Option<&Engine>,
-        send: fn(&mut Control) -> Result<(), StageError>,
-    ) -> Result<(), SwapError> {
-        let happenings = self.keeper.happenings();
-        let mut revision = String::new();
-        if let Some(engine) = which(self.keeper.look()).filter(|_| !self.keeper.look().is_busy()) {
-            let handed = Checkpoint::of(engine, happenings);
-            revision.clone_from(&handed.revision);
-            let kept = self.folder.handovers().save(&handed);
-            kept.map_err(SwapError::NotKept)?;
-        }
-        // What is taken in meanwhile, a replay steps too.
-        send(self.keeper.control())?;
+    fn hand_over(&mut self, by: &str, revision: Option<String>) {
+        let revision = revision.unwrap_or_default();
         self.note(&format!("{by}: {revision} is to take over"));
-        Ok(())
     }
 
     /// Looks whether a comparison is over, and does what was asked for then.
@@ -199,7 +146,7 @@ impl Service {
         }
         let outcome = match passes {
             true => self.commit(&by),
-            false => self.discard(&by).and(Err(SwapError::Worse { ratio })),
+            false => self.discard(&by).and(Err(CommitError::Worse { ratio })),
         };
         if let Err(error) = outcome {
             events.push(ServiceEvent::NotTakenOver(error.to_string()));

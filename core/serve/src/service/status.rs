@@ -28,6 +28,7 @@ impl Shared {
                 last: Instant::MIN,
                 newest: None,
                 stamps: vec![Instant::MIN; channels],
+                is_synchronised: false,
             }),
         }
     }
@@ -56,4 +57,6 @@ pub struct Snapshot {
     pub newest: Option<Instant>,
     /// The stamp of each channel's newest sample that was stepped; [`Instant::MIN`] before the first.
     pub stamps: Vec<Instant>,
+    /// Whether the host's time is known to be right. Until then clocks of sources are not judged, and the first stamp may be any.
+    pub is_synchronised: bool,
 }

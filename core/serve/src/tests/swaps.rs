@@ -176,10 +176,8 @@ impl Bench {
         let (model, deployment, mistakes) = self.read(graph);
         let deployment = deployment.unwrap_or_else(|| panic!("{mistakes}"));
         let options = ServiceOptions {
-            state: self.path("state"),
-            is_dry: false,
-            frozen: false,
             machine: self.path("machine.toml"),
+            ..ServiceOptions::new(self.path("state"))
         };
         Service::start(&model, deployment, &options).unwrap().0
     }

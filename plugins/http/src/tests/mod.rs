@@ -83,10 +83,8 @@ impl Bench {
         let deployment =
             deployment.unwrap_or_else(|| panic!("{}", mistakes.render(&sources, false, 100)));
         let options = ServiceOptions {
-            state: folder.join("state"),
-            is_dry: false,
-            frozen: false,
             machine,
+            ..ServiceOptions::new(folder.join("state"))
         };
         let (mut service, _) = Service::start(&model, deployment, &options).unwrap();
         let thread = std::thread::spawn(move || {
