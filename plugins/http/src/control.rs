@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration as Wait;
 
+use athermal_core::engine::fnv_1a;
 use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::ConnectorError;
 
@@ -22,6 +23,8 @@ use crate::token::Token;
 const RUN: &str = "/run/athermal";
 /// The socket in a state folder, where that folder cannot be written.
 const SOCKET: &str = "control.sock";
+/// How many bytes the path of a socket has at most, on all systems.
+const LONGEST: usize = 100;
 /// How long the service may take to let somebody look on.
 const PATIENCE: Wait = Wait::from_secs(10);
 
@@ -79,8 +82,17 @@ fn socket_of(name: &str, state: &Path) -> PathBuf {
     let _ = fs::remove_file(probe);
     match is_writable && !name.is_empty() && !name.contains('/') {
         true => run.join(format!("{name}.sock")),
-        false => state.join(SOCKET),
+        false => short(state.join(SOCKET)),
     }
+}
+
+/// A path that a socket can have: one that is too long stands among temporary files, and the state folder says where.
+fn short(path: PathBuf) -> PathBuf {
+    if path.as_os_str().len() <= LONGEST {
+        return path;
+    }
+    let hash = fnv_1a(path.as_os_str().as_encoded_bytes());
+    std::env::temp_dir().join(format!("athermal-{hash:016x}.sock"))
 }
 
 /// Binds a socket that its user and group may use. One that nobody listens on any more is taken over.

@@ -218,6 +218,14 @@ fn connectors(page: &mut Page, service: &Service) {
     each!(
         sources,
         "source",
+        "athermal_source_connected",
+        "gauge",
+        "1 while a source is connected.",
+        |of: &Source| u64::from(of.is_connected())
+    );
+    each!(
+        sources,
+        "source",
         "athermal_source_queue_length",
         "gauge",
         "Samples that wait for the engine thread.",

@@ -78,8 +78,12 @@ pub fn status(of: &Value) -> String {
     for source in of["sources"].as_array().into_iter().flatten() {
         let _ = writeln!(
             all,
-            "source {}: {} samples, {} wait, {} dropped, {} restarts",
+            "source {}: {}, {} samples, {} wait, {} dropped, {} restarts",
             text(&source["source"]),
+            match source["connected"] == true {
+                true => "connected",
+                false => "away",
+            },
             source["given"],
             source["waiting"],
             source["dropped"],

@@ -39,6 +39,7 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
         "last_s": time(Some(snapshot.last)),
         "behind_s": behind_s(snapshot.newest, snapshot.last),
         "hurried": snapshot.hurried,
+        "host_clock_synchronised": snapshot.is_synchronised,
         "beat": service.beat(),
         "last_checkpoint": service.last_checkpoint(),
         "journal": {
@@ -135,6 +136,7 @@ fn sources(service: &Service) -> Vec<Value> {
             "source": name,
             "given": of.given.load(Ordering::Relaxed),
             "dropped": of.dropped.load(Ordering::Relaxed),
+            "connected": of.is_connected(),
             "restarts": of.restarts.load(Ordering::Relaxed),
             "waiting": of.waiting(),
         })

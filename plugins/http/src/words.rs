@@ -85,6 +85,14 @@ pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
             Value::Null,
             format!("the staged graph does not take over: {reason}"),
         ),
+        ServiceEvent::HostClock { is_synchronised } => (
+            "host_clock",
+            json!({ "is_synchronised": is_synchronised }),
+            match is_synchronised {
+                true => "the host's clock is synchronised".to_owned(),
+                false => "the host's clock is not synchronised yet".to_owned(),
+            },
+        ),
         ServiceEvent::NoCheckpoint(error) => (
             "no_checkpoint",
             Value::Null,

@@ -117,6 +117,30 @@ fn a_good_graph_is_staged_compared_committed_and_taken_back_and_every_tick_is_th
     revisions.dedup();
     let wanted = [&first, &second, &first].map(|of| of.as_str().unwrap());
     assert_eq!(revisions, wanted);
+    // Who did it stands in the journal: the user of the process at the other end of the socket.
+    let uid = fs::metadata("/proc/self").map(|of| std::os::unix::fs::MetadataExt::uid(&of));
+    let by = format!("uid {}: ", uid.unwrap());
+    let notes = notes(&bench.path("state"));
+    let own: Vec<_> = notes.iter().filter_map(|of| of.strip_prefix(&by)).collect();
+    assert_eq!(own.len(), 11, "{notes:#?}");
+    assert!(
+        own[0].starts_with("staged ") && own.contains(&"learning frozen"),
+        "{own:#?}"
+    );
+}
+
+/// The remarks in a journal.
+fn notes(state: &std::path::Path) -> Vec<String> {
+    use athermal_serve::folder::StatePaths;
+    use athermal_serve::journal::{Entry, Log, Record};
+    let mut log = Log::open(&StatePaths::new(state).journal()).unwrap();
+    let mut notes = Vec::new();
+    while let Some(entry) = log.read().unwrap() {
+        if let Entry::Record(_, Record::Note(text)) = entry {
+            notes.push(text.into());
+        }
+    }
+    notes
 }
 
 #[test]
