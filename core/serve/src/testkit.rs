@@ -60,6 +60,8 @@ impl<'a> SourceTrial<'a> {
                 column: (*address).to_owned(),
                 optional: false,
                 range: (f64::NEG_INFINITY, f64::INFINITY),
+                planned: None,
+                is_instant: false,
             },
             address: (*address).to_owned(),
             unit: crate::unit::Unit::one(),
