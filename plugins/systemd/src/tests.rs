@@ -56,6 +56,8 @@ impl Operator for Hanging {
             outputs.set(i, value);
         }
     }
+
+    fn segment(&mut self) {}
 }
 
 athermal_core::register!(Hang, Feature, "hang");
