@@ -40,6 +40,7 @@ pub struct CompanionKind {
     /// The section of a machine file that is read for it, or `""`. Without the section it runs with what that has by default.
     pub section: &'static str,
     /// Reads the section, or reports its mistakes.
+    #[allow(clippy::type_complexity)] // it is this once
     pub read: fn(Option<&Value>, &str, &mut Diagnostics) -> Option<Box<dyn Companion>>,
     /// The JSON Schema of the section.
     pub schema: fn() -> serde_json::Value,

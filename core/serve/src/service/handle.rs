@@ -9,7 +9,7 @@ use super::Service;
 /// How many may wait for the control thread.
 const WAITING: usize = 64;
 
-type Work = Box<dyn FnOnce(&mut Service) + Send>;
+pub(super) type Work = Box<dyn FnOnce(&mut Service) + Send>;
 
 /// Asks a running service, from any thread: what is handed over is done by the thread that owns the service, at its next
 /// [`pump`](Service::pump). What runs does not notice.

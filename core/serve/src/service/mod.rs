@@ -63,6 +63,7 @@ use crate::sequencer::{Admission, Sequencer};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order};
+use handle::Work;
 use host_clock::HostClock;
 use observer::Observers;
 use replacing::Comparison;
@@ -108,7 +109,7 @@ impl ServiceOptions {
 /// A service at work.
 pub struct Service {
     handle: ServiceHandle,
-    asked: Receiver<Box<dyn FnOnce(&mut Self) + Send>>,
+    asked: Receiver<Work>,
     observers: Observers,
     companions: Vec<Box<dyn Send>>,
     comparison: Option<Comparison>,
