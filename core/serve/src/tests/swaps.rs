@@ -295,10 +295,10 @@ fn a_graph_takes_over_and_is_taken_back_with_every_tick_and_a_replay_has_the_sam
     service.stage(&next, "uid 7").unwrap();
     bench.more(&mut service, 20);
     service.commit("uid 7").unwrap();
-    assert_eq!(took_over(&bench.more(&mut service, 100)), [second.clone()]);
+    assert_eq!(took_over(&bench.more(&mut service, 100)), [&*second]);
     assert!(bench.check_replay() > 300);
     service.rollback("uid 8").unwrap();
-    assert_eq!(took_over(&bench.more(&mut service, 100)), [first.clone()]);
+    assert_eq!(took_over(&bench.more(&mut service, 100)), [&*first]);
     service.rollback("uid 8").unwrap();
     bench.more(&mut service, 50);
     let (ended, _) = service.stop().unwrap();
