@@ -64,6 +64,8 @@ use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;
 use athermal_estimators as _;
+#[cfg(feature = "cli")]
+use athermal_export as _;
 use athermal_features as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_http as _;
