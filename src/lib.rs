@@ -67,8 +67,14 @@ use athermal_estimators as _;
 #[cfg(feature = "cli")]
 use athermal_export as _;
 use athermal_features as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_http as _;
 use athermal_kinematics as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_log as _;
 use athermal_simulation as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_systemd as _;
 
 /// The pages of the guide, so that their code is compiled and run as tests.
 #[cfg(doctest)]
