@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::{ConnectorError, Outflow, Stop};
 use crate::compile::SourceChannel;
 use crate::document::{TableBase, TimeBase};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
 /// A kind of source: the parameters of one, as a machine file gives them.
@@ -22,6 +22,16 @@ pub trait Source: Debug + Send + Sync {
         false
     }
 
+    /// The channels that it gives by parameters of its own, beside those of `channels`; none unless it says otherwise.
+    fn mappings(&self) -> Vec<Mapping> {
+        Vec::new()
+    }
+
+    /// What is wrong with its parameters, or doubtful, beyond their types and ranges; it is reported at their places.
+    fn remarks(&self) -> Vec<ParameterRemark> {
+        Vec::new()
+    }
+
     /// Whether it will come to an end, after which the service ends too.
     fn ends(&self) -> bool {
         false
@@ -32,6 +42,43 @@ pub trait Source: Debug + Send + Sync {
     /// # Errors
     /// When the parameters do not fit what is asked of it; the service does not start.
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError>;
+}
+
+/// What a source or sink says of its parameters.
+#[derive(Debug, Clone)]
+pub struct ParameterRemark {
+    /// Where the parameter stands, as in [`Mapping::at`].
+    pub at: Vec<String>,
+    /// Whether it cannot be used so; otherwise it is only doubtful.
+    pub is_mistake: bool,
+    /// What, and why.
+    pub words: String,
+    /// What to do.
+    pub help: String,
+}
+
+/// Channels that a source gives by a parameter of its own.
+#[derive(Debug, Clone, Default)]
+pub struct Mapping {
+    /// Where the parameter stands in its table: keys, and numbers of lists from 0 on, such as `messages`, `0`, `channel`.
+    pub at: Vec<String>,
+    /// A pattern of channels, such as `temperature.{sensor}`.
+    pub channel: String,
+    /// Where the source has them, for people; `{set}` is the member, `{channel}` the channel.
+    pub address: String,
+    /// The unit in which the source gives them; that of the signal without.
+    pub unit: Option<Unit>,
+    /// A sample no later than this is given to the next tick.
+    pub late: Option<Duration>,
+}
+
+/// Which mapping a channel is of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mapped {
+    /// Its number among [`Source::mappings`].
+    pub mapping: usize,
+    /// What `{…}` in its texts stand for: sets with their members, and `channel`.
+    pub members: Vec<(String, String)>,
 }
 
 /// By what the stamps of a source go.
@@ -48,6 +95,10 @@ pub enum Stamps {
 pub struct SourceWiring {
     /// Its name in the machine file.
     pub name: String,
+    /// The name of the graph, if it has one.
+    pub machine: Option<String>,
+    /// A folder of its own beside the journal, which need not be there yet.
+    pub state: PathBuf,
     /// The folder that relative paths start from.
     pub folder: PathBuf,
     /// The channels that it is to give, in the order in which [`Outflow::sample`] counts them.
@@ -67,6 +118,8 @@ pub struct WiredChannel {
     pub unit: Unit,
     /// Where the source has it: a column, a topic, a node.
     pub address: String,
+    /// Which of the source's own mappings names it; none where `channels` does.
+    pub mapped: Option<Mapped>,
     /// The unit of the channel from that of the source: `value * factor + offset`; none where it is the same.
     pub conversion: Option<(f64, f64)>,
     /// The newest stamp that the service knows of it; [`Instant::MIN`] without one. What is not after it is not asked for again.

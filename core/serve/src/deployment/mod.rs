@@ -17,7 +17,7 @@ pub use size::Size;
 use std::path::PathBuf;
 
 use crate::compile::{Plan, SourceChannel};
-use crate::connector::{Sink, SinkKind, Source, SourceKind};
+use crate::connector::{Mapped, Sink, SinkKind, Source, SourceKind};
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::document::GraphFile;
 use crate::sequencer::ClockRule;
@@ -63,6 +63,8 @@ pub struct DeclaredChannel {
     pub channel: SourceChannel,
     /// Where the source has it: a column, a topic, a node.
     pub address: String,
+    /// Which of the source's own mappings names it.
+    pub mapped: Option<Mapped>,
     /// The unit of the channel from that of the source: `value * factor + offset`; none where it is the same.
     pub conversion: Option<(f64, f64)>,
     /// A sample no later than this is given to the next tick.

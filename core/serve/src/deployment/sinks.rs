@@ -123,7 +123,9 @@ fn sink(
         Some(value) => outputs.rates(value, &columns, diagnostics),
         None => vec![None; columns.len()],
     };
-    let (kind, parameters) = kind?;
+    let (kind, sink) = kind?;
+    keys::report(sink.remarks(), &parameters, diagnostics);
+    let parameters = sink;
     let is_command = parameters.purpose() == Purpose::Command;
     for key in ["behind", "rate"].into_iter().filter(|_| !is_command) {
         if let Some(entry) = entry.value.as_table().and_then(|table| table.entry(key)) {

@@ -35,8 +35,7 @@ pub(super) struct SinkThread {
     pub(super) progress: Arc<Progress>,
     pub(super) stop: Stop,
     pub(super) events: Sender<ServiceEvent>,
-    /// Whether what it did last failed.
-    pub(super) has_failed: bool,
+    pub(super) health: Health,
 }
 
 impl SinkThread {
@@ -55,7 +54,11 @@ impl SinkThread {
             if is_dirty {
                 let flushed = guarded(|| self.outlet.flush());
                 is_dirty = flushed.is_err();
-                self.report(flushed);
+                self.health.report(&self.name, &self.events, flushed);
+            }
+            if !self.is_dry {
+                self.health
+                    .look(&self.name, &self.events, &mut *self.outlet);
             }
             let is_over = self.frames.is_over();
             if (is_over || kept.elapsed() >= KEEP)
@@ -106,7 +109,9 @@ impl SinkThread {
                 &self.counts.failures
             };
             counts.fetch_add(1, Ordering::Relaxed);
-            report(&self.name, &mut self.has_failed, &self.events, put);
+            self.health.report(&self.name, &self.events, put);
+            self.health
+                .look(&self.name, &self.events, &mut *self.outlet);
             // An old command is none: the next tick has a newer one.
             if is_put || is_command {
                 return Some(happenings);
@@ -115,10 +120,6 @@ impl SinkThread {
                 return None;
             }
         }
-    }
-
-    fn report(&mut self, done: Result<(), ConnectorError>) {
-        report(&self.name, &mut self.has_failed, &self.events, done);
     }
 
     /// Keeps how far the sink is. Where that fails it is tried again; what is kept is always true.
@@ -142,21 +143,42 @@ impl SinkThread {
     }
 }
 
-/// Reports the first failure, and the first success after one.
-fn report(
-    name: &str,
-    has_failed: &mut bool,
-    events: &Sender<ServiceEvent>,
-    done: Result<(), ConnectorError>,
-) {
-    let sink = name.to_owned();
-    let event = match (done, *has_failed) {
-        (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
-        (Ok(()), true) => ServiceEvent::SinkBack { sink },
-        _ => return,
-    };
-    *has_failed = !*has_failed;
-    let _ = events.send(event);
+/// Whether a sink works.
+#[derive(Debug, Default)]
+pub(super) struct Health {
+    /// Whether what it did last failed.
+    has_failed: bool,
+    /// Whether it takes rows that cannot leave.
+    is_held: bool,
+}
+
+impl Health {
+    /// Asks whether what was taken can leave.
+    fn look(&mut self, name: &str, events: &Sender<ServiceEvent>, outlet: &mut dyn Outlet) {
+        let state = guarded(|| outlet.state());
+        if std::mem::replace(&mut self.is_held, false) || state.is_err() {
+            let is_held = state.is_err();
+            self.report(name, events, state);
+            self.is_held = is_held;
+        }
+    }
+
+    /// Reports the first failure, and the first success after one. That a row was taken is no news where none can leave.
+    fn report(
+        &mut self,
+        name: &str,
+        events: &Sender<ServiceEvent>,
+        done: Result<(), ConnectorError>,
+    ) {
+        let sink = name.to_owned();
+        let event = match (done, self.has_failed) {
+            (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
+            (Ok(()), true) if !self.is_held => ServiceEvent::SinkBack { sink },
+            _ => return,
+        };
+        self.has_failed = !self.has_failed;
+        let _ = events.send(event);
+    }
 }
 
 fn guarded(work: impl FnOnce() -> Result<(), ConnectorError>) -> Result<(), ConnectorError> {

@@ -1,5 +1,6 @@
 //! The sources of a service at its start: opened, and linked to the engine thread.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::Thread;
@@ -31,6 +32,7 @@ pub(super) struct OpenSources {
 pub(super) fn open(
     sources: Vec<DeclaredSource>,
     model: &Model,
+    state: &Path,
     (feed, stamps): (&[Feed], &[Instant]),
     (engine, progress): (&Thread, &Arc<Progress>),
 ) -> Result<OpenSources, ServiceError> {
@@ -56,6 +58,7 @@ pub(super) fn open(
                 unit: unit(&of.channel.name),
                 channel: of.channel,
                 address: of.address,
+                mapped: of.mapped,
                 conversion: of.conversion,
                 after: stamps[place],
             };
@@ -75,6 +78,8 @@ pub(super) fn open(
         );
         let wiring = SourceWiring {
             name: source.name.clone(),
+            machine: plan.name.clone(),
+            state: state.join("sources").join(&source.name),
             folder: source.folder,
             channels: wired,
             time: plan.time.clone(),
