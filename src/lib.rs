@@ -31,8 +31,9 @@ pub use athermal_trial as trial;
 pub use athermal_analysis::{chart, diagnosis, report};
 
 #[cfg(feature = "cli")]
-#[macro_use]
-mod output;
+#[macro_use(print, println)]
+extern crate athermal_command;
+
 #[cfg(feature = "cli")]
 mod checkout;
 #[cfg(feature = "cli")]
@@ -42,18 +43,17 @@ mod drawing;
 #[cfg(feature = "cli")]
 mod invocation;
 #[cfg(feature = "cli")]
-mod message;
-#[cfg(feature = "cli")]
 mod program;
 #[cfg(feature = "cli")]
 pub mod schema;
 #[cfg(feature = "cli")]
 mod starter;
-#[cfg(feature = "cli")]
-mod terminal;
 
 #[cfg(feature = "cli")]
 pub use program::command_line;
+
+#[cfg(feature = "cli")]
+use athermal_command::{message, output, terminal};
 
 // The commands use what the library offers to everybody by the name that everybody uses.
 #[cfg(feature = "cli")]

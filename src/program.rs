@@ -4,20 +4,10 @@ use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
 use athermal::core::diagnostic::{panic_message, panic_text};
-use clap::{CommandFactory, Parser};
+use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
-use crate::terminal::{Answer, Failure, Format};
-use crate::{command, terminal};
-
-/// Predicts and corrects the thermal drift of precision machines.
-#[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true, max_term_width = 80, after_help = EXAMPLES)]
-struct Arguments {
-    #[command(subcommand)]
-    command: command::Command,
-    #[command(flatten)]
-    terminal: terminal::Options,
-}
+use crate::command::Command;
+use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 
 const EXAMPLES: &str = "\
 Start here:
@@ -34,11 +24,12 @@ outside failed, such as reading a file.";
 /// The command line of athermal, with every plugin that the program links: all that its `main` has to do.
 #[must_use]
 pub fn command_line() -> ExitCode {
-    let arguments = Arguments::parse();
-    let mut terminal = terminal::Terminal::new(&arguments.terminal);
-    terminal.events = terminal.format == Format::Json && arguments.command.writes_events();
+    let arguments = whole().get_matches();
+    let options = Options::from_arg_matches(&arguments);
+    let options = options.unwrap_or_else(|error| error.exit());
+    let mut terminal = Terminal::new(&options);
     report_panics_in_a_line();
-    match caught(|| arguments.command.run(&terminal)) {
+    match caught(|| run(&arguments, &mut terminal)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
             terminal.error(&failure);
@@ -47,10 +38,34 @@ pub fn command_line() -> ExitCode {
     }
 }
 
-/// The command line, as a shell completes it.
+/// Does what the command says that stands first: one of the program, or one that a crate brings.
+fn run(arguments: &ArgMatches, terminal: &mut Terminal) -> Result<Answer, Failure> {
+    let is_for_programs = terminal.format == Format::Json;
+    if let Some((name, inside)) = arguments.subcommand()
+        && let Some(kind) = athermal_command::kind(name)
+    {
+        terminal.events = is_for_programs && kind.writes_events;
+        return (kind.run)(inside, terminal);
+    }
+    let command = Command::from_arg_matches(arguments);
+    let command = command.unwrap_or_else(|error| error.exit());
+    terminal.events = is_for_programs && command.writes_events();
+    command.run(terminal)
+}
+
+/// The command line, as a shell completes it: the commands of the program, behind them those that crates bring.
 #[must_use]
 pub fn whole() -> clap::Command {
-    Arguments::command()
+    let whole = clap::Command::new("athermal")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about("Predicts and corrects the thermal drift of precision machines")
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .max_term_width(80)
+        .after_help(EXAMPLES);
+    let whole = Command::augment_subcommands(Options::augment_args(whole));
+    let brought = athermal_command::kinds().values();
+    brought.fold(whole, |whole, kind| whole.subcommand((kind.declare)()))
 }
 
 /// What a command answers, or that code of the program or of a plugin panicked in it.
@@ -85,10 +100,38 @@ fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use clap::{Command, CommandFactory};
+    use clap::{Args, Command, FromArgMatches};
 
-    use super::Arguments;
-    use crate::terminal::{Answer, Failure};
+    use super::{run, whole};
+    use crate::terminal::{Answer, Failure, Format, Options, Terminal};
+
+    /// Say the number
+    #[derive(Debug, Args)]
+    struct Say {
+        /// Any number
+        number: u8,
+    }
+
+    impl athermal_command::Command for Say {
+        fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+            assert_eq!((self.number, terminal.format), (7, Format::Json));
+            Ok(Answer::No)
+        }
+    }
+
+    athermal_command::register_command!(Say, "say-for-a-test");
+
+    #[test]
+    fn a_command_that_a_crate_brings_stands_behind_those_of_the_program() {
+        let help = whole().render_help().to_string();
+        let (ours, brought) = (help.find("  build "), help.find("  say-for-a-test "));
+        assert!(ours.is_some() && ours < brought, "{help}");
+        let words = ["athermal", "say-for-a-test", "7", "--format", "json"];
+        let arguments = whole().get_matches_from(words);
+        let options = Options::from_arg_matches(&arguments).expect("they were checked");
+        let answer = run(&arguments, &mut Terminal::new(&options));
+        assert!(matches!(answer, Ok(Answer::No)), "{answer:?}");
+    }
 
     /// The error of each argument of a command, and of those inside it, that is given a text instead of what it takes.
     fn refusals(command: &Command, words: &[String]) -> Vec<String> {
@@ -98,7 +141,7 @@ mod tests {
             .filter_map(|argument| argument.get_long())
         {
             let call = words.iter().cloned().chain([format!("--{argument}=x")]);
-            let refused = Arguments::command().try_get_matches_from(call).err();
+            let refused = whole().try_get_matches_from(call).err();
             all.extend(refused.map(|error| error.to_string()));
         }
         for inner in command.get_subcommands() {
@@ -121,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_told_in_words_of_the_program() {
-        let refusals = refusals(&Arguments::command(), &["athermal".to_owned()]);
+        let refusals = refusals(&whole(), &["athermal".to_owned()]);
         let ours = refusals
             .iter()
             .filter(|message| message.contains("expected ") && message.contains("number"));

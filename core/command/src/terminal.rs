@@ -5,19 +5,19 @@ use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use athermal::ModelError;
-use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
-use athermal::files::FileError;
-use athermal::run::fit::FitError;
-use athermal::run::live::{RunError, StateError};
-use athermal::trial::fault::FaultError;
+use athermal_analysis::figures::counted;
+use athermal_core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
+use athermal_files::FileError;
+use athermal_run::fit::FitError;
+use athermal_run::live::{RunError, StateError};
+use athermal_run::model::ModelError;
+use athermal_trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
 use crate::message::Message;
-use athermal_analysis::figures::counted;
 
 /// Options that every command takes.
 #[derive(Debug, Args)]

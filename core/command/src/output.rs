@@ -26,10 +26,14 @@ pub fn offer(text: fmt::Arguments<'_>) -> bool {
     true
 }
 
+/// Takes the place of the standard macro.
+#[macro_export]
 macro_rules! print {
     ($($text:tt)*) => { $crate::output::put(format_args!($($text)*)) };
 }
 
+/// Takes the place of the standard macro.
+#[macro_export]
 macro_rules! println {
     () => { $crate::output::put(format_args!("\n")) };
     ($($text:tt)*) => { $crate::output::put(format_args!("{}\n", format_args!($($text)*))) };

@@ -1,0 +1,43 @@
+//! What a command of the command line is, how it speaks to people and programs, and how a crate brings one.
+//!
+//! A command is a struct of [`clap`] arguments that implements [`Command`]. A plugin crate makes it known with
+//! [`register_command!`], and it stands among the others:
+//!
+//! ```
+//! use athermal_command::{Answer, Command, Failure, Terminal, println};
+//! use clap::Args;
+//!
+//! /// Say how many windows a period has
+//! #[derive(Debug, Args)]
+//! struct Windows {
+//!     /// The period, in minutes
+//!     minutes: u32,
+//! }
+//!
+//! impl Command for Windows {
+//!     fn run(&self, _: &Terminal) -> Result<Answer, Failure> {
+//!         println!("{}", self.minutes / 5);
+//!         Ok(Answer::Fine)
+//!     }
+//! }
+//!
+//! athermal_command::register_command!(Windows, "windows");
+//! # let matches = athermal_command::kind("windows").map(|kind| (kind.declare)().try_get_matches_from(["windows", "15"]));
+//! # assert!(matches.is_some_and(|matches| matches.is_ok()));
+//! ```
+
+pub mod message;
+#[macro_use]
+pub mod output;
+mod registry;
+pub mod terminal;
+
+pub use message::Message;
+pub use registry::{Command, CommandKind, declare, kind, kinds, run};
+pub use terminal::{Answer, Failure, Format, Terminal};
+
+/// What the macros of this crate use.
+#[doc(hidden)]
+pub mod __private {
+    pub use inventory;
+}
