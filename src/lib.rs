@@ -62,6 +62,7 @@ extern crate self as athermal;
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
 use athermal_connectors as _;
+use athermal_mqtt as _;
 use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
