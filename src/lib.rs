@@ -62,10 +62,11 @@ extern crate self as athermal;
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
 use athermal_connectors as _;
-use athermal_mqtt as _;
 use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
+#[cfg(feature = "mqtt")]
+use athermal_mqtt as _;
 use athermal_simulation as _;
 
 /// The pages of the guide, so that their code is compiled and run as tests.

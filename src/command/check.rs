@@ -23,7 +23,7 @@ use athermal_analysis::figures::counted;
 /// Reports all mistakes at once, each with its place and a way out. Nothing is fitted and no data are read.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml"
+    after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml\n  athermal check --live machine.toml"
 )]
 pub struct Check {
     /// Graph files
@@ -32,6 +32,9 @@ pub struct Check {
     /// Fail on warnings too (exit status 1)
     #[arg(long)]
     strict: bool,
+    /// Ask the sources of machine files for one of everything, and show it (exit status 1 where something is missing)
+    #[arg(long)]
+    live: bool,
 }
 
 /// What a graph without mistakes has.
@@ -112,11 +115,16 @@ impl Check {
     /// When one has mistakes.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-        let mut fine = Vec::new();
+        let (mut fine, mut is_whole) = (Vec::new(), true);
         for path in &self.graphs {
             let mut of_file = Diagnostics::new();
             let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
+            if let Some(machine) = &machine
+                && self.live
+            {
+                is_whole &= super::look::look(terminal, machine, &sources);
+            }
             fine.extend(machine.map(|machine| (path, machine.plan)));
         }
         if terminal.format == Format::Json {
@@ -140,7 +148,7 @@ impl Check {
         }
         if diagnostics.has_errors() {
             Err(Failure::Exit(status_of(&diagnostics)))
-        } else if self.strict && !diagnostics.is_empty() {
+        } else if self.strict && !diagnostics.is_empty() || !is_whole {
             Ok(Answer::No)
         } else {
             Ok(Answer::Fine)

@@ -16,6 +16,7 @@ mod explain;
 mod faults;
 mod fit;
 mod init;
+mod look;
 mod model;
 mod new;
 mod nodes;

@@ -19,9 +19,13 @@
 
 mod acknowledgements;
 mod broker;
+#[cfg(feature = "cli")]
+mod browse;
 mod client;
 mod gap;
 mod left_out;
+mod listen;
+mod look;
 mod message;
 mod outgoing;
 mod payload;

@@ -271,7 +271,7 @@ impl<'a> Session<'a> {
 }
 
 /// The time of day, as it is stamped where a message has no time.
-fn arrival() -> Instant {
+pub(crate) fn arrival() -> Instant {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let ns = since.map_or(0, |of| i64::try_from(of.as_nanos()).unwrap_or(i64::MAX));
     Instant::from_ns(ns)

@@ -6,7 +6,7 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::time::{Duration, Instant};
 use athermal_serve::connector::{
-    ConnectorError, Inlet, Mapping, Outflow, ParameterRemark, Source, SourceWiring, Stop,
+    ConnectorError, Inlet, Mapping, Outflow, ParameterRemark, Seen, Source, SourceWiring, Stop,
     WiredChannel,
 };
 use athermal_serve::register_source;
@@ -18,6 +18,7 @@ use crate::broker::{Broker, Login, Version, Way, keep_alive};
 use crate::client::{Ended, Settings};
 use crate::gap::GapWatch;
 use crate::left_out::LeftOutCounts;
+use crate::look::look;
 use crate::message::{Messages, TimeForm};
 use crate::payload::{Form, Time, Values};
 use crate::session::Session;
@@ -103,6 +104,22 @@ pub(crate) struct Route {
 }
 
 impl MqttSource {
+    fn settings(&self, wiring: &SourceWiring) -> Result<Settings, ConnectorError> {
+        let way = Way {
+            broker: &self.broker,
+            authorities: self.authorities.as_ref(),
+            login: self.login.as_ref(),
+            client_id: self.client_id.as_deref(),
+            keep_alive: self.keep_alive,
+        };
+        let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
+        Ok(Settings {
+            version: self.version.unwrap_or(Version::Five),
+            receive_maximum: self.receive_maximum,
+            ..settings.map_err(ConnectorError::new)?
+        })
+    }
+
     /// Its routes, for these channels.
     fn routes(&self, channels: &[WiredChannel]) -> Vec<Route> {
         let mut routes = Vec::new();
@@ -185,20 +202,15 @@ impl Source for MqttSource {
         all
     }
 
+    fn look(&self, wiring: SourceWiring, patience: Wait) -> Result<Vec<Seen>, ConnectorError> {
+        let settings = self.settings(&wiring)?;
+        let routes = self.routes(&wiring.channels);
+        let seen = look(&settings, &routes, &wiring.channels, patience);
+        seen.map_err(|why| ConnectorError::new(format_args!("{}: {why}", self.broker)))
+    }
+
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
-        let way = Way {
-            broker: &self.broker,
-            authorities: self.authorities.as_ref(),
-            login: self.login.as_ref(),
-            client_id: self.client_id.as_deref(),
-            keep_alive: self.keep_alive,
-        };
-        let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
-        let settings = Settings {
-            version: self.version.unwrap_or(Version::Five),
-            receive_maximum: self.receive_maximum,
-            ..settings.map_err(ConnectorError::new)?
-        };
+        let settings = self.settings(&wiring)?;
         // That it cannot speak to such a broker is known before anything runs.
         crate::client::Connection::new(&settings).map_err(ConnectorError::new)?;
         let routes = self.routes(&wiring.channels);

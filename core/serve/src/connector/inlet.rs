@@ -2,6 +2,7 @@
 
 use std::fmt::Debug;
 use std::path::PathBuf;
+use std::time::Duration as Wait;
 
 use super::{ConnectorError, Outflow, Stop};
 use crate::compile::SourceChannel;
@@ -37,6 +38,16 @@ pub trait Source: Debug + Send + Sync {
         false
     }
 
+    /// What it has of each channel at present, for whoever commissions it: it connects, reads one of everything, and leaves. It takes no
+    /// longer than so long, and disturbs nothing that runs.
+    ///
+    /// # Errors
+    /// When it cannot be reached, or asked so.
+    fn look(&self, _: SourceWiring, _: Wait) -> Result<Vec<Seen>, ConnectorError> {
+        let words = "sources of this kind cannot be asked for one of everything; `athermal serve --dry-run` shows what comes";
+        Err(ConnectorError::new(words))
+    }
+
     /// The source at work. Nothing is connected yet: that is for [`Inlet::run`].
     ///
     /// # Errors
@@ -55,6 +66,23 @@ pub struct ParameterRemark {
     pub words: String,
     /// What to do.
     pub help: String,
+}
+
+/// What a source has of a channel at present.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Its number among those that were asked for.
+    pub channel: usize,
+    /// The value, in the unit of the source; none where nothing came that could be used.
+    pub value: Option<f64>,
+    /// What is said of it: good, or why there is none.
+    pub quality: String,
+    /// Of when it is.
+    pub stamp: Option<Instant>,
+    /// By how much its clock is behind the one of this computer, the way included.
+    pub offset: Option<Duration>,
+    /// What the other side granted, where it was asked for something.
+    pub granted: String,
 }
 
 /// Channels that a source gives by a parameter of its own.

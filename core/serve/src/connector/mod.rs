@@ -13,7 +13,7 @@ mod stop;
 
 pub use error::ConnectorError;
 pub use inlet::{
-    Inlet, Mapped, Mapping, ParameterRemark, Source, SourceWiring, Stamps, WiredChannel,
+    Inlet, Mapped, Mapping, ParameterRemark, Seen, Source, SourceWiring, Stamps, WiredChannel,
 };
 pub use kind::{
     ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,

@@ -174,7 +174,12 @@ impl Peer {
     }
 }
 
-/// Publishes with QoS 1 from a queue of its own, in order, one each `pace`, through all outages: what has no answer is sent again.
+/// What a publisher sends again on a new connection although the broker had answered: a broker that saves after each message answers
+/// a moment before it has saved.
+const AGAIN: usize = 50;
+
+/// Publishes with QoS 1 from a queue of its own, in order, one each `pace`, through all outages: what has no answer is sent again, and
+/// the last ones that had.
 pub fn publish_all(
     port: u16,
     messages: &[(String, String)],
@@ -191,6 +196,10 @@ pub fn publish_all(
         };
         let mut waiting = VecDeque::new();
         let mut work = || -> io::Result<()> {
+            let first = open.front().copied().unwrap_or(next);
+            for nth in (first.saturating_sub(AGAIN)..first).rev() {
+                open.push_front(nth);
+            }
             for &nth in &open {
                 let (topic, payload) = &messages[nth];
                 waiting.push_back(peer.publish(topic, payload.as_bytes(), 8)?);
@@ -201,7 +210,7 @@ pub fn publish_all(
                 }
                 let due = began + pace * next as u32;
                 let now = Instant::now();
-                if next < messages.len() && open.len() < 20 && due <= now {
+                if next < messages.len() && open.len() < 20 + AGAIN && due <= now {
                     let (topic, payload) = &messages[next];
                     // Before it is sent: where that fails it is sent again.
                     open.push_back(next);
