@@ -16,7 +16,6 @@ mod explain;
 mod faults;
 mod fit;
 mod init;
-mod look;
 mod model;
 mod new;
 mod nodes;

@@ -176,6 +176,7 @@ impl Reader {
         let column = |name: &String| ChannelColumn {
             column: name.clone(),
             optional: false,
+            is_instant: false,
         };
         let mut wanted = layout.clone();
         if long.is_some() {
@@ -532,7 +533,11 @@ impl Reading {
         cell: &[u8],
     ) -> Result<f64, FileError> {
         let (column, ledger) = (&self.layout.channels[index].column, &mut self.ledger);
-        match cell::value(cell, self.commas.values) {
+        let value = match self.layout.channels[index].is_instant {
+            true => instant(&self.layout.time, cell),
+            false => cell::value(cell, self.commas.values),
+        };
+        match value {
             Some(_)
                 if self.commas.values
                     && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
@@ -547,6 +552,16 @@ impl Reading {
             })?,
         }
         Ok(f64::NAN)
+    }
+}
+
+/// The instant that a cell beside the time says in its form, in s; none where it says none.
+#[cold]
+fn instant(time: &TimeColumn, cell: &[u8]) -> Option<f64> {
+    match time.read(cell::trim(cell), None) {
+        Some(Civil::At(at)) => Some((at - Instant::from_ns(0)).secs()),
+        Some(_) => None,
+        None => cell::value(cell, false).filter(|value| value.is_nan()),
     }
 }
 

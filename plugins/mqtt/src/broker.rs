@@ -1,6 +1,7 @@
 //! Where a broker is and how one logs in: what source and sink have in common.
 
 use std::fmt;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration as Wait;
@@ -76,6 +77,16 @@ impl FromStr for Broker {
             is_secure,
             authorities: None,
         })
+    }
+}
+
+impl Broker {
+    /// Whether somebody listens there.
+    pub fn is_there(&self) -> bool {
+        let host = self.host.trim_matches(['[', ']']);
+        let found = (host, self.port).to_socket_addrs();
+        let mut addresses = found.into_iter().flatten();
+        addresses.any(|of| TcpStream::connect_timeout(&of, Wait::from_secs(1)).is_ok())
     }
 }
 

@@ -8,7 +8,7 @@ use athermal_serve::connector::{Seen, WiredChannel};
 use crate::client::Settings;
 use crate::listen::{Heard, listen};
 use crate::payload::Values;
-use crate::session::arrival;
+use crate::session::{arrival, shown};
 use crate::source::Route;
 
 /// What came of each channel.
@@ -53,7 +53,7 @@ pub fn look(
                         // A fresh one says more than one that was kept.
                         if seen.value.is_none() || seen.quality != "good" {
                             seen.value = Some(of.value);
-                            seen.stamp = Some(of.stamp);
+                            seen.stamp = Some(shown(of.stamp));
                             seen.offset = Some(now - of.stamp);
                             seen.quality = match message.is_retained {
                                 true => "retained".to_owned(),

@@ -299,7 +299,8 @@ impl MqttInlet {
                 "another client has taken over its session".to_owned()
             }
             Ended::Closed(words) => {
-                if was_connected {
+                // Where it is still there, it was not its own end that ended the connection.
+                if was_connected && broker.is_there() {
                     self.take_overs.push_back(Clock::now());
                 }
                 words

@@ -33,6 +33,12 @@ pub trait Source: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Whether its connection is dropped and made anew where it is connected, and neither gives a sample nor says that it is
+    /// [alive](Outflow::alive) for as long as `silent` says. A reconnect that brings no data back is noticed by that.
+    fn is_watched(&self) -> bool {
+        self.stamps() == Stamps::Clock
+    }
+
     /// Whether it will come to an end, after which the service ends too.
     fn ends(&self) -> bool {
         false
@@ -77,8 +83,8 @@ pub struct Seen {
     pub value: Option<f64>,
     /// What is said of it: good, or why there is none.
     pub quality: String,
-    /// Of when it is.
-    pub stamp: Option<Instant>,
+    /// Of when it is, for people.
+    pub stamp: Option<String>,
     /// By how much its clock is behind the one of this computer, the way included.
     pub offset: Option<Duration>,
     /// What the other side granted, where it was asked for something.

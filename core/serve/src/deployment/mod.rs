@@ -3,6 +3,7 @@
 mod channels;
 mod describe;
 mod keys;
+mod look;
 pub mod problem;
 mod runtime;
 mod schema;
@@ -10,6 +11,7 @@ mod sinks;
 mod size;
 mod sources;
 
+pub use look::{Found, NAMES};
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
 pub use size::Size;

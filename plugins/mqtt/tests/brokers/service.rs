@@ -84,11 +84,7 @@ impl Running {
     pub fn start(folder: &Folder, machine: &str) -> Self {
         fs::write(folder.0.join("machine.toml"), machine).unwrap();
         let (model, deployment) = deployment(&folder.0);
-        let options = ServiceOptions {
-            state: folder.0.join("state"),
-            is_dry: false,
-            frozen: false,
-        };
+        let options = ServiceOptions::new(folder.0.join("state"));
         let (service, _) = Service::start(&model, deployment, &options).unwrap();
         Self {
             service: Some(service),
@@ -167,11 +163,7 @@ fn child() {
     };
     let folder = PathBuf::from(folder);
     let (model, deployment) = deployment(&folder);
-    let options = ServiceOptions {
-        state: folder.join("state"),
-        is_dry: false,
-        frozen: false,
-    };
+    let options = ServiceOptions::new(folder.join("state"));
     let (mut service, _) = Service::start(&model, deployment, &options).unwrap();
     while !folder.join("stop").exists() {
         for event in service.pump() {

@@ -74,7 +74,7 @@ fn each_output_has_a_topic_and_the_service_says_that_it_lives() {
         .rfind(|of| of.topic == "out/masses.plate@3s")
         .map(json)
         .unwrap();
-    assert_eq!(row["unit"], "Cel");
+    assert_eq!(row["unit"], "K");
     assert!(
         row["value"].is_f64() && row["behind_s"].as_f64().unwrap() < 5.0,
         "{row}"
