@@ -67,7 +67,7 @@ impl GapWatch {
             }
         };
         let missing = number.saturating_sub(*last).saturating_sub(1);
-        if missing >= 0 || missing < -AGAIN {
+        if !(-AGAIN..0).contains(&missing) {
             *last = number;
         }
         (missing > 0).then(|| Gap {
