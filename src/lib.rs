@@ -60,6 +60,8 @@ use athermal_command::{message, output, terminal};
 extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
+#[cfg(feature = "parquet")]
+use athermal_arrow as _;
 use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;

@@ -17,6 +17,7 @@ use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
 use crate::long::Long;
+use crate::typed::{self, TypedCells, TypedFile};
 use crate::{
     Again, CellFault, ChannelColumn, Event, FileError, Format, Layout, Place, Report, TimeColumn,
 };
@@ -76,6 +77,7 @@ pub struct Reader {
 enum Rows {
     Csv(Box<CsvRows>),
     Json(Box<JsonRows>),
+    Typed(Box<TypedCells>),
 }
 
 /// What becomes of rows, whatever their format.
@@ -132,6 +134,9 @@ impl Reader {
         if let Some((_, time)) = options.times.iter().find(|(file, _)| file == path) {
             layout.time = time.clone();
         }
+        if let Some(kind) = typed::kind_of(path) {
+            return Self::from_typed(path, typed::open(kind, path)?, layout, options);
+        }
         let format = options.format.or_else(|| Format::of_file(path));
         let options = Options { format, ..options };
         let table = layout.table_of(path).clone();
@@ -172,31 +177,53 @@ impl Reader {
         options: Options,
     ) -> Result<Self, FileError> {
         lines.only_whole = options.goes_on;
-        let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout));
-        let column = |name: &String| ChannelColumn {
-            column: name.clone(),
-            optional: false,
-        };
-        let mut wanted = layout.clone();
-        if long.is_some() {
-            let cells = [&table.name, &table.value].into_iter().flatten();
-            wanted.channels = cells.map(column).collect();
-        }
-        let segment_cell = table.segment.as_ref().map(|_| wanted.channels.len());
-        wanted.channels.extend(table.segment.as_ref().map(column));
+        let wanted = wanted(&layout, table);
         let (rows, separator) = match lines.format_or(options.format)? {
-            Format::Csv => {
+            Format::JsonLines => (Rows::Json(Box::new(JsonRows::new(lines, &wanted)?)), None),
+            _ => {
                 let rows = CsvRows::new(lines, &wanted, table)?;
                 let separator = rows.separator();
                 (Rows::Csv(Box::new(rows)), Some(separator))
             }
-            Format::JsonLines => (Rows::Json(Box::new(JsonRows::new(lines, &wanted)?)), None),
         };
+        Ok(Self::of_rows(rows, separator, layout, table, &options))
+    }
+
+    /// Reads a file that is no text.
+    fn from_typed(
+        path: &Path,
+        file: Box<dyn TypedFile>,
+        layout: Layout,
+        options: Options,
+    ) -> Result<Self, FileError> {
+        let table = layout.table_of(path).clone();
+        let wanted = wanted(&layout, &table);
+        let is_long = table.layout == Arrangement::Long;
+        let numbers = if is_long { 0 } else { layout.channels.len() };
+        let cells = TypedCells::new(path, file, &wanted, numbers)?;
+        let rows = Rows::Typed(Box::new(cells));
+        Ok(Self::of_rows(rows, None, layout, &table, &options))
+    }
+
+    fn of_rows(
+        rows: Rows,
+        separator: Option<u8>,
+        layout: Layout,
+        table: &TableFormat,
+        options: &Options,
+    ) -> Self {
+        let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout));
+        let cells = if long.is_some() {
+            2
+        } else {
+            layout.channels.len()
+        };
+        let segment_cell = table.segment.as_ref().map(|_| cells);
         let joins = options.joins || long.is_some();
         let mut ledger = Ledger::new(options.lenient || table.lenient, table.decimal);
         ledger.joins = joins;
         ledger.goes_on = options.goes_on;
-        Ok(Self {
+        Self {
             rows,
             reading: Reading {
                 layout,
@@ -211,7 +238,7 @@ impl Reader {
                 lookahead: Lookahead::default(),
             },
             waiting: None,
-        })
+        }
     }
 
     /// Reads the next row into `row`; false at the end of the recording.
@@ -223,6 +250,7 @@ impl Reader {
         match &mut self.rows {
             Rows::Csv(rows) => self.reading.next_joined(rows.as_mut(), row),
             Rows::Json(rows) => self.reading.next_joined(rows.as_mut(), row),
+            Rows::Typed(rows) => self.reading.next_joined(rows.as_mut(), row),
         }
     }
 
@@ -262,7 +290,7 @@ impl Reader {
 
     /// Whether the columns are known by their names alone, and not by the rows.
     pub(crate) fn has_names(&self) -> bool {
-        matches!(self.rows, Rows::Csv(_)) && self.reading.long.is_none()
+        !matches!(self.rows, Rows::Json(_)) && self.reading.long.is_none()
     }
 
     /// Which channels of the layout were there, as far as the file was read.
@@ -271,6 +299,7 @@ impl Reader {
             (Some(long), _) => long.seen().to_vec(),
             (None, Rows::Csv(rows)) => rows.present(),
             (None, Rows::Json(rows)) => rows.present(),
+            (None, Rows::Typed(rows)) => rows.present(),
         }
     }
 
@@ -279,6 +308,7 @@ impl Reader {
         match &self.rows {
             Rows::Csv(rows) => rows.names().to_vec(),
             Rows::Json(rows) => rows.names(),
+            Rows::Typed(rows) => rows.names().to_vec(),
         }
     }
 
@@ -466,6 +496,10 @@ impl Reading {
         text: &mut String,
     ) -> Result<Option<i64>, FileError> {
         text.clear();
+        if let Some((ns, is_utc, of_file)) = rows.instant() {
+            text.push_str(of_file);
+            return self.take_instant(rows, ns, is_utc);
+        }
         let (time, ledger) = (&self.layout.time, &mut self.ledger);
         time.columns
             .join(&mut self.time, |column| cell::trim(rows.time(column)));
@@ -506,8 +540,47 @@ impl Reading {
         Ok(Some(at.as_ns()))
     }
 
+    /// The same of a row that has an instant, by UTC or by the clock of the zone.
+    fn take_instant<C: Cells>(
+        &mut self,
+        rows: &C,
+        ns: i64,
+        is_utc: bool,
+    ) -> Result<Option<i64>, FileError> {
+        self.time.clear();
+        self.time.extend_from_slice(rows.time(0));
+        let (time, ledger) = (&self.layout.time, &mut self.ledger);
+        let at = match &time.zone {
+            Some(zone) if !is_utc => zone.instant(Instant::from_ns(ns), ledger.last()),
+            _ => Civil::At(Instant::from_ns(ns)),
+        };
+        if !is_utc && time.zone.is_none() {
+            ledger
+                .report
+                .without_zone
+                .get_or_insert_with(|| rows.place());
+        }
+        if let Civil::At(at) = at {
+            return Ok(Some(at.as_ns()));
+        }
+        ledger.refuse_row(|| {
+            let column = time.columns.to_string();
+            bad_cell(
+                rows.place(),
+                &column,
+                &self.time,
+                no_instant(time, Some(at)),
+            )
+        })?;
+        Ok(None)
+    }
+
     fn read_values<C: Cells>(&mut self, rows: &C, values: &mut Vec<f64>) -> Result<(), FileError> {
         values.clear();
+        if let Some(numbers) = rows.numbers() {
+            values.extend_from_slice(numbers);
+            return Ok(());
+        }
         let channels = self.layout.channels.len();
         if self.long.is_none() {
             for index in 0..channels {
@@ -548,6 +621,22 @@ impl Reading {
         }
         Ok(f64::NAN)
     }
+}
+
+/// The columns whose cells are read: those of the channels, or where a row has one value its name and that; behind them the one for
+/// segments.
+fn wanted(layout: &Layout, table: &TableFormat) -> Layout {
+    let column = |name: &String| ChannelColumn {
+        column: name.clone(),
+        optional: false,
+    };
+    let mut wanted = layout.clone();
+    if table.layout == Arrangement::Long {
+        let cells = [&table.name, &table.value].into_iter().flatten();
+        wanted.channels = cells.map(column).collect();
+    }
+    wanted.channels.extend(table.segment.as_ref().map(column));
+    wanted
 }
 
 /// A cell that is not taken.
