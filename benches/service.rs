@@ -151,11 +151,7 @@ fn serve(model: &Model) {
     };
     let deployment = Deployment::read(&graph, &model.plan, &files, &mut mistakes);
     let deployment = deployment.expect("it has no mistake");
-    let options = ServiceOptions {
-        state: folder.clone(),
-        is_dry: false,
-        frozen: false,
-    };
+    let options = ServiceOptions::new(folder.clone());
     let (mut service, _) =
         Service::start(model, deployment, &options).expect("the folder can be written");
     while !service.is_over() {

@@ -13,11 +13,11 @@ use athermal::trial::machine::{
     ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
     machine, machines,
 };
-use athermal_simulation::{table_columns, write_table};
+use athermal_simulation::{table_columns, write_set_points, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::aside::{check_apart, not_written};
+use super::aside::{check_apart, not_written, write_aside};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
@@ -69,6 +69,9 @@ pub struct Simulate {
     /// Set points over time; the machine has a schedule of its own
     #[arg(long, value_name = "FILE", requires = "machine")]
     schedule: Option<PathBuf>,
+    /// Write what the schedule plans too: a row half an hour before each set point applies
+    #[arg(long, value_name = "FILE", requires = "output")]
+    set_points: Option<PathBuf>,
     /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
     #[arg(long, value_name = "MODEL", requires = "machine")]
     compensate: Option<PathBuf>,
@@ -97,8 +100,14 @@ impl Simulate {
         }
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
         data::check_ending(output)?;
-        let read = self.compensate.iter().chain(&self.schedule);
-        check_apart("--output", output, read.map(|path| &**path))?;
+        let read = || self.compensate.iter().chain(&self.schedule);
+        check_apart("--output", output, read().map(|path| &**path))?;
+        if let Some(path) = &self.set_points {
+            let others = read().map(|path| &**path).chain([output]);
+            check_apart("--set-points", path, others)?;
+            let plan = write_set_points(known.machine, &self.setup(known.machine)?);
+            write_aside(path, plan)?;
+        }
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() == "-" {
             return Ok(Answer::Fine);
@@ -130,11 +139,7 @@ impl Simulate {
         output: &Path,
         terminal: &Terminal,
     ) -> Result<u64, Failure> {
-        let setup = Setup {
-            days: self.days,
-            seed: self.seed,
-            schedule: self.schedule(machine)?,
-        };
+        let setup = self.setup(machine)?;
         let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
         match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
@@ -164,6 +169,14 @@ impl Simulate {
             take(&row, self.truth, values);
             values.extend_from_slice(simulation.applied());
             more.then_some(row.time_ns)
+        })
+    }
+
+    fn setup(&self, machine: &dyn Machine) -> Result<Setup, Failure> {
+        Ok(Setup {
+            days: self.days,
+            seed: self.seed,
+            schedule: self.schedule(machine)?,
         })
     }
 
@@ -288,7 +301,11 @@ impl Simulation for Watched {
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = machines().values().flatten().map(describe).collect();
+        let all: Vec<Value> = machines()
+            .values()
+            .flatten()
+            .map(KnownMachine::facts)
+            .collect();
         println!("{:#}", json!({ "machines": all }));
         return;
     }
@@ -313,23 +330,4 @@ fn list(terminal: &Terminal) {
         println!("  a schedule can set: {}\n", set_points.join(", "));
     }
     terminal.note("Next: athermal simulate die-tester -o train.csv");
-}
-
-fn describe(known: &KnownMachine) -> Value {
-    let machine = known.machine;
-    let channels = machine.channels().iter().map(|channel| {
-        json!({ "channel": channel.reference(), "column": channel.column(), "unit": channel.unit })
-    });
-    let set_points = machine.set_points().iter().map(
-        |what| json!({ "name": what.name, "default_degC": what.default, "range_degC": what.range }),
-    );
-    let (channels, set_points): (Value, Value) = (channels.collect(), set_points.collect());
-    json!({
-        "name": machine.name(),
-        "summary": machine.summary(),
-        "package": known.package,
-        "version": known.version,
-        "channels": channels,
-        "set_points": set_points,
-    })
 }

@@ -263,6 +263,7 @@ impl Survey {
         let channel = |column: &Column| ChannelColumn {
             column: column.name.clone(),
             optional: true,
+            is_instant: false,
         };
         let mut recording = data.skim(Layout {
             time: clock.column(),

@@ -15,6 +15,7 @@ mod language;
 mod leaks;
 mod learning;
 mod modules;
+mod planned;
 mod predicted_at_once;
 mod runs_between_truths;
 mod swap;

@@ -14,6 +14,7 @@ mod estimators;
 mod in_sample;
 mod missing_truths;
 mod novelty;
+mod planned;
 mod redundancy;
 mod reference_figures;
 mod scores_by_hand;

@@ -216,6 +216,9 @@ impl DurationError {
     pub fn help(&self) -> Option<String> {
         match self {
             Self::DecimalComma { instead, .. } => Some(decimal_comma::help(instead)),
+            Self::Negative => Some(
+                "what is ahead is known of plans alone: only a `lag` may be negative, of a signal with `known_ahead`".to_owned(),
+            ),
             _ => None,
         }
     }

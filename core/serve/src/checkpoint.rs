@@ -116,6 +116,14 @@ impl Checkpoints {
         Ok(())
     }
 
+    /// Removes those taken before so many ticks, beats, breaks and freezes. One that stays does no harm.
+    pub fn forget(&self, happenings: u64) {
+        let files = self.files().unwrap_or_default();
+        for (_, path) in files.iter().filter(|(of, _)| *of < happenings) {
+            let _ = fs::remove_file(path);
+        }
+    }
+
     /// All that can be used, newest first, and why others cannot.
     ///
     /// # Errors

@@ -9,6 +9,8 @@ use std::{fmt, io};
 use athermal_run::live::store::write_whole;
 use athermal_run::model::{Model, ModelError};
 
+use crate::checkpoint::Checkpoints;
+
 /// How long a process that is ending is waited for.
 const ENDS: Wait = Wait::from_secs(1);
 
@@ -73,7 +75,13 @@ impl StateFolder {
             paths: StatePaths::new(path),
             _lock: file,
         };
-        for part in [folder.journal(), folder.checkpoints(), folder.models()] {
+        let parts = [
+            folder.journal(),
+            folder.checkpoints(),
+            folder.models(),
+            folder.swaps(),
+        ];
+        for part in parts {
             fs::create_dir_all(&part).map_err(not_written(&part))?;
         }
         Ok(folder)
@@ -109,6 +117,18 @@ impl StatePaths {
     #[must_use]
     pub fn models(&self) -> PathBuf {
         self.0.join("models")
+    }
+
+    /// Where graphs are as they were when they were committed: what a replay lets take over.
+    #[must_use]
+    pub fn swaps(&self) -> PathBuf {
+        self.0.join("swaps")
+    }
+
+    /// Graphs as they were when they were committed; all are kept that the journal goes back to.
+    #[must_use]
+    pub fn commits(&self) -> Checkpoints {
+        Checkpoints::new(self.swaps(), usize::MAX)
     }
 
     /// Keeps a model by its revision, so that a checkpoint of it is of use.

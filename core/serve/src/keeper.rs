@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_run::live::{Control, Notice};
+use athermal_run::live::{Control, Notice, StageError};
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
+use crate::folder::FolderError;
 use crate::journal::Progress;
 
 /// Takes checkpoints from the replica, so that the engine thread never serialises.
@@ -13,6 +14,10 @@ use crate::journal::Progress;
 pub struct Keeper {
     control: Control,
     checkpoints: Checkpoints,
+    /// Graphs as they were when they were committed.
+    swaps: Checkpoints,
+    /// Whether one is on its way to the engine thread. Until it has taken over, the replica is not what a start is to go on from.
+    is_committed: bool,
     progress: Arc<Progress>,
     /// How many ticks, beats, breaks and freezes there were before this run.
     before: u64,
@@ -28,7 +33,7 @@ impl Keeper {
     #[must_use]
     pub fn new(
         control: Control,
-        checkpoints: Checkpoints,
+        (checkpoints, swaps): (Checkpoints, Checkpoints),
         progress: Arc<Progress>,
         before: u64,
         every: Wait,
@@ -36,6 +41,8 @@ impl Keeper {
         Self {
             control,
             checkpoints,
+            swaps,
+            is_committed: false,
             progress,
             before,
             every,
@@ -54,11 +61,48 @@ impl Keeper {
     /// When it cannot be written. It is tried again after `every`.
     pub fn pump(&mut self) -> Result<Vec<Notice>, CheckpointError> {
         let notices = self.control.pump();
+        let is_over = |of: &Notice| !matches!(of, Notice::Missed { .. });
+        self.is_committed &= !notices.iter().any(is_over);
         if self.waiting.is_none() && self.taken.elapsed() >= self.every {
             self.take();
         }
         self.save()?;
         Ok(notices)
+    }
+
+    /// Lets the staged graph take over before the next tick. It is saved as it is, so that a replay lets the same take over.
+    ///
+    /// # Errors
+    /// When it cannot be saved, nothing is staged, or a graph is still on its way; what runs is untouched.
+    pub fn commit(&mut self) -> Result<(), CommitError> {
+        self.send(0, Control::commit)
+    }
+
+    /// Lets the graph before the last swap take over again; as [`commit`](Self::commit).
+    ///
+    /// # Errors
+    /// As of [`commit`](Self::commit), and when none is still warm.
+    pub fn rollback(&mut self) -> Result<(), CommitError> {
+        self.send(1, Control::rollback)
+    }
+
+    fn send(
+        &mut self,
+        which: usize,
+        send: fn(&mut Control) -> Result<(), StageError>,
+    ) -> Result<(), CommitError> {
+        let happenings = self.before + self.control.events();
+        if let Some(engine) = self.control.beside()[which] {
+            self.swaps.save(&Checkpoint::of(engine, happenings))?;
+        }
+        send(&mut self.control)?;
+        self.is_committed = true;
+        Ok(())
+    }
+
+    /// Forgets how graphs took over before so many ticks, beats, breaks and freezes: the journal does not go back to them.
+    pub fn forget(&self, happenings: u64) {
+        self.swaps.forget(happenings);
     }
 
     /// Saves what the replica knows now, once the journal is synced up to it. For the end, when the journal is finished.
@@ -88,6 +132,7 @@ impl Keeper {
         let happenings = self.before + self.control.events();
         if let Some(replica) = self.control.replica()
             && happenings > self.last
+            && !self.is_committed
             // What a node that was given up had learned is not whole: the journal goes on from before.
             && replica.panics().is_empty()
         {
@@ -105,5 +150,46 @@ impl Keeper {
         self.checkpoints.save(&checkpoint)?;
         self.last = checkpoint.happenings;
         Ok(())
+    }
+}
+
+/// Why a graph does not take over.
+#[derive(Debug)]
+pub enum CommitError {
+    /// It cannot be saved, so that no replay could let it take over.
+    NotSaved(CheckpointError),
+    /// Its model cannot be kept.
+    NotKept(FolderError),
+    /// It cannot take over.
+    NotStaged(StageError),
+}
+
+impl std::fmt::Display for CommitError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NotSaved(error) => error.fmt(f),
+            Self::NotKept(error) => error.fmt(f),
+            Self::NotStaged(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for CommitError {}
+
+impl From<CheckpointError> for CommitError {
+    fn from(error: CheckpointError) -> Self {
+        Self::NotSaved(error)
+    }
+}
+
+impl From<FolderError> for CommitError {
+    fn from(error: FolderError) -> Self {
+        Self::NotKept(error)
+    }
+}
+
+impl From<StageError> for CommitError {
+    fn from(error: StageError) -> Self {
+        Self::NotStaged(error)
     }
 }

@@ -15,6 +15,7 @@
 //! | [`connector`] | what a source and a sink implement, and how their kinds become known |
 //! | [`deployment`] | what a machine file says of them, and of time |
 //! | [`moment`] | time that the host's clock does not touch |
+//! | [`host`] | the host's clock, and whether it is right |
 //! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
 //! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
 //! | [`replay`] | a log through an engine, to the same bits |
@@ -27,6 +28,7 @@ pub mod checkpoint;
 pub mod connector;
 pub mod deployment;
 pub mod folder;
+pub mod host;
 pub mod journal;
 pub mod keeper;
 pub mod moment;

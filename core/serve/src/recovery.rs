@@ -8,7 +8,7 @@ use athermal_run::model::Model;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
 use crate::compile::Plan;
-use crate::engine::{Engine, EngineError, NodeCarry, StateTransfer};
+use crate::engine::{Engine, EngineError, StateTransfer};
 use crate::folder::{StateFolder, StatePaths};
 use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
 use crate::replay::{Difference, Replay};
@@ -48,8 +48,8 @@ pub struct RecoveryReport {
     pub ahead: u64,
     /// The first tick whose outputs differ from those in the journal.
     pub difference: Option<Difference>,
-    /// What was carried over at each swap that lies behind the checkpoint.
-    pub swaps: Vec<(String, Vec<NodeCarry>)>,
+    /// The graphs that took over behind the checkpoint.
+    pub swaps: Vec<String>,
 }
 
 /// Where a recovery began.
@@ -261,6 +261,7 @@ impl Recovered {
         let mut log = Log::open_at(&folder.journal(), from)?;
         let mut seen = 0;
         let mut replay = Replay::new(engine, &Begin::nothing());
+        let mut committed = committed(folder, from);
         while let Some(entry) = log.read()? {
             let (event, record) = match entry {
                 Entry::Begin(begin) => {
@@ -271,14 +272,22 @@ impl Recovered {
                 }
                 Entry::Record(event, record) => (event, record),
             };
+            // A graph that was committed saw all that came between that and its taking over.
+            while let Some((_, engine)) = committed.next_if(|(at, _)| *at <= seen) {
+                replay.follow(engine);
+            }
             seen += u64::from(record.is_happening());
             match record {
                 Record::Swap { revision } if seen >= from => {
                     let revision = format!("{revision:016x}");
                     let next = folder.model(&revision);
                     model = next.map_err(|error| no_model(&revision, error))?;
-                    let carry = swap(&mut replay, &model)?;
-                    report.swaps.push((revision, carry));
+                    let next = match replay.followed(&revision) {
+                        Some(next) => next,
+                        None => carried(replay.engine(), &model)?,
+                    };
+                    replay.replace(next);
+                    report.swaps.push(revision);
                 }
                 _ if seen > from || seen == from && !record.is_happening() => {
                     let stepped = replay.apply(event, &record);
@@ -357,19 +366,31 @@ fn no_model(revision: &str, error: impl fmt::Display) -> RecoveryError {
     }
 }
 
-/// Lets another graph take over from the state of the one before, without a past to warm it by.
-fn swap(replay: &mut Replay, model: &Model) -> Result<Vec<NodeCarry>, RecoveryError> {
+/// Graphs as they were when they were committed, by after how many ticks, beats, breaks and freezes that was. One that cannot be read is
+/// made anew where it took over.
+fn committed(
+    folder: &StatePaths,
+    from: u64,
+) -> std::iter::Peekable<impl Iterator<Item = (u64, Engine)>> {
+    let commits = folder.commits();
+    let all = commits.read().into_iter().flatten();
+    let mut all: Vec<_> = all.filter_map(Result::ok).collect();
+    all.retain(|of| of.happenings >= from);
+    all.reverse();
+    let folder = folder.clone();
+    let engine = move |of: Checkpoint| {
+        let usable = usable(&folder, None, of, 0).ok();
+        usable.map(|(engine, _, happenings)| (happenings, engine))
+    };
+    all.into_iter().filter_map(engine).peekable()
+}
+
+/// A graph that takes over from the state of another, without a past to warm it by.
+fn carried(before: &Engine, model: &Model) -> Result<Engine, RecoveryError> {
     let next = Engine::new(Arc::clone(&model.plan), &model.fitted);
     let mut next = next.map_err(RecoveryError::Unfit)?;
     next.isolate_panics();
-    let before = replay.engine();
     let transfer = StateTransfer::between(before, &next, false);
-    let carry = next.adopt(&before.state(), &transfer, false);
-    let outputs = &before.plan().outputs;
-    let place = |name: &String| outputs.iter().position(|output| output.name == *name);
-    let plan = Arc::clone(next.plan());
-    let places: Vec<_> = plan.outputs.iter().map(|of| place(&of.name)).collect();
-    next.pass_over(before, &places);
-    replay.replace(next);
-    Ok(carry)
+    next.adopt(&before.state(), &transfer, false);
+    Ok(next)
 }

@@ -1,10 +1,9 @@
 //! A log through an engine: the same bits as when it was written.
 
-use std::sync::Arc;
-
 use athermal_run::live::Feed;
 
 use crate::channel::ABSENT;
+use crate::compile::PlannedOutput;
 use crate::engine::{Engine, EngineError};
 use crate::journal::{Begin, FeedNames, Record, output_hash};
 use crate::sequencer::Timeline;
@@ -13,14 +12,50 @@ use crate::time::Instant;
 /// An engine that a log is applied to.
 #[derive(Debug)]
 pub struct Replay {
-    engine: Engine,
+    runs: Fed,
+    /// Engines that may take over, and see all that the one that runs does.
+    beside: Vec<Fed>,
     timeline: Timeline,
     feed: FeedNames,
+    stepped: u64,
+    difference: Option<Difference>,
+}
+
+/// An engine, and what it is given.
+#[derive(Debug)]
+struct Fed {
+    engine: Engine,
     /// Where each channel that the engine reads stands in the feed.
     places: Vec<Option<usize>>,
     samples: Vec<f64>,
-    stepped: u64,
-    difference: Option<Difference>,
+}
+
+impl Fed {
+    fn new(engine: Engine, feed: &FeedNames) -> Self {
+        let mut fed = Self {
+            engine,
+            places: Vec::new(),
+            samples: Vec::new(),
+        };
+        fed.find_places(feed);
+        fed
+    }
+
+    fn find_places(&mut self, feed: &FeedNames) {
+        let place = |of: &Feed| {
+            let mut channels = feed.channels.iter();
+            channels.position(|(name, column)| *name == of.name && *column == of.column)
+        };
+        self.places = Feed::of(self.engine.plan()).iter().map(place).collect();
+        self.samples = vec![ABSENT; self.places.len()];
+    }
+
+    fn step(&mut self, at: Instant, row: &[f64]) -> Result<&[f64], EngineError> {
+        for (sample, place) in self.samples.iter_mut().zip(&self.places) {
+            *sample = place.map_or(ABSENT, |place| row[place]);
+        }
+        self.engine.step(at, &self.samples)
+    }
 }
 
 /// The first tick whose outputs differ from those in the log.
@@ -36,17 +71,14 @@ impl Replay {
     /// An engine at the beginning of a file of the log.
     #[must_use]
     pub fn new(engine: Engine, begin: &Begin) -> Self {
-        let mut replay = Self {
-            engine,
+        Self {
+            runs: Fed::new(engine, &begin.feed),
+            beside: Vec::new(),
             timeline: begin.timeline(),
-            feed: FeedNames::default(),
-            places: Vec::new(),
-            samples: Vec::new(),
+            feed: begin.feed.clone(),
             stepped: 0,
             difference: None,
-        };
-        replay.find_places(&begin.feed);
-        replay
+        }
     }
 
     /// The next file begins. `has_gap`: records are missing before it, so that what waits is known from it alone.
@@ -55,7 +87,8 @@ impl Replay {
             self.timeline = begin.timeline();
         }
         if begin.feed != self.feed {
-            self.find_places(&begin.feed);
+            self.feed.clone_from(&begin.feed);
+            self.all().for_each(|fed| fed.find_places(&begin.feed));
             self.timeline = begin.timeline();
         }
     }
@@ -73,18 +106,16 @@ impl Replay {
         match record {
             Record::Tick { at, hash } | Record::Beat { at, hash } => {
                 let row = self.timeline.tick(*at);
-                for (sample, place) in self.samples.iter_mut().zip(&self.places) {
-                    *sample = place.map_or(ABSENT, |place| row[place]);
-                }
-                let outputs = self.engine.step(*at, &self.samples)?;
+                self.beside.retain_mut(|fed| fed.step(*at, row).is_ok());
+                let outputs = self.runs.step(*at, row)?;
                 if output_hash(outputs) != *hash && self.difference.is_none() {
                     self.difference = Some(Difference { event, at: *at });
                 }
                 self.stepped += 1;
                 return Ok(true);
             }
-            Record::Break { .. } => self.engine.segment(),
-            Record::Freeze(frozen) => self.engine.freeze(*frozen),
+            Record::Break { .. } => self.all().for_each(|fed| fed.engine.segment()),
+            Record::Freeze(frozen) => self.all().for_each(|fed| fed.engine.freeze(*frozen)),
             _ => {}
         }
         record.apply(&mut self.timeline);
@@ -106,7 +137,7 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        &self.runs.engine
     }
 
     /// What waits.
@@ -115,12 +146,25 @@ impl Replay {
         &self.timeline
     }
 
-    /// Lets another engine go on.
-    pub fn replace(&mut self, engine: Engine) {
-        self.engine = engine;
-        self.difference = None;
-        let feed = std::mem::take(&mut self.feed);
-        self.find_places(&feed);
+    /// Lets an engine see all that the one that runs does from now on.
+    pub fn follow(&mut self, engine: Engine) {
+        self.beside.push(Fed::new(engine, &self.feed));
+    }
+
+    /// The engine of a revision that has followed, the last one where there are several. The others are let go.
+    pub fn followed(&mut self, revision: &str) -> Option<Engine> {
+        let mut beside = self.beside.drain(..).rev();
+        let found = beside.find(|fed| fed.engine.revision() == revision);
+        found.map(|fed| fed.engine)
+    }
+
+    /// Lets another engine go on, whose outputs pass over from those of the one that runs.
+    pub fn replace(&mut self, mut engine: Engine) {
+        let outputs = &self.runs.engine.plan().outputs;
+        let place = |of: &PlannedOutput| outputs.iter().position(|output| output.name == of.name);
+        let places: Vec<_> = engine.plan().outputs.iter().map(place).collect();
+        engine.pass_over(&self.runs.engine, &places);
+        self.runs = Fed::new(engine, &self.feed);
     }
 
     /// The channels and sources of the log.
@@ -132,17 +176,10 @@ impl Replay {
     /// The engine.
     #[must_use]
     pub fn into_engine(self) -> Engine {
-        self.engine
+        self.runs.engine
     }
 
-    fn find_places(&mut self, feed: &FeedNames) {
-        let plan = Arc::clone(self.engine.plan());
-        let place = |of: &Feed| {
-            let mut channels = feed.channels.iter();
-            channels.position(|(name, column)| *name == of.name && *column == of.column)
-        };
-        self.places = Feed::of(&plan).iter().map(place).collect();
-        self.samples = vec![ABSENT; self.places.len()];
-        self.feed = feed.clone();
+    fn all(&mut self) -> impl Iterator<Item = &mut Fed> {
+        std::iter::once(&mut self.runs).chain(&mut self.beside)
     }
 }

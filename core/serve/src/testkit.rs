@@ -60,6 +60,8 @@ impl<'a> SourceTrial<'a> {
                 column: (*address).to_owned(),
                 optional: false,
                 range: (f64::NEG_INFINITY, f64::INFINITY),
+                planned: None,
+                is_instant: false,
             },
             address: (*address).to_owned(),
             unit: crate::unit::Unit::one(),
@@ -83,6 +85,20 @@ impl<'a> SourceTrial<'a> {
     #[must_use]
     pub fn patience(mut self, patience: Wait) -> Self {
         self.patience = patience;
+        self
+    }
+
+    /// The unit of its channels in the graph; 1 unless this says so.
+    ///
+    /// # Panics
+    /// When there is no such unit.
+    #[must_use]
+    pub fn unit(mut self, unit: &str) -> Self {
+        let unit = crate::unit::Unit::parse(unit);
+        let unit = unit.unwrap_or_else(|error| panic!("{}", error.reason()));
+        for channel in &mut self.wiring.channels {
+            channel.unit = unit.clone();
+        }
         self
     }
 
@@ -196,6 +212,14 @@ impl<'a> SourceTrial<'a> {
                 old.stamp.as_ns()
             ));
         }
+        self.flood()
+    }
+
+    /// Tries what it does where nothing that it gives is taken, and then nobody is there any more.
+    ///
+    /// # Errors
+    /// The rule that it broke, in words.
+    pub fn flood(&self) -> Result<(), String> {
         let flooded = self.given(usize::MAX, &[], 4, false);
         flooded
             .map(|_| ())
@@ -246,7 +270,7 @@ pub fn open_sink(
 ) -> Result<Box<dyn Outlet>, String> {
     let wired = |name: &&str| WiredOutput {
         name: (*name).to_owned(),
-        unit: None,
+        unit: Some("nm".to_owned()),
     };
     let opened = sink.open(SinkWiring {
         name: "tried".to_owned(),

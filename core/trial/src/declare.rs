@@ -18,7 +18,7 @@ use crate::document::{
     Data, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt, known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
-use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine};
+use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine, plans};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -310,7 +310,7 @@ impl Declaring<'_> {
         };
         let missing: Vec<String> = needed
             .filter(sure)
-            .filter(|source| measures(&source.name).is_none())
+            .filter(|source| measures(&source.name).is_none() && !plans(machine, source))
             .map(|source| source.name.clone())
             .collect();
         if !missing.is_empty() {

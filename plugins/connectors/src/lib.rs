@@ -15,10 +15,13 @@ mod file_sink;
 mod file_source;
 mod follow;
 mod pace;
+mod pipe;
 mod replay;
 mod simulation;
 mod stream;
 mod table;
+
+pub use simulation::{SimulationSink, SimulationSource};
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! `simulation`: a simulated machine, which takes corrections back.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use athermal_core::time::Instant;
@@ -10,7 +10,7 @@ use athermal_serve::connector::{
     SourceWiring, Stamps, Stop,
 };
 use athermal_serve::{register_sink, register_source};
-use athermal_trial::machine::{Machine, Row, Setup, Simulation, machine};
+use athermal_trial::machine::{Announcements, Machine, Row, Setup, Simulation, machine, plans};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -91,25 +91,29 @@ impl Source for SimulationSource {
             seed: self.seed,
             schedule: None,
         };
-        let simulation = known.start(&setup).map_err(ConnectorError::new)?;
+        let mut simulation = known.start(&setup).map_err(ConnectorError::new)?;
         let axes = axes(&wiring.name);
         let names = known.channels().iter().filter(|of| of.is_axis());
         let names: Vec<_> = names.map(|of| of.name).collect();
+        let mut applied = Vec::new();
         with(&axes, |axes| {
             if axes.names != names {
                 axes.asked = vec![f64::NAN; names.len()];
                 axes.applied = vec![0.0; names.len()];
                 axes.names.clone_from(&names);
             }
+            // Its axes stand where they stood.
+            applied.clone_from(&axes.applied);
+            simulation.correct(&applied, &mut axes.applied);
         });
         Ok(Box::new(MachineInlet {
-            feeds: feeds(known, &names, &wiring)?,
+            feeds: feeds(known, &setup, &names, &wiring)?,
             simulation,
             row: Row::empty(known.channels()),
             known: wiring.channels.iter().map(|of| of.after).max(),
             pace: Pace::new(self.speed),
             values: vec![f64::NAN; wiring.channels.len()],
-            applied: vec![0.0; names.len()],
+            applied,
             axes,
         }))
     }
@@ -125,10 +129,15 @@ struct Feed {
 enum Origin {
     Channel(usize),
     Applied(usize),
+    /// A set point, as it is announced.
+    SetPoint(Box<Announcements>),
+    /// From when on that of the feed of this number applies.
+    AppliesAt,
 }
 
 fn feeds(
     machine: &dyn Machine,
+    setup: &Setup,
     axes: &[&str],
     wiring: &SourceWiring,
 ) -> Result<Vec<Feed>, ConnectorError> {
@@ -140,10 +149,13 @@ fn feeds(
         let applied = name
             .strip_prefix("applied.")
             .and_then(|axis| axes.iter().position(|of| *of == axis));
-        let (from, machine_unit) = match (measured, applied) {
-            (Some(nth), _) => (Origin::Channel(nth), unit(channels[nth].unit)?),
-            (None, Some(nth)) => (Origin::Applied(nth), unit("nm")?),
-            (None, None) => {
+        let planned = Announcements::of(machine, setup, &wired.channel);
+        let (from, machine_unit) = match (measured, applied, planned) {
+            (Some(nth), ..) => (Origin::Channel(nth), unit(channels[nth].unit)?),
+            (None, Some(nth), _) => (Origin::Applied(nth), unit("nm")?),
+            (.., Some(planned)) => (Origin::SetPoint(Box::new(planned)), unit("Cel")?),
+            _ if plans(machine, &wired.channel) => (Origin::AppliesAt, unit("s")?),
+            _ => {
                 let known: Vec<_> = channels.iter().map(|of| of.reference()).collect();
                 return Err(ConnectorError::new(format_args!(
                     "`{}` has no channel `{name}`; it has {}, and `applied.AXIS`",
@@ -190,10 +202,18 @@ impl Inlet for MachineInlet {
             if !is_known && !self.pace.wait(at, stop) {
                 break;
             }
-            for (value, feed) in self.values.iter_mut().zip(&self.feeds) {
-                let measured = match feed.from {
-                    Origin::Channel(nth) => self.row.values[nth],
-                    Origin::Applied(nth) => self.applied[nth],
+            // From when on a set point applies stands behind it.
+            let mut from_s = VecDeque::new();
+            for (value, feed) in self.values.iter_mut().zip(&mut self.feeds) {
+                let measured = match &mut feed.from {
+                    Origin::Channel(nth) => self.row.values[*nth],
+                    Origin::Applied(nth) => self.applied[*nth],
+                    Origin::SetPoint(planned) => {
+                        let announced = planned.next(self.row.time_ns);
+                        from_s.push_back(announced.map_or(f64::NAN, |(_, from_s)| from_s));
+                        announced.map_or(f64::NAN, |(set_point, _)| set_point)
+                    }
+                    Origin::AppliesAt => from_s.pop_front().unwrap_or(f64::NAN),
                 };
                 let converted = feed.machine.convert(measured, &feed.graph);
                 *value = converted.unwrap_or(f64::NAN);

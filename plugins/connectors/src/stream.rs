@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::file_sink::{columns, time_text};
+use crate::pipe::Pipe;
 use crate::table::{pass, reader};
 
 /// How rows of a pipe are written.
@@ -68,10 +69,9 @@ struct StandardInlet {
 
 impl Inlet for StandardInlet {
     fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
-        let input = io::stdin();
         let opened = reader(
             STANDARD_INPUT,
-            input,
+            Pipe::new(stop),
             &self.wiring,
             Some(self.format),
             None,

@@ -12,6 +12,7 @@ pub(crate) fn layout(wiring: &SourceWiring) -> Layout {
     let column = |of: &WiredChannel| ChannelColumn {
         column: of.address.clone(),
         optional: of.channel.optional,
+        is_instant: of.channel.is_instant,
     };
     Layout {
         time: TimeColumn::from(&wiring.time),

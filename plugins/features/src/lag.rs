@@ -1,6 +1,8 @@
-//! Values as they were some time ago.
+//! Values as they were some time ago, and as they are planned to be.
 
-use athermal_core::channel::{Channel, is_unchanged};
+use std::fmt;
+
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
     Restored, State, Tick,
@@ -11,23 +13,76 @@ use serde::{Deserialize, Serialize};
 
 use crate::past::{LookingBack, max_age_mistake};
 
-/// Each channel as it was some time ago, at one lag or several: past values as regressors.
+/// Each channel as it was some time ago, at one lag or several: past values as regressors. A negative lag gives what is planned.
 ///
 /// With every new value at `t` it gives, for each lag, the last value at or before `t − lag`, unless that was older than
 /// `max_age` at that instant. With several lags a channel is named by both: `plate1@5min`. The stamp moves with the value. A `delay`
 /// gives every value on, each later by the same; a `lag` looks back whenever there is a new one.
 ///
+/// A negative lag, `"-5min"`, gives what will be then, as it is planned at `t`. Only signals with `known_ahead` may be read so, and as far
+/// as that says. With a negative lag among the others all are given at every tick, stamped with it, since a plan holds from the instant
+/// that it names to the next.
+///
 /// The search for leaks counts each channel as so much older as its lag says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Lag {
-    /// How far to look back: `["5min", "10min"]`; 0 or more, each once.
+    /// How far to look back: `["5min", "10min"]`; each once. Negative is ahead.
     #[schemars(length(min = 1))]
-    pub lags: Vec<Duration>,
+    pub lags: Vec<Shift>,
     /// How old a value may have been at the instant looked back to; by default as old as a held value of the channel may be.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_age: Option<Duration>,
+}
+
+/// How far back in time, or with a minus how far ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Shift(pub Duration);
+
+impl Shift {
+    /// How far ahead, where it is.
+    fn ahead(self) -> Option<Duration> {
+        self.0.is_negative().then_some(-self.0)
+    }
+}
+
+impl TryFrom<String> for Shift {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let ahead = text.trim().strip_prefix(['-', '\u{2212}']);
+        let length = ahead.unwrap_or(&text).parse::<Duration>();
+        let length = length.map_err(|error| error.to_string())?;
+        Ok(Self(if ahead.is_some() { -length } else { length }))
+    }
+}
+
+impl From<Shift> for String {
+    fn from(shift: Shift) -> Self {
+        shift.to_string()
+    }
+}
+
+impl fmt::Display for Shift {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+impl JsonSchema for Shift {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Shift".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "type": "string",
+            "description": "A duration such as \"5min\"; \"-5min\" is as far ahead.",
+            "examples": ["5min", "-5min"]
+        })
+    }
 }
 
 impl Feature for Lag {
@@ -55,7 +110,7 @@ impl Feature for Lag {
         if let Some(mistake) = max_age_mistake(self.max_age, from) {
             return Err(vec![mistake]);
         }
-        let of = |channel: &Channel, lag: &Duration| Channel {
+        let of = |channel: &Channel, lag: &Shift| Channel {
             name: if self.lags.len() == 1 {
                 channel.name.clone()
             } else {
@@ -73,12 +128,16 @@ impl Feature for Lag {
     }
 
     fn reach(&self, _port: &str) -> Reach {
-        Reach::Delayed(self.lags.clone())
+        Reach::Delayed(self.lags.iter().map(|lag| lag.0).collect())
+    }
+
+    fn reads_ahead(&self) -> Vec<Duration> {
+        self.lags.iter().filter_map(|lag| lag.ahead()).collect()
     }
 
     fn memory(&self) -> Duration {
-        let longest = self.lags.iter().copied().max();
-        longest.unwrap_or_default() + self.max_age.unwrap_or_default()
+        let longest = self.lags.iter().map(|lag| lag.0).max();
+        longest.unwrap_or_default().max(Duration::ZERO) + self.max_age.unwrap_or_default()
     }
 
     fn every_tick(&self) -> bool {
@@ -88,28 +147,58 @@ impl Feature for Lag {
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channels = inputs.port("signal");
+        let back = self.lags.iter().filter(|lag| lag.ahead().is_none());
         Box::new(Lagging {
-            lags: self.lags.len(),
-            past: LookingBack::new(self.lags.clone(), self.max_age, channels),
+            lags: self.lags.iter().map(|lag| lag.ahead()).collect(),
+            channels: channels.len(),
+            max_age: self.max_age.unwrap_or(Duration::MAX),
+            past: LookingBack::new(back.map(|lag| lag.0).collect(), self.max_age, channels),
         })
     }
 }
 
 struct Lagging {
-    /// How many lags there are.
-    lags: usize,
+    /// Of each lag how far ahead it is, where it is.
+    lags: Box<[Option<Duration>]>,
+    channels: usize,
+    /// How long before an instant ahead a plan for it may have begun.
+    max_age: Duration,
     past: LookingBack,
+}
+
+impl Lagging {
+    /// Gives a channel at all lags at once, as it was and as it is planned.
+    fn plan(&mut self, nth: usize, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        let (values, stamps) = (tick.port(0), tick.stamps(0));
+        let mut past = self.past.before(nth, tick.now);
+        let mut place = nth;
+        for (i, ahead) in self.lags.iter().enumerate() {
+            let value = match ahead {
+                None => past.next().map_or(ABSENT, |(_, value, _)| value),
+                Some(_) => {
+                    place += self.channels;
+                    let is_old = tick.now - stamps[place] > self.max_age;
+                    if is_old { ABSENT } else { values[place] }
+                }
+            };
+            outputs.set_stamped(nth * self.lags.len() + i, value, tick.now);
+        }
+    }
 }
 
 impl Operator for Lagging {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
-        let inputs = tick.port(0).iter().zip(tick.stamps(0));
-        for (nth, (&value, &stamp)) in inputs.enumerate() {
-            if is_unchanged(value) || !self.past.take(nth, tick.now, value, stamp) {
-                continue;
-            }
-            for (i, (lag, past, stamp)) in self.past.before(nth, tick.now).enumerate() {
-                outputs.set_stamped(nth * self.lags + i, past, stamp + lag);
+        let is_planned = self.lags.iter().any(Option::is_some);
+        for nth in 0..self.channels {
+            let (value, stamp) = (tick.port(0)[nth], tick.stamps(0)[nth]);
+            let is_new = !is_unchanged(value) && self.past.take(nth, tick.now, value, stamp);
+            if is_planned {
+                self.plan(nth, tick, outputs);
+            } else if is_new {
+                let past = self.past.before(nth, tick.now);
+                for (i, (lag, past, stamp)) in past.enumerate() {
+                    outputs.set_stamped(nth * self.lags.len() + i, past, stamp + lag);
+                }
             }
         }
     }

@@ -59,6 +59,7 @@ pub fn layout(plan: &Plan) -> Layout {
             .map(|source| ChannelColumn {
                 column: source.column.clone(),
                 optional: source.optional,
+                is_instant: source.is_instant,
             })
             .collect(),
         table: plan.table.clone(),

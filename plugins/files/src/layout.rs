@@ -82,6 +82,8 @@ pub struct ChannelColumn {
     pub column: String,
     /// Whether the data may lack the column; the channel is then absent throughout.
     pub optional: bool,
+    /// Whether its cells are instants, written as the times of rows are; the values are seconds.
+    pub is_instant: bool,
 }
 
 impl Layout {
@@ -96,6 +98,7 @@ impl Layout {
             .map(|column| ChannelColumn {
                 column: column.into(),
                 optional: false,
+                is_instant: false,
             })
             .collect();
         Self {

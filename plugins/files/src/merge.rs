@@ -226,6 +226,7 @@ impl Content {
         wanted.channels.extend(segment.map(|column| ChannelColumn {
             column,
             optional: true,
+            is_instant: false,
         }));
         let mut reader = Reader::open(path, wanted, options.clone())?;
         let mut row = Row::default();

@@ -180,6 +180,15 @@ impl TypedCells {
             let ambiguous = columns::ambiguous(place.clone(), &lacking, &names);
             return Err(ambiguous.unwrap_or_else(|| columns::missing(place, lacking, &names, "")));
         }
+        let planned = layout.channels.iter().zip(&columns.channels);
+        let planned = planned.filter(|(of, at)| of.is_instant && at.is_some());
+        if let Some((of, _)) = planned.into_iter().next() {
+            let reason = format!(
+                "`{}`: when a plan applies is read from CSV and JSON lines alone",
+                of.column
+            );
+            return Err(failed(name, 0, reason));
+        }
         let channels = layout.channels[..numbers].iter();
         let channels = channels.map(|of| of.column.clone()).collect();
         Self::of(name, file, names, columns, channels)

@@ -69,12 +69,14 @@ impl Machine for DieTester {
         &SET_POINTS
     }
 
+    fn schedule(&self) -> Option<Schedule> {
+        Some(Schedule::cycle(CHUCK.name, &LEVELS, HOLD_S))
+    }
+
     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
-        let schedule = setup
-            .schedule
-            .clone()
-            .unwrap_or_else(|| Schedule::cycle(CHUCK.name, &LEVELS, HOLD_S));
+        let schedule = setup.schedule.clone().or_else(|| self.schedule());
+        let schedule = schedule.unwrap_or_default();
         let bodies = Bodies::settled(&schedule, setup.seed);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
     }

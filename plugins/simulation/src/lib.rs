@@ -28,7 +28,7 @@ pub mod wander;
 
 pub use die_tester::DieTester;
 pub use linear_axis::LinearAxis;
-pub use table::{table_columns, write_table};
+pub use table::{table_columns, write_set_points, write_table};
 
 use athermal_trial::machine::Machine;
 

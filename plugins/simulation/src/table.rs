@@ -2,8 +2,10 @@
 
 use std::io::{self, Write};
 
-use crate::recorder::DRIFT_DECIMALS;
-use athermal_trial::machine::{Channel, Row, SECOND_NS, Simulation};
+use athermal_core::time::Duration;
+use athermal_trial::machine::{Announcements, Channel, Machine, Row, SECOND_NS, Setup, Simulation};
+
+use crate::recorder::{DRIFT_DECIMALS, PERIOD_S};
 
 /// The names of the columns after the time: one per channel (`plate1_degC`, `Z1_nm`), and with `truth` one per axis with its
 /// true drift (`Z1_drift_true_nm_per_min`).
@@ -54,6 +56,38 @@ pub fn write_table(
         count += 1;
     }
     Ok(count)
+}
+
+/// How long before it applies a set point stands in a plan, in s.
+const KNOWN_AHEAD_S: i64 = 1800;
+
+/// What the schedule of a machine plans, as a table: a row as of when each set point is known, half an hour before it applies or at the
+/// beginning. Its columns are `time_s` and for each set point `chuck_set_degC` and `chuck_applies_at_s`.
+#[must_use]
+pub fn write_set_points(machine: &dyn Machine, setup: &Setup) -> String {
+    let set_points = machine.set_points().iter();
+    let names: Vec<&str> = set_points.map(|of| of.name).collect();
+    let ahead = Duration::from_ns(KNOWN_AHEAD_S * SECOND_NS);
+    let plan = |name: &&str| Announcements::ahead(machine, setup, name, ahead);
+    let mut plans: Vec<_> = names.iter().filter_map(plan).collect();
+    let columns = names
+        .iter()
+        .map(|name| format!(",{name}_set_degC,{name}_applies_at_s"));
+    let mut text = format!("time_s{}\n", columns.collect::<String>());
+    let end_s = (setup.days * 86_400.0) as i64;
+    for time_s in (0..end_s.max(1)).step_by(PERIOD_S as usize) {
+        let rows = plans.iter_mut().map(|plan| plan.next(time_s * SECOND_NS));
+        let row: Vec<_> = rows.collect();
+        if row.iter().all(Option::is_none) {
+            continue;
+        }
+        let cells = row.iter().map(|cell| match cell {
+            Some((set_point, from_s)) => format!(",{set_point:?},{from_s:?}"),
+            None => ",,".to_owned(),
+        });
+        text += &format!("{time_s}.0{}\n", cells.collect::<String>());
+    }
+    text
 }
 
 /// Seconds with one decimal place, or as many as they need.

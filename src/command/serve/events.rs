@@ -53,6 +53,11 @@ impl Events<'_> {
             ServiceEvent::NotStaged(reason) => terminal.warning(format_args!(
                 "another graph than the one that ran last was given, and cannot take over: {reason}; what ran last goes on"
             )),
+            ServiceEvent::HostClock { is_synchronised } => terminal.note(if is_synchronised {
+                "the host's clock is synchronised: stamps are compared with it from now on"
+            } else {
+                "the host's clock is not synchronised: until it is, the clocks of sources are not judged, and the first stamp may be any"
+            }),
             ServiceEvent::NoCheckpoint(error) => {
                 terminal.warning(format_args!("no checkpoint: {error}; tried again"));
             }
@@ -141,7 +146,7 @@ pub fn damaged(terminal: &Terminal, report: &RecoveryReport) {
     for gap in &report.gaps {
         terminal.warning(format_args!("{gap}"));
     }
-    for (revision, _) in &report.swaps {
+    for revision in &report.swaps {
         terminal.note(format_args!("{revision} took over before"));
     }
 }

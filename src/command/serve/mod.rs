@@ -55,9 +55,9 @@ impl Serve {
         let named = self.state.as_ref().or(deployment.runtime.state.as_ref());
         let state = named.map_or_else(|| usual_state(&self.machine), PathBuf::clone);
         let options = ServiceOptions {
-            state: state.clone(),
             is_dry: self.dry_run,
             frozen: self.frozen,
+            ..ServiceOptions::new(state.clone())
         };
         stop::listen_for_the_end();
         let started = Service::start(&model, deployment, &options);

@@ -1,6 +1,8 @@
 //! A correction on a simulated machine, as a loop: bounded, still where it knows nothing, and as good as before once a fault is over.
 
 mod looped;
+mod served;
+
 use std::path::Path;
 
 use crate::workbench::{Scratch, athermal, graph, simulated};

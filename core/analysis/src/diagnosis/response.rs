@@ -142,7 +142,9 @@ pub(super) fn answers(
         }
     }
     let mut sensors: Vec<Vec<Response>> = vec![Vec::new(); slots.len()];
-    for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
+    for source in (0..plan.sources.len())
+        .filter(|&source| !of_truth[source] && !plan.sources[source].is_instant)
+    {
         let size = match observation.sources[source].deviation() {
             spread if spread > 0.0 => spread,
             _ => continue,

@@ -48,7 +48,9 @@ pub fn contributions(
     let plan = &*model.plan;
     let of_truth = of_truths(plan);
     let (mut contributions, mut silent_nodes) = (Vec::new(), Vec::new());
-    for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
+    for source in (0..plan.sources.len())
+        .filter(|&source| !of_truth[source] && !plan.sources[source].is_instant)
+    {
         if observation.sources[source].samples == 0 {
             continue;
         }

@@ -143,13 +143,14 @@ impl ChannelWatch {
         let channels = plan.sources.iter().zip(leap::finders(plan));
         let channels = channels.zip(of_truths(plan)).enumerate();
         let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
-            let rests = source.optional;
+            let rests = source.rests();
+            let steps = source.planned.is_some() || source.is_instant;
             // Such a node takes out what is stuck.
             let stuck = !rests && !watched.contains_key(&slot);
             WatchedChannel {
                 source: source.clone(),
                 of_truth,
-                leaps,
+                leaps: leaps.filter(|_| !steps),
                 stuck: stuck.then(Default::default),
                 silent: (!rests).then(Default::default),
             }

@@ -87,9 +87,9 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
             max_age_s: channel.max_age.map(|age| age.secs()),
             looking: Looking {
                 limits: source.range,
-                optional: source.optional,
+                optional: source.rests(),
                 reason: reasons.get(&slot).copied(),
-                finder,
+                finder: finder.filter(|_| source.planned.is_none() && !source.is_instant),
                 wanders: of_truths[slot],
                 ..Looking::default()
             },

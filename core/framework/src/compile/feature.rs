@@ -3,6 +3,7 @@
 use super::instance::Instance;
 use super::kind_fault::KindFault;
 use super::plan::{PlannedFit, PlannedRole};
+use super::problem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
 use crate::node::{Feature, InputPort, Inputs, Mistake, OutputPort, Read};
@@ -43,10 +44,11 @@ impl Resolver<'_> {
         if !faults.is_empty() {
             lags = vec![Duration::ZERO];
         }
+        let ahead = feature.reads_ahead();
         let mut ports = Vec::new();
         let mut gathers = Vec::new();
         let mut whole = true;
-        for port in (instance.kind.inputs)() {
+        for (nth, port) in (instance.kind.inputs)().iter().enumerate() {
             if closes {
                 ports.push((*port, Vec::new()));
                 continue;
@@ -57,6 +59,11 @@ impl Resolver<'_> {
             };
             if port.read != Read::Truth {
                 let unit = Self::port_unit(port);
+                let mut lags = lags.clone();
+                if nth == 0 && !ahead.is_empty() {
+                    whole &= self.known_ahead(instance, port, &slots, &ahead);
+                    lags.extend(ahead.iter().map(|&ahead| -ahead));
+                }
                 match self.gather(instance, port, &slots, &lags, unit.as_ref()) {
                     Some(gather) => gathers.push(gather),
                     None => whole = false,
@@ -103,6 +110,34 @@ impl Resolver<'_> {
             fit,
         };
         self.add(instance, outputs, role, behind, None)
+    }
+
+    /// Whether channels are known so far ahead; reports the first that is not.
+    fn known_ahead(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+        ahead: &[Duration],
+    ) -> bool {
+        let Some(&ahead) = ahead.iter().max() else {
+            return true;
+        };
+        let known = |slot: usize| self.planned(slot).map(|planned| planned.known_ahead);
+        let unknown = slots.iter().copied();
+        let mut unknown = unknown.filter(|&slot| known(slot).is_none_or(|known| known < ahead));
+        let Some(slot) = unknown.next() else {
+            return true;
+        };
+        let problem = problem::NotKnownAhead {
+            channel: self.channels[slot].name.clone(),
+            ahead,
+            known: known(slot),
+            is_measured: self.channels[slot].node.is_none(),
+        };
+        let place = instance.input_place(port.name);
+        self.diagnostics.report(place, problem);
+        false
     }
 
     /// The rows that a feature is fitted on; `None` when an error about them has been reported.

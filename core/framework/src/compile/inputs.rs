@@ -213,7 +213,10 @@ impl Resolver<'_> {
     ) -> Option<usize> {
         let conversions = self.conversions(instance, port, slots, lags.len(), unit);
         let ages = match port.read {
-            Read::Fresh => Some(vec![Duration::ZERO; slots.len()]),
+            Read::Fresh if lags.iter().all(|lag| !lag.is_negative()) => {
+                Some(vec![Duration::ZERO; slots.len()])
+            }
+            Read::Fresh => self.max_ages(instance, port.name, slots),
             Read::Held | Read::Truth => self.max_ages(instance, port.name, slots),
         };
         let (conversions, ages) = (conversions?, ages?);

@@ -32,8 +32,10 @@ impl Resolver<'_> {
     /// The measured channel that a slot shares with the truth and has with the smallest delay behind it: with the delays of both.
     fn nearest(&self, slot: usize, truth: &Provenance) -> Option<(usize, Duration, Duration)> {
         let sources = self.provenance[slot].sources();
+        // A plan was known when it was read, whatever is made of it.
+        let measured = sources.filter(|(source, _)| self.planned(*source).is_none());
         let shared =
-            sources.filter_map(|(source, delay)| Some((source, delay, truth.delay_of(source)?)));
+            measured.filter_map(|(source, delay)| Some((source, delay, truth.delay_of(source)?)));
         shared.min_by_key(|(_, delay, late)| *delay - *late)
     }
 

@@ -39,8 +39,9 @@ pub use gate::Misordered;
 pub use keys::{EstimatorKeys, Outside};
 pub use kind_fault::KindFault;
 pub use plan::{
-    AuxPorts, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
-    PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
+    AuxPorts, Conversion, Entry, Gather, Plan, Planned, PlannedChannel, PlannedFit,
+    PlannedLearning, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits,
+    TruthLink,
 };
 pub use plan::{Rows, admits};
 pub use port_channels::PortChannels;

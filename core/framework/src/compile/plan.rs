@@ -50,6 +50,19 @@ pub struct SourceChannel {
     pub optional: bool,
     /// The lowest and highest value that count, in the signal's unit.
     pub range: (f64, f64),
+    /// Of what is planned: how far ahead it is known, and from when on a value applies.
+    pub planned: Option<Planned>,
+    /// Whether its values are the instants at which those of a planned channel begin to apply: in seconds, as the time of a row.
+    pub is_instant: bool,
+}
+
+/// What is known of a planned channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Planned {
+    /// How long before it applies a value is known.
+    pub known_ahead: Duration,
+    /// The source, by number, that says from when on a value applies; a value without it applies at once.
+    pub applies_at: usize,
 }
 
 impl SourceChannel {
@@ -57,6 +70,12 @@ impl SourceChannel {
     #[must_use]
     pub fn admits(&self, sample: f64) -> bool {
         admits(self.range, sample)
+    }
+
+    /// Whether it may well have no new value, or the same, for long: data may lack it, or it is planned.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.optional || self.planned.is_some() || self.is_instant
     }
 }
 

@@ -11,7 +11,8 @@ use super::instance::{Declared, Instance, ReadNode, context};
 use super::kind_fault::KindFault;
 use super::order::Order;
 use super::plan::{
-    Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, TruthLink,
+    Gather, Plan, Planned, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    TruthLink,
 };
 use super::problem;
 use super::provenance::Provenance;
@@ -157,28 +158,18 @@ impl<'g> Resolver<'g> {
     fn take_signals(&mut self) {
         for signal in &self.graph.signals {
             for (channel, _) in &signal.channels {
-                let name = format!("{}.{channel}", signal.name);
-                self.sources.push(SourceChannel {
-                    name: name.clone(),
+                let source = SourceChannel {
+                    name: format!("{}.{channel}", signal.name),
                     column: signal.column.replace("{channel}", channel),
                     optional: signal.optional.contains(channel),
                     range: signal.range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY)),
-                });
-                let slot = self.channels.len();
-                self.channels.push(PlannedChannel {
-                    name,
-                    channel: Channel {
-                        name: channel.clone(),
-                        unit: signal.unit.clone(),
-                        span: Duration::ZERO,
-                        ahead: Duration::ZERO,
-                        max_age: signal.max_age,
-                    },
-                    node: None,
-                    history: None,
-                    predicts: None,
-                });
-                self.provenance.push(Provenance::source(slot));
+                    planned: signal.known_ahead.map(|known_ahead| Planned {
+                        known_ahead,
+                        applies_at: usize::MAX,
+                    }),
+                    is_instant: false,
+                };
+                let slot = self.source(source, channel, &signal.unit, signal.max_age);
                 let scope = self.scopes.get_mut(&signal.name);
                 scope
                     .ports
@@ -187,6 +178,62 @@ impl<'g> Resolver<'g> {
                     .insert(channel.clone(), slot);
             }
         }
+        // From when planned values apply stands behind all that graphs refer to, since none refers to it.
+        for signal in &self.graph.signals {
+            for (channel, _) in signal
+                .channels
+                .iter()
+                .filter(|_| signal.known_ahead.is_some())
+            {
+                let name = format!("{}.{channel}", signal.name);
+                let (applies_at, of) = (self.sources.len(), self.sources.iter_mut());
+                let of = of.filter(|source| source.name == name);
+                let planned = of.filter_map(|source| source.planned.as_mut());
+                planned.for_each(|planned| planned.applies_at = applies_at);
+                let source = SourceChannel {
+                    name: format!("{}:applies_at.{channel}", signal.name),
+                    column: signal.applies_at.replace("{channel}", channel),
+                    optional: signal.optional.contains(channel),
+                    range: (f64::NEG_INFINITY, f64::INFINITY),
+                    planned: None,
+                    is_instant: true,
+                };
+                let seconds = Unit::parse("s").expect("the second is a unit");
+                self.source(source, channel, &seconds, signal.max_age);
+            }
+        }
+    }
+
+    /// Gives a measured channel its slot.
+    fn source(
+        &mut self,
+        source: SourceChannel,
+        channel: &str,
+        unit: &Unit,
+        max_age: Option<Duration>,
+    ) -> usize {
+        let slot = self.channels.len();
+        self.channels.push(PlannedChannel {
+            name: source.name.clone(),
+            channel: Channel {
+                name: channel.to_owned(),
+                unit: unit.clone(),
+                span: Duration::ZERO,
+                ahead: Duration::ZERO,
+                max_age,
+            },
+            node: None,
+            history: source.planned.map(|_| Duration::ZERO),
+            predicts: None,
+        });
+        self.sources.push(source);
+        self.provenance.push(Provenance::source(slot));
+        slot
+    }
+
+    /// What is known of a slot ahead of time, where it is a planned channel.
+    pub(super) fn planned(&self, slot: usize) -> Option<Planned> {
+        self.sources.get(slot)?.planned
     }
 
     /// Resolves one instance; `None` when an error about it has been reported.

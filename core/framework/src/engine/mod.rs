@@ -36,7 +36,9 @@ use crate::compile::{Plan, Step, admits, origins};
 use crate::diagnostic::NodePanic;
 use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
-use tick::{Estimate, NodeRunner, OutputSlots, Slots, TickContext, Work, runners, work};
+use tick::{
+    Estimate, NodeRunner, OutputSlots, PlannedSlot, Slots, TickContext, Work, runners, work,
+};
 
 /// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
@@ -53,8 +55,10 @@ pub struct Engine {
     slots: Slots,
     gathered: Vec<Gathered>,
     histories: Vec<Option<History>>,
-    /// The slots that have a history.
+    /// The slots that have a history of what they held.
     recorded: Vec<usize>,
+    /// The planned channels, each with what it held before the tick.
+    planned: Vec<PlannedSlot>,
     /// The nodes that are given truths after all outputs, and the slots of these.
     truths: Vec<(usize, usize)>,
     nodes: Vec<NodeRunner>,
@@ -86,9 +90,13 @@ impl Engine {
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
         let nodes = runners(&plan, fitted)?;
-        let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
+        let planned = PlannedSlot::all(&plan);
+        let is_planned = |slot: usize| planned.iter().any(|of| of.slot == slot);
+        let with_history =
+            |&slot: &usize| plan.channels[slot].history.is_some() && !is_planned(slot);
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
+            planned,
             truths: nodes
                 .iter()
                 .enumerate()
@@ -390,6 +398,7 @@ impl Engine {
     }
 
     fn take_in(&mut self, time: Instant, samples: &[f64]) {
+        self.planned.iter_mut().for_each(|of| of.keep(&self.slots));
         for (slot, (&sample, &range)) in samples.iter().zip(&self.ranges).enumerate() {
             if sample.is_nan() {
                 continue;
@@ -399,6 +408,11 @@ impl Engine {
                 self.extremes[slot].include(sample);
             } else {
                 self.rejected[slot] += 1;
+            }
+        }
+        for planned in &self.planned {
+            if let Some(history) = &mut self.histories[planned.slot] {
+                planned.take(&mut self.slots, history, time);
             }
         }
     }

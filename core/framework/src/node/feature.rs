@@ -135,6 +135,13 @@ pub trait Feature: Debug + Send + Sync {
         Duration::ZERO
     }
 
+    /// How far ahead of a tick it also reads the channels of its first port, each time above 0. Only planned channels may be read so,
+    /// as far as they are known ahead. Behind the present values [`Tick::port`] then has those of all channels for the first of
+    /// these times, then for the next.
+    fn reads_ahead(&self) -> Vec<Duration> {
+        Vec::new()
+    }
+
     /// Whether outputs depend only on inputs of earlier ticks, so that the node may close a loop.
     ///
     /// Such a node gets its inputs through [`Operator::capture`] once all outputs of the tick are there.
@@ -187,6 +194,14 @@ pub struct SlotTime {
     pub(crate) stamp: Instant,
     /// The number of the tick at which the slot was last given something, be it nothing.
     pub(crate) tick: u64,
+}
+
+impl SlotTime {
+    /// That of a slot that was never given anything.
+    pub(crate) const NEVER: Self = Self {
+        stamp: Instant::MIN,
+        tick: 0,
+    };
 }
 
 /// What an operator sees of the present tick.

@@ -137,6 +137,10 @@ pub struct SignalDecl {
     pub max_age: Option<Duration>,
     /// The channels that the data may lack.
     pub optional: Vec<String>,
+    /// Of what is planned: how long before it applies it is known.
+    pub known_ahead: Option<Duration>,
+    /// The name of the column that says from when a planned value applies, with `{channel}` for the channel.
+    pub applies_at: String,
 }
 
 /// A node and its instances.

@@ -255,6 +255,13 @@ impl Control {
         self.staged.as_ref()
     }
 
+    /// The graph that is staged and the one before the last swap, as each would take over after [`events`](Self::events).
+    #[must_use]
+    pub fn beside(&self) -> [Option<&Engine>; 2] {
+        let staged = self.staged.as_ref().map(|of| &of.live.engine);
+        [staged, self.previous.as_ref().map(|of| &of.live.engine)]
+    }
+
     /// Lets go of what is staged; what runs goes on.
     pub fn discard(&mut self) {
         self.staged = None;

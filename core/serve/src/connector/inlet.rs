@@ -22,6 +22,12 @@ pub trait Source: Debug + Send + Sync {
         false
     }
 
+    /// Whether its connection is dropped and made anew where it is connected, and neither gives a sample nor says that it is
+    /// [alive](Outflow::alive) for as long as `silent` says. A reconnect that brings no data back is noticed by that.
+    fn is_watched(&self) -> bool {
+        self.stamps() == Stamps::Clock
+    }
+
     /// Whether it will come to an end, after which the service ends too.
     fn ends(&self) -> bool {
         false

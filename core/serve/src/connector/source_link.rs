@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::thread::Thread;
 use std::time::Duration as Wait;
@@ -59,10 +59,36 @@ pub struct SourceCounts {
     pub dropped: AtomicU64,
     /// How often it was started again after a failure.
     pub restarts: AtomicU64,
+    /// How often it was connected and silent, and was started again for that.
+    pub silences: AtomicU64,
+    /// How often it said that it is connected to something that lives.
+    alive: AtomicU64,
+    is_connected: AtomicBool,
     /// So many samples have been taken by the engine thread…
     taken: AtomicU64,
     /// …and stand in the journal once it has so many records.
     records: AtomicU64,
+}
+
+impl SourceCounts {
+    /// Whether it is connected.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.is_connected.load(Ordering::Relaxed)
+    }
+
+    /// Notes whether it is connected.
+    pub(crate) fn set_connected(&self, is_connected: bool) {
+        self.is_connected.store(is_connected, Ordering::Relaxed);
+    }
+
+    /// Grows with every sign of life.
+    pub(crate) fn signs(&self) -> u64 {
+        [&self.given, &self.dropped, &self.alive]
+            .iter()
+            .map(|count| count.load(Ordering::Relaxed))
+            .sum()
+    }
 }
 
 /// Where the samples of a channel go.
@@ -138,12 +164,21 @@ pub(crate) fn link(
 impl Outflow {
     /// The source is connected: its channels may be waited for.
     pub fn connected(&mut self) {
+        self.alive();
+        self.counts.set_connected(true);
         self.send(Arrival::Connected);
     }
 
     /// The source has lost its connection.
     pub fn away(&mut self) {
+        self.counts.set_connected(false);
         self.send(Arrival::Away);
+    }
+
+    /// The other side has shown that it lives and that nothing has changed: a keep-alive of a subscription, say. One that only
+    /// shows that the connection stands is none.
+    pub fn alive(&self) {
+        self.counts.alive.fetch_add(1, Ordering::Relaxed);
     }
 
     /// The times of what follows may start again.

@@ -64,6 +64,8 @@ pub(super) struct GraphChannel<'a> {
     pub(super) name: String,
     channel: &'a str,
     signal: &'a SignalDecl,
+    /// Whether it is from when on values of a planned channel apply.
+    is_instant: bool,
 }
 
 /// A channel that a source is to give.
@@ -138,15 +140,22 @@ pub(super) fn wrong_type(value: &Value, key: &str, expected: &str, diagnostics: 
 
 impl<'a> GraphChannels<'a> {
     pub(super) fn new(graph: &'a GraphFile) -> Self {
-        let of = |signal: &'a SignalDecl| {
+        let of = |signal: &'a SignalDecl, port: &'static str| {
             let channels = signal.channels.iter();
             channels.map(move |(channel, _)| GraphChannel {
-                name: format!("{}.{channel}", signal.name),
+                name: format!("{}{port}.{channel}", signal.name),
                 channel,
                 signal,
+                is_instant: !port.is_empty(),
             })
         };
-        let all: Vec<_> = graph.signals.iter().flat_map(of).collect();
+        let (signals, planned) = (graph.signals.iter(), graph.signals.iter());
+        let planned = planned.filter(|signal| signal.known_ahead.is_some());
+        let planned = planned.flat_map(|signal| of(signal, ":applies_at"));
+        let all: Vec<_> = signals
+            .flat_map(|signal| of(signal, ""))
+            .chain(planned)
+            .collect();
         let signals = graph.signals.iter().map(|signal| signal.name.clone());
         let names = all
             .iter()
@@ -162,6 +171,16 @@ impl<'a> GraphChannels<'a> {
 
     pub(super) fn all(&self) -> &[GraphChannel<'a>] {
         &self.all
+    }
+
+    /// From when on values of a channel apply, where it is planned: one source gives both.
+    fn applies_at(&self, channel: usize) -> Option<usize> {
+        let of = &self.all[channel];
+        let is_its = |other: &GraphChannel<'_>| {
+            other.is_instant && other.signal.name == of.signal.name && other.channel == of.channel
+        };
+        let mut all = self.all.iter();
+        all.position(|other| !of.is_instant && is_its(other))
     }
 
     /// The channels that a source is to give; what else stands there is reported.
@@ -180,6 +199,9 @@ impl<'a> GraphChannels<'a> {
                 for (text, place) in texts(value, "channels", expected, diagnostics) {
                     for (channel, _) in self.find(text, place, diagnostics) {
                         named.entry(channel).or_insert(place);
+                        if let Some(applies_at) = self.applies_at(channel) {
+                            named.entry(applies_at).or_insert(place);
+                        }
                     }
                 }
                 let claim = |(channel, place)| Claim {
@@ -233,7 +255,8 @@ impl<'a> GraphChannels<'a> {
             let pattern = Pattern::new(&name);
             let before = found.len();
             for (nth, of) in self.all.iter().enumerate() {
-                if pattern.matches(&of.name) || pattern.matches(&of.signal.name) {
+                let is_whole = !of.is_instant && pattern.matches(&of.signal.name);
+                if pattern.matches(&of.name) || is_whole {
                     found.push((nth, pairs.clone()));
                 }
             }

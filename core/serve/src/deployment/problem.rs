@@ -180,6 +180,27 @@ problem! {
     help: "declare one: `[sources.NAME]` with a `type`; `athermal nodes` lists the kinds of sources",
 }
 
+problem! {
+    /// A command that may step.
+    A210 Unbounded {
+        output: String,
+        /// How many more may.
+        more: usize,
+    }
+    warning: "command that may step",
+    explanation: "A command passes to what is asked no faster than the `rate` of its sink, or the `blend` of its output without. With neither it \
+        is there at once, also after a start, when the machine may stand elsewhere.",
+    message: format!(
+        "`{output}`{} without a rate: a command may step",
+        match more {
+            0 => " is".to_owned(),
+            more => format!(" and {more} more are"),
+        }
+    ),
+    label: "it moves something",
+    help: "write `rate = \"…\"` here, or `blend` at the output",
+}
+
 fn nearest_of(name: &str, known: &Names, there_are: &str) -> String {
     match known.nearest(name) {
         Some(near) => format!("did you mean `{near}`?"),

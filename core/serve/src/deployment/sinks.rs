@@ -9,10 +9,10 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::channels::{expand, texts};
-use super::problem::{NoOutput, NotACommand, OtherRate};
+use super::problem::{NoOutput, NotACommand, OtherRate, Unbounded};
 use super::sources::of_kind;
 use super::{DeclaredSink, keys};
-use crate::compile::Plan;
+use crate::compile::{Plan, PlannedOutput};
 use crate::connector::{Purpose, sink_kinds};
 use crate::diagnostic::{Diagnostics, Names, Place, Sources};
 use crate::document::{Data, Entry, GraphFile, Pattern, Table, Value, decode};
@@ -37,7 +37,8 @@ pub(super) struct SinkKeys {
     /// Only of commands: a tick that lies further behind is not put out; 5 s without.
     #[schemars(extend("exclusiveMinimum" = 0))]
     behind: Option<Duration>,
-    /// Only of commands: by how much they may change in a time, such as "5 nm/s", for all outputs or each; without bound without.
+    /// Only of commands: by how much they may change in a time, such as "5 nm/s", for all outputs or each; the `blend` of an output
+    /// without.
     #[serde(rename = "rate")]
     #[schemars(with = "Option<RateForm>")]
     _rate: IgnoredAny,
@@ -66,8 +67,8 @@ enum RateForm {
 /// What a sink may be given.
 struct Outputs<'a> {
     graph: &'a GraphFile,
-    /// Columns, each with its unit per second.
-    columns: Vec<(String, Unit)>,
+    /// Columns, each with its unit per second, and its `blend` in that.
+    columns: Vec<(String, Unit, Option<f64>)>,
     /// Outputs and columns.
     names: Arc<Names>,
 }
@@ -80,16 +81,15 @@ pub(super) fn read(
     files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Vec<DeclaredSink> {
-    let per_second = |slot: usize| {
-        let unit = &plan.channels[slot].channel.unit;
-        unit.difference().per(&Unit::second())
+    let column = |of: &PlannedOutput| {
+        let unit = &plan.channels[of.slot].channel.unit;
+        let unit = unit.difference().per(&Unit::second());
+        let blend = of.blend.as_ref().and_then(|rate| rate.in_unit(&unit));
+        (of.name.clone(), unit, blend)
     };
-    let outputs = plan.outputs.iter();
-    let columns: Vec<_> = outputs
-        .map(|of| (of.name.clone(), per_second(of.slot)))
-        .collect();
+    let columns: Vec<_> = plan.outputs.iter().map(column).collect();
     let names = graph.outputs.iter().map(|of| of.name.clone());
-    let names = names.chain(columns.iter().map(|(name, _)| name.clone()));
+    let names = names.chain(columns.iter().map(|(name, ..)| name.clone()));
     let outputs = Outputs {
         graph,
         names: Arc::new(names.collect()),
@@ -107,6 +107,7 @@ fn sink(
     files: &Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<DeclaredSink> {
+    let before = diagnostics.error_count();
     let (own, others) = keys::split(&entry.value, &KEYS);
     let (_, parameters) = keys::split(&others, &["type"]);
     let (by_hand, own) = keys::split(&own, &["outputs", "rate"]);
@@ -119,10 +120,7 @@ fn sink(
         Some(value) => outputs.read(value, diagnostics),
         None => (0..outputs.columns.len()).collect(),
     };
-    let rate = match by_hand("rate") {
-        Some(value) => outputs.rates(value, &columns, diagnostics),
-        None => vec![None; columns.len()],
-    };
+    let rate = outputs.rates(by_hand("rate"), &columns, diagnostics);
     let (kind, parameters) = kind?;
     let is_command = parameters.purpose() == Purpose::Command;
     for key in ["behind", "rate"].into_iter().filter(|_| !is_command) {
@@ -130,6 +128,15 @@ fn sink(
             let kind = kind.name;
             diagnostics.report(entry.key, NotACommand { key, kind });
         }
+    }
+    let mut unbounded = columns.iter().zip(&rate).filter(|(_, rate)| rate.is_none());
+    if is_command
+        && diagnostics.error_count() == before
+        && let Some((&first, _)) = unbounded.next()
+    {
+        let output = outputs.columns[first].0.clone();
+        let more = unbounded.count();
+        diagnostics.report(entry.key, Unbounded { output, more });
     }
     Some(DeclaredSink {
         name: name.to_owned(),
@@ -155,7 +162,7 @@ impl Outputs<'_> {
             let columns = self.columns.iter().enumerate();
             found.extend(
                 columns
-                    .filter(|(_, (column, _))| {
+                    .filter(|(_, (column, ..))| {
                         let output = column.split_once('.').map_or("", |(output, _)| output);
                         pattern.matches(column) || pattern.matches(output)
                     })
@@ -185,11 +192,15 @@ impl Outputs<'_> {
     /// The rate of each column of a sink.
     fn rates(
         &self,
-        value: &Value,
+        value: Option<&Value>,
         columns: &[usize],
         diagnostics: &mut Diagnostics,
     ) -> Vec<Option<f64>> {
-        let mut rates = vec![None; columns.len()];
+        let blends = columns.iter().map(|&column| self.columns[column].2);
+        let mut rates: Vec<_> = blends.collect();
+        let Some(value) = value else {
+            return rates;
+        };
         let Data::Table(each) = &value.data else {
             let all: Vec<usize> = (0..columns.len()).collect();
             self.rate(value, columns, &all, &mut rates, diagnostics);
@@ -230,7 +241,7 @@ impl Outputs<'_> {
             return;
         };
         for &nth in places {
-            let (column, unit) = &self.columns[columns[nth]];
+            let (column, unit, _) = &self.columns[columns[nth]];
             let per_second = rate.in_unit(unit).filter(|rate| *rate > 0.0);
             if per_second.is_none() {
                 let problem = OtherRate {

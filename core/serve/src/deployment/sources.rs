@@ -30,7 +30,7 @@ pub(super) struct SourceKeys {
     #[serde(rename = "channels")]
     #[schemars(with = "Option<ChannelsForm>")]
     _channels: IgnoredAny,
-    /// A source that is away so long is not waited for.
+    /// A source that is away so long is not waited for. One that is connected and silent so long is dropped and started over.
     #[schemars(extend("exclusiveMinimum" = 0))]
     silent: Duration,
     /// How its clock is judged by the time at which samples arrive; not at all without.

@@ -32,6 +32,6 @@ pub use progress::{JournalStatus, Progress};
 pub use record::{Record, output_hash};
 pub use recorder::{JournalOptions, Recorder};
 pub use recording::JournalRecording;
-pub use retention::{Keep, retire};
+pub use retention::{Keep, oldest, retire};
 
 pub(crate) use writer::sync_folder;

@@ -55,3 +55,13 @@ pub fn retire(folder: &Path, keep: Keep, needed: u64) -> Result<usize, JournalEr
     }
     Ok(files.len().saturating_sub(1))
 }
+
+/// How many ticks, beats, breaks and freezes there were before the journal of a folder begins; none where there is no journal.
+///
+/// # Errors
+/// When its first file cannot be read.
+pub fn oldest(folder: &Path) -> Result<Option<u64>, JournalError> {
+    let first = files(folder)?.into_iter().next();
+    let begin = |(_, path): (_, std::path::PathBuf)| Ok(Segment::open(&path)?.begin.happenings);
+    first.map(begin).transpose()
+}

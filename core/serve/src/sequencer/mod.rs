@@ -109,10 +109,9 @@ impl Sequencer {
     }
 
     /// Gives the host's time, read once, where it is known to be right. Until then clocks are not judged, and the first stamp may be
-    /// any.
+    /// any. From the first stamp on, it is the newest one that others are compared with: a source may be slow.
     pub fn synchronise(&mut self, host: Instant, now: Moment) {
         self.epoch = Some(host - (now - Moment::START));
-        self.newest.get_or_insert((host, now));
     }
 
     /// A source is connected.
@@ -136,7 +135,7 @@ impl Sequencer {
             return Admission::Refused(sample, Refusal::NoChannel);
         };
         self.now = self.now.max(now);
-        let arrival = self.epoch.map(|epoch| epoch + (now - Moment::START));
+        let arrival = self.host_time(now);
         let judged = match self.clocks.get_mut(channel.source) {
             Some(clock) => clock.judge(sample, arrival, now),
             None => Judged::Stamp(sample.stamp),
@@ -261,6 +260,10 @@ impl Sequencer {
         self.epoch.is_some()
     }
 
+    fn host_time(&self, now: Moment) -> Option<Instant> {
+        self.epoch.map(|epoch| epoch + (now - Moment::START))
+    }
+
     fn count(&mut self, sample: Sample, admission: Admission) -> Admission {
         if let Some(counts) = self.counts.get_mut(sample.channel as usize) {
             counts.count(admission);
@@ -282,7 +285,8 @@ impl Sequencer {
         }
         let source = self.rules.sources.get(self.rules.channels[channel].source);
         let is_in_order = source.is_some_and(|source| source.is_in_order);
-        if !is_in_order && let Some(newest) = self.newest(now) {
+        let known = || self.newest(now).or_else(|| self.host_time(now));
+        if !is_in_order && let Some(newest) = known() {
             let ahead = sample.stamp - newest;
             if ahead > self.rules.future {
                 return Admission::Refused(sample, Refusal::Future { ahead });

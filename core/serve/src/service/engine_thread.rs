@@ -19,6 +19,7 @@ use crate::diagnostic::panic_text;
 use crate::engine::EngineError;
 use crate::moment::{Moment, MonotonicClock};
 use crate::sequencer::Admission;
+use crate::time::Instant;
 use crate::worker::{Output, Worker};
 
 /// How many arrivals of a source are taken before time is looked at again.
@@ -31,6 +32,8 @@ const NAP: Wait = Wait::from_millis(100);
 pub(super) enum Order {
     Freeze(bool),
     Note(Box<str>),
+    /// The host's time, which is known to be right.
+    Synchronise(Instant, Moment),
     /// To step what waits, and end.
     Stop,
 }
@@ -122,6 +125,9 @@ impl EngineThread {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
                     Order::Note(text) => self.worker.note(text),
+                    Order::Synchronise(host, now) => {
+                        self.worker.sequencer().synchronise(host, now);
+                    }
                     Order::Stop => is_stopped = true,
                 }
             }
@@ -217,12 +223,14 @@ impl EngineThread {
                 hurried,
                 last,
                 newest: known,
+                is_synchronised,
                 ..
             } = &mut *snapshot;
             counts.clone_from_slice(sequencer.counts());
             *hurried = sequencer.hurried();
             *last = sequencer.timeline().last();
             *known = newest;
+            *is_synchronised = sequencer.is_synchronised();
             snapshot.happenings = self.worker.recorder().happenings();
         }
     }

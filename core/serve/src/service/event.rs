@@ -62,6 +62,11 @@ pub enum ServiceEvent {
     },
     /// Another graph than that of the last checkpoint was given, and cannot take over: what ran last goes on.
     NotStaged(String),
+    /// Whether the host's clock is known to be right, where that matters to a source: at the start, and once it is.
+    HostClock {
+        /// Until it is, clocks of sources are not judged, and the first stamp may be any.
+        is_synchronised: bool,
+    },
     /// A checkpoint was not written; it is tried again.
     NoCheckpoint(CheckpointError),
     /// The journal cannot be written, or can again.

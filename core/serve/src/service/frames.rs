@@ -25,6 +25,18 @@ pub struct SinkCounts {
     pub failures: AtomicU64,
 }
 
+impl SinkCounts {
+    /// Counts a row that was put out, or a failure.
+    pub(super) fn count<E>(&self, put: &Result<(), E>) {
+        let counted = if put.is_ok() {
+            &self.put
+        } else {
+            &self.failures
+        };
+        counted.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
 /// The end that the engine thread holds.
 #[derive(Debug)]
 pub(super) struct FrameSender {

@@ -12,6 +12,7 @@ mod engine_thread;
 mod error;
 mod event;
 mod frames;
+mod host_clock;
 mod position;
 mod sink_thread;
 mod sinks;
@@ -20,6 +21,7 @@ mod sources;
 mod status;
 #[cfg(test)]
 mod tests;
+mod watch;
 mod wiring;
 
 use std::path::{Path, PathBuf};
@@ -29,7 +31,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_run::live::{Feed, LiveOptions, StageError, pair_from};
+use athermal_run::live::{Feed, LiveOptions, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -43,16 +45,21 @@ use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
 use crate::folder::StateFolder;
-use crate::journal::{FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, retire};
-use crate::keeper::Keeper;
+use crate::host;
+use crate::journal::{
+    FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
+};
+use crate::keeper::{CommitError, Keeper};
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Admission, Sequencer};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order};
+use host_clock::HostClock;
 use sinks::OpenSink;
 use status::Shared;
+use watch::Watch;
 use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
@@ -69,6 +76,21 @@ pub struct ServiceOptions {
     pub is_dry: bool,
     /// Whether estimators learn nothing.
     pub frozen: bool,
+    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
+    pub host_time: fn() -> Option<Instant>,
+}
+
+impl ServiceOptions {
+    /// A service that puts everything out and learns, with its state in a folder.
+    #[must_use]
+    pub fn new(state: PathBuf) -> Self {
+        Self {
+            state,
+            is_dry: false,
+            frozen: false,
+            host_time: host::synchronised,
+        }
+    }
 }
 
 /// A service at work.
@@ -85,6 +107,8 @@ pub struct Service {
     stop_sinks: Stop,
     sources: Vec<(String, Arc<SourceCounts>)>,
     source_threads: Vec<JoinHandle<()>>,
+    watches: Vec<Watch>,
+    host: HostClock,
     sinks: Vec<(String, Arc<SinkCounts>)>,
     sink_threads: Vec<JoinHandle<()>>,
     channels: Vec<String>,
@@ -175,7 +199,11 @@ impl Service {
         let feed = fed(recovered.engine.plan(), &given);
         let rules = rules(&runtime, &sources, &feed);
         let stamps = recovered.timeline.stamps().to_vec();
-        let sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
+        let mut sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
+        let mut host = HostClock::new(options.host_time, clock, &sources);
+        if let Some((time, now)) = host.look(true) {
+            sequencer.synchronise(time, now);
+        }
         let live = LiveOptions {
             isolates: true,
             channels: given.clone(),
@@ -187,7 +215,7 @@ impl Service {
         let every = wait(runtime.checkpoint);
         let keeper = Keeper::new(
             control,
-            checkpoints,
+            (checkpoints, folder.commits()),
             Arc::clone(&progress),
             happenings,
             every,
@@ -247,6 +275,8 @@ impl Service {
             stop_sinks,
             sources: open.counts,
             source_threads,
+            watches: open.watches,
+            host,
             sinks: sink_counts,
             sink_threads,
             channels: feed.iter().map(|of| of.name.clone()).collect(),
@@ -259,6 +289,7 @@ impl Service {
             given_up: 0,
             has_failed: false,
         };
+        service.own.extend(service.host.first());
         if differs {
             service.replace(model);
         }
@@ -292,11 +323,23 @@ impl Service {
             self.is_degraded = status.is_degraded;
             events.push(ServiceEvent::Journal(status));
         }
+        if let Some((time, now)) = self.host.look(false) {
+            self.order(Order::Synchronise(time, now));
+            self.note("the host's clock is synchronised");
+            events.push(ServiceEvent::HostClock {
+                is_synchronised: true,
+            });
+        }
+        let now = Clock::now();
+        self.watches.iter_mut().for_each(|watch| watch.look(now));
         if self.retired.elapsed() >= RETIRE {
             self.retired = Clock::now();
             let needed = self.keeper.oldest().unwrap_or_default();
             // What stays does no harm.
             let _ = retire(&self.folder.journal(), self.keep, needed);
+            if let Ok(Some(oldest)) = oldest(&self.folder.journal()) {
+                self.keeper.forget(oldest);
+            }
         }
         events
     }
@@ -357,10 +400,12 @@ impl Service {
     ///
     /// # Errors
     /// When it cannot take over; what runs is untouched.
-    pub fn swap(&mut self, model: &Model) -> Result<Vec<crate::engine::NodeCarry>, StageError> {
-        let control = self.keeper.control();
-        let carry = control.stage(model, false)?.carry().to_vec();
-        control.commit()?;
+    pub fn swap(&mut self, model: &Model) -> Result<Vec<crate::engine::NodeCarry>, CommitError> {
+        if let Some(revision) = model.revision() {
+            self.folder.keep_model(model, &revision)?;
+        }
+        let carry = self.keeper.control().stage(model, false)?.carry().to_vec();
+        self.keeper.commit()?;
         Ok(carry)
     }
 

@@ -18,8 +18,8 @@ use crate::journal::Progress;
 const PATIENCE: Wait = Wait::from_millis(50);
 /// How long a row waits after a failure.
 const AGAIN: Wait = Wait::from_millis(500);
-/// How often the position is kept.
-const KEEP: Wait = Wait::from_secs(5);
+/// How often the position of a log is kept, and that of a command, which goes on from there.
+const KEEP: (Wait, Wait) = (Wait::from_secs(5), Wait::from_secs(1));
 
 /// A sink at work.
 pub(super) struct SinkThread {
@@ -43,6 +43,7 @@ impl SinkThread {
     /// Puts rows out until no more will come.
     pub(super) fn run(mut self) {
         let (mut is_dirty, mut kept, mut happenings) = (false, Clock::now(), None);
+        let every = if self.gate.is_some() { KEEP.1 } else { KEEP.0 };
         loop {
             if self.frames.take() {
                 let Some(put) = self.put() else {
@@ -58,7 +59,7 @@ impl SinkThread {
                 self.report(flushed);
             }
             let is_over = self.frames.is_over();
-            if (is_over || kept.elapsed() >= KEEP)
+            if (is_over || kept.elapsed() >= every)
                 && let Some(happenings) = happenings.take()
             {
                 kept = Clock::now();
@@ -83,32 +84,32 @@ impl SinkThread {
         ) = self.frames.row();
         // Where the journal fails the outputs go on; that is reported elsewhere.
         let _ = self.progress.wait_written(records, PATIENCE);
-        let is_command = self.gate.is_some();
-        let row = match &mut self.gate {
-            None => row,
-            Some(gate) => match gate.pass(&row) {
-                Some(row) => row,
-                None => {
-                    self.counts.behind.fetch_add(1, Ordering::Relaxed);
-                    return Some(happenings);
-                }
-            },
-        };
-        loop {
-            if self.is_dry {
-                return Some(happenings);
+        if let Some(gate) = &mut self.gate {
+            let applied = || self.outlet.applied();
+            if gate.is_unsure()
+                && let Ok(Some(applied)) = catch_unwind(AssertUnwindSafe(applied))
+            {
+                gate.start_from(&applied);
             }
+            let Some(row) = gate.pass(&row) else {
+                self.counts.behind.fetch_add(1, Ordering::Relaxed);
+                return Some(happenings);
+            };
+            if !self.is_dry {
+                // An old command is none: where this one fails, the next tick has a newer one.
+                let put = guarded(|| self.outlet.put(&row));
+                self.counts.count(&put);
+                gate.is_put(put.is_ok());
+                self.report(put);
+            }
+            return Some(happenings);
+        }
+        loop {
             let put = guarded(|| self.outlet.put(&row));
             let is_put = put.is_ok();
-            let counts = if is_put {
-                &self.counts.put
-            } else {
-                &self.counts.failures
-            };
-            counts.fetch_add(1, Ordering::Relaxed);
+            self.counts.count(&put);
             report(&self.name, &mut self.has_failed, &self.events, put);
-            // An old command is none: the next tick has a newer one.
-            if is_put || is_command {
+            if is_put {
                 return Some(happenings);
             }
             if !self.stop.wait(AGAIN) {

@@ -181,7 +181,7 @@ pub(super) fn start(
 
 impl OpenSink {
     fn thread(
-        mut self,
+        self,
         frames: FrameReceiver,
         is_dry: bool,
         progress: &Arc<Progress>,
@@ -191,9 +191,8 @@ impl OpenSink {
         let is_command = self.declared.parameters.purpose() == Purpose::Command;
         let gate = is_command.then(|| {
             let mut gate = CommandGate::new(self.declared.behind, self.declared.rate.clone());
-            let known = self.was.as_ref().map(Position::applied);
-            if let Some(applied) = self.outlet.applied().or(known) {
-                gate.start_from(&applied);
+            if let Some(was) = &self.was {
+                gate.start_from(&was.applied());
             }
             gate
         });

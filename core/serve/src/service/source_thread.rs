@@ -8,6 +8,7 @@ use std::time::{Duration as Wait, Instant as Clock};
 use super::ServiceEvent;
 use crate::connector::{ConnectorError, Inlet, Outflow, Stop};
 use crate::diagnostic::panic_message;
+use crate::time::Duration;
 
 /// How long a source that failed is left alone: at first, and at most.
 const BACK_OFF: (Wait, Wait) = (Wait::from_millis(500), Wait::from_secs(30));
@@ -17,6 +18,10 @@ pub(super) struct SourceThread {
     pub(super) name: String,
     pub(super) inlet: Box<dyn Inlet>,
     pub(super) out: Outflow,
+    /// The end of one run, asked for where it is connected and silent.
+    pub(super) run: Stop,
+    /// How long that may be.
+    pub(super) silent: Duration,
 }
 
 impl SourceThread {
@@ -26,12 +31,19 @@ impl SourceThread {
             name,
             mut inlet,
             mut out,
+            run,
+            silent,
         } = self;
         let mut pause = BACK_OFF.0;
+        let either = stop.or(&run);
         loop {
             let began = Clock::now();
-            let ran = catch_unwind(AssertUnwindSafe(|| inlet.run(&mut out, stop)));
+            run.withdraw();
+            let ran = catch_unwind(AssertUnwindSafe(|| inlet.run(&mut out, &either)));
             let error = match ran {
+                Ok(_) if run.is_asked() && !stop.is_asked() => ConnectorError::new(format_args!(
+                    "connected, and silent for {silent}: the connection is dropped and made anew"
+                )),
                 Ok(Ok(())) => {
                     if !stop.is_asked() {
                         let source = name.clone();

@@ -7,9 +7,10 @@ use std::thread::Thread;
 use athermal_run::live::Feed;
 use athermal_run::model::Model;
 
-use super::ServiceError;
 use super::source_thread::SourceThread;
-use crate::connector::{Remarks, SourceCounts, SourceLink, SourceWiring, WiredChannel, link};
+use super::watch::Watch;
+use super::{ServiceError, wait};
+use crate::connector::{Remarks, SourceCounts, SourceLink, SourceWiring, Stop, WiredChannel, link};
 use crate::deployment::DeclaredSource;
 use crate::journal::Progress;
 use crate::time::Instant;
@@ -23,6 +24,7 @@ pub(super) struct OpenSources {
     pub(super) inlets: Vec<SourceThread>,
     pub(super) links: Vec<SourceLink>,
     pub(super) counts: Vec<(String, Arc<SourceCounts>)>,
+    pub(super) watches: Vec<Watch>,
     /// What they leave out, by their names.
     pub(super) heard: Receiver<(String, String)>,
 }
@@ -39,6 +41,7 @@ pub(super) fn open(
         inlets: Vec::new(),
         links: Vec::new(),
         counts: Vec::new(),
+        watches: Vec::new(),
         heard,
     };
     let place = |name: &str| feed.iter().position(|of| of.name == name);
@@ -86,12 +89,19 @@ pub(super) fn open(
             error,
         })?;
         let counts = Arc::clone(outflow.counts());
+        let run = Stop::default();
+        if source.parameters.is_watched() {
+            let silent = wait(source.silent);
+            open.watches.push(Watch::new(silent, &counts, &run));
+        }
         open.counts.push((source.name.clone(), counts));
         open.links.push(link);
         open.inlets.push(SourceThread {
             name: source.name,
             inlet,
             out: outflow,
+            run,
+            silent: source.silent,
         });
     }
     Ok(open)

@@ -27,6 +27,7 @@ impl Shared {
                 happenings: 0,
                 last: Instant::MIN,
                 newest: None,
+                is_synchronised: false,
             }),
         }
     }
@@ -53,4 +54,6 @@ pub struct Snapshot {
     pub last: Instant,
     /// The newest stamp, and the time since.
     pub newest: Option<Instant>,
+    /// Whether the host's time is known to be right. Until then clocks of sources are not judged, and the first stamp may be any.
+    pub is_synchronised: bool,
 }

@@ -93,7 +93,13 @@ fn child() {
     let (stepper, control) = pair_from(recovered.engine, LiveOptions::default()).unwrap();
     let every = Wait::from_millis(5);
     let known = Arc::clone(&progress);
-    let mut keeper = Keeper::new(control, checkpoints, known, happenings, every);
+    let mut keeper = Keeper::new(
+        control,
+        (checkpoints, folder.commits()),
+        known,
+        happenings,
+        every,
+    );
     let mut worker = Worker::new(sequencer, stepper, recorder);
     let mut text = String::new();
     for count in from..SAMPLES {

@@ -7,6 +7,7 @@
 
 mod closed_loop;
 mod faulty;
+mod planned;
 mod recording;
 mod registry;
 pub mod schedule;
@@ -14,6 +15,7 @@ mod simulation;
 
 pub use closed_loop::ClosedLoop;
 pub use faulty::Faulty;
+pub use planned::{Announcements, plans};
 pub use recording::{MachineError, Simulated};
 pub use registry::{KnownMachine, UnknownMachine, machine, machines};
 pub use schedule::{Schedule, ScheduleError};

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::{Faulty, Machine, Row, Setup, SetupError, Simulation};
-use crate::compile::Plan;
+use super::{Announcements, Faulty, Machine, Row, Setup, SetupError, Simulation, plans};
+use crate::compile::{Plan, SourceChannel};
 use crate::fault::{FaultError, FaultSpec, Faults};
 use crate::recording::{Event, Recording, Samples, Source, SourceError};
 use crate::time::Instant;
@@ -12,6 +12,7 @@ use crate::unit::Unit;
 /// A machine as a recording: it is simulated anew each time that the recording is opened, with the same rows.
 ///
 /// A measured channel `temperature.plate1` of the graph is the channel of that signal and name of the machine, in the unit of the graph.
+/// A planned channel `set_point.chuck` is the set point of that name, each step of the schedule announced as long before as it is known.
 pub struct Simulated<'a> {
     machine: &'a dyn Machine,
     setup: Setup,
@@ -73,7 +74,24 @@ impl Recording for Simulated<'_> {
         let channels = self.machine.channels();
         let mut picks = Vec::with_capacity(plan.sources.len());
         let mut missing = Vec::new();
+        let mut announced = Vec::new();
         for (source, planned) in plan.sources.iter().zip(&plan.channels) {
+            if let Some(set_points) = Announcements::of(self.machine, &self.setup, source) {
+                let applies_at = source.planned.map_or(picks.len(), |of| of.applies_at);
+                let from = unit_of("Cel")?;
+                if !from.measures_same(&planned.channel.unit) {
+                    return Err(other_unit(source, from, &planned.channel.unit));
+                }
+                announced.push(Announced {
+                    set_points,
+                    to: [picks.len(), applies_at],
+                    units: (from, planned.channel.unit.clone()),
+                });
+            }
+            if plans(self.machine, source) {
+                picks.push(None);
+                continue;
+            }
             let found = channels
                 .iter()
                 .position(|channel| channel.reference() == source.name);
@@ -86,11 +104,7 @@ impl Recording for Simulated<'_> {
             };
             let from = unit_of(channels[index].unit)?;
             if !from.measures_same(&planned.channel.unit) {
-                return Err(Box::new(MachineError::Unit {
-                    channel: source.name.clone(),
-                    machine: Box::new(from),
-                    graph: Box::new(planned.channel.unit.clone()),
-                }));
+                return Err(other_unit(source, from, &planned.channel.unit));
             }
             picks.push(Some((index, from, planned.channel.unit.clone())));
         }
@@ -105,8 +119,17 @@ impl Recording for Simulated<'_> {
             simulation: self.start()?,
             row: Row::empty(channels),
             picks,
+            announced,
         }))
     }
+}
+
+fn other_unit(source: &SourceChannel, machine: Unit, graph: &Unit) -> SourceError {
+    Box::new(MachineError::Unit {
+        channel: source.name.clone(),
+        machine: Box::new(machine),
+        graph: Box::new(graph.clone()),
+    })
 }
 
 pub(super) fn unit_of(text: &'static str) -> Result<Unit, MachineError> {
@@ -120,6 +143,14 @@ struct Running {
     simulation: Box<dyn Simulation>,
     row: Row,
     picks: Picks,
+    announced: Vec<Announced>,
+}
+
+/// A planned channel of the graph: its set points, where they and their instants go, and the units of both sides.
+struct Announced {
+    set_points: Announcements,
+    to: [usize; 2],
+    units: (Unit, Unit),
 }
 
 impl Source for Running {
@@ -136,6 +167,14 @@ impl Source for Running {
                     from.convert(sample, to).unwrap_or(f64::NAN)
                 }
             };
+        }
+        for plan in &mut self.announced {
+            if let Some((set_point, from_s)) = plan.set_points.next(self.row.time_ns) {
+                let (machine, graph) = &plan.units;
+                let converted = machine.convert(set_point, graph);
+                samples.values[plan.to[0]] = converted.unwrap_or(f64::NAN);
+                samples.values[plan.to[1]] = from_s;
+            }
         }
         Ok(Some(Event::Row(Instant::from_ns(self.row.time_ns))))
     }

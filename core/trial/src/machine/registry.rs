@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::OnceLock;
 
+use serde_json::{Value, json};
+
 use super::Machine;
 use crate::diagnostic::nearest;
 
@@ -27,6 +29,29 @@ impl fmt::Debug for KnownMachine {
             self.package,
             self.version
         )
+    }
+}
+
+impl KnownMachine {
+    /// What it measures and what a schedule can set, for programs.
+    #[must_use]
+    pub fn facts(&self) -> Value {
+        let machine = self.machine;
+        let channels = machine.channels().iter().map(|channel| {
+            json!({ "channel": channel.reference(), "column": channel.column(), "unit": channel.unit })
+        });
+        let set_points = machine.set_points().iter().map(
+            |what| json!({ "name": what.name, "default_degC": what.default, "range_degC": what.range }),
+        );
+        let (channels, set_points): (Value, Value) = (channels.collect(), set_points.collect());
+        json!({
+            "name": machine.name(),
+            "summary": machine.summary(),
+            "package": self.package,
+            "version": self.version,
+            "channels": channels,
+            "set_points": set_points,
+        })
     }
 }
 

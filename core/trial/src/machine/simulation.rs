@@ -1,6 +1,6 @@
 //! Decides what the author of a machine implements: what it measures, and how it goes from row to row; not who runs it.
 
-use super::{Channel, Row, SetPoint, Setup, SetupError};
+use super::{Channel, Row, Schedule, SetPoint, Setup, SetupError};
 
 /// A machine that can be simulated.
 ///
@@ -72,6 +72,11 @@ pub trait Machine: Sync {
 
     /// What a schedule can set.
     fn set_points(&self) -> &[SetPoint];
+
+    /// Its set points over time where a setup says nothing else; none where each keeps its default.
+    fn schedule(&self) -> Option<Schedule> {
+        None
+    }
 
     /// A simulation at time 0, settled as if the machine had stood there for half a day.
     ///

@@ -228,6 +228,7 @@ fn a_column_in_no_file_is_named_with_what_it_may_be_called() {
     layout.channels.push(ChannelColumn {
         column: "height_um".to_owned(),
         optional: false,
+        is_instant: false,
     });
     let refused = read("none", &files, layout, &Options::default()).unwrap_err();
     assert_eq!(

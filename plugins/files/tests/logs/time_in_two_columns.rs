@@ -27,6 +27,7 @@ fn layout(time: TimeColumn) -> Layout {
     let channels = ["T1", "T2"].map(|column| ChannelColumn {
         column: column.to_owned(),
         optional: false,
+        is_instant: false,
     });
     let channels = channels.into();
     Layout {

@@ -180,6 +180,9 @@ pub(super) fn signals(plan: &Plan) -> IndexMap<String, Facts> {
         if let Some(age) = planned.channel.max_age {
             facts.plain("max_age", age.to_string());
         }
+        if let Some(planned) = source.planned {
+            facts.plain("known_ahead", planned.known_ahead.to_string());
+        }
         (source.name.clone(), facts)
     });
     signals.collect()

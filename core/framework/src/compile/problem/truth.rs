@@ -140,3 +140,32 @@ problem! {
         "set how much of the past counts, such as `span = \"10min\"` on `{node}`, or use a window, such as `slope`"
     ),
 }
+
+problem! {
+    /// What is read before it is known.
+    A161 NotKnownAhead {
+        channel: String,
+        /// How far ahead it is read.
+        ahead: Duration,
+        /// How far ahead it is known, where it is planned.
+        known: Option<Duration>,
+        is_measured: bool,
+    }
+    error: "ahead of its time",
+    explanation: "A negative lag reads what will be. That is known only of what is planned, such as the set points of a recipe: its signal \
+        says with `known_ahead` how long before it applies a value is known, and a `lag` reads it so far ahead and no further. What is \
+        measured, and what is computed from it, is not known before its time.",
+    message: match known {
+        Some(known) => format!("`{channel}` is read {ahead} ahead, and known {known} ahead"),
+        None if *is_measured => format!("`{channel}` is measured, so that nobody knows it {ahead} ahead"),
+        None => format!("`{channel}` is computed at each tick, so that nobody knows it {ahead} ahead"),
+    },
+    label: "sees the future",
+    help: match known {
+        Some(_) => format!("read it less far ahead, or plan earlier and say so: `known_ahead = \"{ahead}\"`"),
+        None if *is_measured => format!(
+            "if it is planned, as a set point is, say how long before it applies it is known: `known_ahead = \"{ahead}\"` on its signal"
+        ),
+        None => "read the signal of a plan ahead, and compute from what the `lag` gives".to_owned(),
+    },
+}

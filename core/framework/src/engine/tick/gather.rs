@@ -345,8 +345,13 @@ impl AllPast {
                     .as_ref()
                     .expect("a slot that is read with a lag has a history");
                 let at = now - entry.lag;
-                let (value, stamp, until) =
-                    history.at_until(at, now, entry.max_age, &mut past.cursor);
+                let (value, stamp, until) = if entry.lag.is_negative() {
+                    // A plan may be another at the next tick.
+                    let (value, from) = history.planned(at, entry.max_age);
+                    (value, from, at)
+                } else {
+                    history.at_until(at, now, entry.max_age, &mut past.cursor)
+                };
                 values[place] = value;
                 stamps[place] = stamp + entry.lag;
                 // A value that is converted is read afresh, lest it be converted twice.

@@ -40,15 +40,36 @@ impl History {
 
     /// Writes down what the channel holds from `at` on; NaN where a run gave nothing.
     pub fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
-        while self
-            .entries
-            .get(1)
-            .is_some_and(|next| next.at <= at - self.depth)
-        {
+        self.drop_before(at - self.depth);
+        self.entries.push_back(Past { at, value, stamp });
+    }
+
+    /// Writes down at `now` what is planned to be held from `at` on, in place of all that was planned for then or later.
+    pub(crate) fn plan(&mut self, now: Instant, at: Instant, value: f64) {
+        while self.entries.back().is_some_and(|last| last.at >= at) {
+            self.entries.pop_back();
+        }
+        self.drop_before(now - self.depth);
+        let stamp = at;
+        self.entries.push_back(Past { at, value, stamp });
+    }
+
+    /// What is planned for an instant, and from when on; NaN where that is longer before it than `max_age`, or nothing is planned.
+    pub(crate) fn planned(&self, at: Instant, max_age: Duration) -> (f64, Instant) {
+        let begun = self.entries.partition_point(|entry| entry.at <= at);
+        match begun.checked_sub(1).and_then(|last| self.entries.get(last)) {
+            Some(held) if at - held.at <= max_age => (held.value, held.at),
+            Some(held) => (ABSENT, held.at),
+            None => (ABSENT, at),
+        }
+    }
+
+    /// Forgets what nobody asks for any more who asks for `at` or later.
+    fn drop_before(&mut self, at: Instant) {
+        while self.entries.get(1).is_some_and(|next| next.at <= at) {
             self.entries.pop_front();
             self.dropped += 1;
         }
-        self.entries.push_back(Past { at, value, stamp });
     }
 
     /// The value that was held at `at`, and its stamp; NaN where there was none or it was older than `max_age`.
@@ -73,7 +94,8 @@ impl History {
             let nothing = if next.is_some() { COLD } else { ABSENT };
             return (nothing, at, Instant::MIN);
         };
-        let next = next.map_or(unwritten, |next| next.at);
+        // What is planned for later may yet be another.
+        let next = next.map_or(unwritten, |next| next.at.min(unwritten));
         let last = held.stamp + max_age;
         if held.value.is_nan() {
             (held.value, held.stamp, next)

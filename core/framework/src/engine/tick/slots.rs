@@ -17,17 +17,11 @@ pub struct Slots {
     pub(crate) tick: u64,
 }
 
-/// The time of a slot that was never given anything.
-const NEVER: SlotTime = SlotTime {
-    stamp: Instant::MIN,
-    tick: 0,
-};
-
 impl Slots {
     pub(crate) fn new(count: usize) -> Self {
         Self {
             values: vec![ABSENT; count],
-            given: vec![NEVER; count],
+            given: vec![SlotTime::NEVER; count],
             tick: 0,
         }
     }

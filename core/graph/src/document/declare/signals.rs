@@ -15,7 +15,18 @@ use crate::document::tree::{Data, Entry, Value};
 use crate::time::Duration;
 use crate::unit::Unit;
 
-const KEYS: [&str; 6] = ["unit", "channels", "column", "range", "max_age", "optional"];
+const KEYS: [&str; 8] = [
+    "unit",
+    "channels",
+    "column",
+    "range",
+    "max_age",
+    "optional",
+    KNOWN_AHEAD,
+    APPLIES_AT,
+];
+const KNOWN_AHEAD: &str = "known_ahead";
+const APPLIES_AT: &str = "applies_at";
 /// The placeholder in column patterns.
 const CHANNEL: &str = "channel";
 /// Stands in for an age that cannot be read, so that nobody asks for one.
@@ -95,6 +106,20 @@ fn signal(
         (Some(value), Some(channels)) => optional(value, name, channels, diagnostics),
         _ => Vec::new(),
     };
+    let known_ahead = given(KNOWN_AHEAD)
+        .map(|value| length(value, KNOWN_AHEAD, sample, diagnostics).unwrap_or(SOME_AGE));
+    let applies_at = match (given(APPLIES_AT), known_ahead) {
+        (Some(value), Some(_)) => self::column(value, channels.as_deref(), &what, diagnostics),
+        (Some(value), None) => {
+            diagnostics.report(value.place, problem::NotPlanned {});
+            None
+        }
+        (None, _) => {
+            let count = channels.as_ref().map_or(0, Vec::len);
+            let of_channel = if count > 1 { "{channel}_" } else { "" };
+            Some(format!("{of_channel}{APPLIES_AT}"))
+        }
+    };
     let (unit, unit_place) = unit.filter(|_| known)?;
     Some(SignalDecl {
         name: name.to_owned(),
@@ -106,6 +131,8 @@ fn signal(
         range,
         max_age,
         optional,
+        known_ahead,
+        applies_at: applies_at.unwrap_or_default(),
     })
 }
 

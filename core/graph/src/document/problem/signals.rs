@@ -51,3 +51,14 @@ problem! {
     label: "not a channel",
     help: nearest_of_many(name, known, "its channels are"),
 }
+
+problem! {
+    /// When values apply is said of a signal that is not known ahead.
+    A029 NotPlanned {}
+    error: "not planned",
+    explanation: "`applies_at` names the column that says from when a value applies. Only what is planned has one, such as the set points of \
+        a recipe: its signal says with `known_ahead` how long before that it is known. What is measured applies when it is measured.",
+    message: "`applies_at` belongs to a signal that is known ahead",
+    label: "nothing is planned here",
+    help: "say how long before they apply its values are known, as `known_ahead = \"30min\"`, or leave `applies_at` out",
+}

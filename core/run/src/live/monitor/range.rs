@@ -72,7 +72,9 @@ impl Channel {
     fn new(source: &SourceChannel, usual_of_all: &[SampleRange]) -> Self {
         Self {
             source: source.clone(),
-            usual: usual(usual_of_all, &source.name).cloned(),
+            usual: usual(usual_of_all, &source.name)
+                .filter(|_| !source.is_instant)
+                .cloned(),
             rejected: None,
             outside: None,
         }

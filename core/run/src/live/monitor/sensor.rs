@@ -150,7 +150,7 @@ impl Sensor {
 
     /// Takes the sample of a row, if it is one; whether something changed.
     fn row(&mut self, at_s: f64, value: f64) -> bool {
-        if self.source.optional {
+        if self.source.rests() {
             return false;
         }
         let is_sample = self.source.admits(value);

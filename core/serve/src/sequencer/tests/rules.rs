@@ -108,6 +108,10 @@ fn the_hosts_time_limits_the_first_stamp_where_it_is_known() {
     );
     let mut unknown = connected(plain(1));
     assert_eq!(unknown.arrive(beyond, at(0)), Admission::Accepted(beyond));
+    // One that is ten minutes slow is no backlog for ever: what follows is compared with its own stamps.
+    let slow = sample(0, -500_000, 1.0);
+    assert_eq!(sequencer.arrive(slow, at(1)), Admission::Accepted(slow));
+    assert_eq!(sequencer.newest(at(11)), Some(stamp(-499_990)));
 }
 
 #[test]

@@ -47,6 +47,23 @@ impl Track {
         let after = self.steps.partition_point(|step| step.0 <= time_ns);
         self.steps[after.max(1) - 1].1
     }
+
+    /// The first step after `time_ns`, by its instant and its value; none where it holds from there on.
+    #[must_use]
+    pub fn after(&self, time_ns: i64) -> Option<(i64, f64)> {
+        let (first, _) = *self.steps.first()?;
+        let round = |begin: i64, within: i64| {
+            let mut steps = self.steps.iter();
+            let (at, value) = *steps.find(|step| step.0 > within)?;
+            Some((begin.saturating_add(at), value))
+        };
+        let Some(repeat_ns) = self.repeat_ns.filter(|_| time_ns >= 0) else {
+            return round(0, time_ns);
+        };
+        let begin = time_ns - time_ns % repeat_ns;
+        let begin_again = begin.saturating_add(repeat_ns);
+        round(begin, time_ns % repeat_ns).or_else(|| round(begin_again, first - 1))
+    }
 }
 
 /// Set points over time, by name.

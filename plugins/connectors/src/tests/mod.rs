@@ -1,5 +1,8 @@
 //! Sources and sinks in a whole service.
 
+mod conformance;
+mod faults;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -53,11 +56,16 @@ impl Folder {
     fn start(&self, source: &str, sink: &str) -> Result<Service, ServiceError> {
         // A row of a recording is whole by itself.
         let wait = if source.contains("replay") { 0 } else { 20 };
-        let text = format!(
-            "schema = 1\nextends = \"graph.toml\"\n\
-             [runtime]\nwait = \"{wait} ms\"\nsettle = \"0 s\"\n\
+        let sections = format!(
+            "[runtime]\nwait = \"{wait} ms\"\nsettle = \"0 s\"\n\
              [sources.in]\n{source}\n[sinks.out]\n{sink}\n"
         );
+        self.serve(&sections, &ServiceOptions::new(self.file("state")))
+    }
+
+    /// Starts a service with these sections of its machine file.
+    fn serve(&self, sections: &str, options: &ServiceOptions) -> Result<Service, ServiceError> {
+        let text = format!("schema = 1\nextends = \"graph.toml\"\n{sections}");
         let path = self.file("machine.toml");
         fs::write(&path, text).unwrap();
         let (mut sources, mut mistakes) = (Sources::new(), Diagnostics::new());
@@ -66,12 +74,7 @@ impl Folder {
         let declared = Deployment::read(&model.graph, &model.plan, &sources, &mut mistakes);
         let declared =
             declared.unwrap_or_else(|| panic!("{}", mistakes.render(&sources, false, 100)));
-        let options = ServiceOptions {
-            state: self.file("state"),
-            is_dry: false,
-            frozen: false,
-        };
-        Ok(Service::start(&model, declared, &options)?.0)
+        Ok(Service::start(&model, declared, options)?.0)
     }
 }
 
