@@ -25,7 +25,8 @@ fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
             ])
             .ended(0);
         }
-        let (graph, model) = (of("graph"), of("model"));
+        let graph = scratch.path(&format!("{ending}.toml"));
+        let model = scratch.path(&format!("{ending}.json"));
         athermal(&[&"init", &train, &"-o", &graph, &"--force"]).ended(0);
         athermal_on("fit", &graph, &train, &[&"-o", &model]).ended(0);
         let scores = athermal_on("evaluate", &model, &test, &[&"--format", &"json"]).ended(0);
