@@ -309,7 +309,11 @@ fn a_column_without_numbers_or_one_that_is_missing_is_named() {
         ("list", "the column `list` has lists"),
     ] {
         let error = rows_of(&path, seconds(&[column]), Options::default()).unwrap_err();
-        assert!(error.to_string().contains(words), "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("of.parquet: ") && text.contains(words),
+            "{text}"
+        );
     }
 }
 
