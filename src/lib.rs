@@ -66,8 +66,16 @@ use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;
 use athermal_estimators as _;
+#[cfg(feature = "cli")]
+use athermal_export as _;
 use athermal_features as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_http as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_log as _;
 use athermal_simulation as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_systemd as _;
 
 /// The pages of the guide, so that their code is compiled and run as tests.
 #[cfg(doctest)]

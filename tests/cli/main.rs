@@ -7,6 +7,8 @@
 mod workbench;
 
 mod architecture_page;
+#[cfg(unix)]
+mod asked_services;
 mod command_line;
 mod compare;
 mod data_warnings;
