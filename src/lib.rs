@@ -60,6 +60,8 @@ use athermal_command::{message, output, terminal};
 extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
+#[cfg(feature = "parquet")]
+use athermal_arrow as _;
 use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;
@@ -73,6 +75,8 @@ use athermal_http as _;
 use athermal_log as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_retrain as _;
+#[cfg(feature = "mqtt")]
+use athermal_mqtt as _;
 use athermal_simulation as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_systemd as _;

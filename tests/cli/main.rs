@@ -35,6 +35,8 @@ mod not_files;
 mod nothing_to_score;
 mod orders;
 mod other_processors;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plugin_crates;
 mod report;
 mod report_graphs;
