@@ -24,6 +24,7 @@
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
 
+mod aside;
 pub mod checkpoint;
 pub mod connector;
 pub mod deployment;
