@@ -102,12 +102,14 @@ fn a_full_disk_of_the_state_is_reported_and_the_service_goes_on() {
     until_rows(&out, 200, &mut child);
     disk.fill();
     // More than a file of the journal has room for ahead.
-    append(&scratch, 200, 14_000);
-    until_rows(&out, 14_000, &mut child);
+    for from in (200..14_200).step_by(2_000) {
+        append(&scratch, from, from + 2_000);
+        until_rows(&out, from + 2_000, &mut child);
+    }
     disk.make_room();
     std::thread::sleep(Duration::from_millis(1_500));
-    append(&scratch, 14_000, 14_200);
-    until_rows(&out, 14_200, &mut child);
+    append(&scratch, 14_200, 14_400);
+    until_rows(&out, 14_400, &mut child);
     std::thread::sleep(Duration::from_millis(500));
     let text = end(child);
     assert!(
@@ -117,9 +119,9 @@ fn a_full_disk_of_the_state_is_reported_and_the_service_goes_on() {
     assert!(text.contains("the journal is written again; "), "{text}");
     assert!(history(&scratch) == by_run(&scratch));
     // It goes on behind the gap, of which the journal knows.
-    append(&scratch, 14_200, 14_400);
+    append(&scratch, 14_400, 14_600);
     let mut child = serve(&scratch, &["--state", state]);
-    until_rows(&out, 14_400, &mut child);
+    until_rows(&out, 14_600, &mut child);
     let text = end(child);
     assert!(text.contains("goes on where it ended"), "{text}");
     assert!(history(&scratch) == by_run(&scratch));
@@ -193,7 +195,7 @@ fn rows_come_in_time_while_the_disk_of_the_state_hangs() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_and_a_damaged_journal_are_refused_with_their_places() {
+fn a_folder_that_cannot_be_written_is_refused_and_a_torn_journal_goes_on() {
     let scratch = begun("refused");
     let file = scratch.path("log.csv");
     let machine = scratch.path("line.toml");
@@ -213,23 +215,8 @@ fn a_folder_that_cannot_be_written_and_a_damaged_journal_are_refused_with_their_
         .path();
     let bytes = fs::read(&segment).unwrap();
     let written = bytes.iter().rposition(|byte| *byte != 0).unwrap();
-    let damage = |damaged: &[u8]| {
-        fs::write(&segment, damaged).unwrap();
-        damaged.to_vec()
-    };
-    // A bit in the middle is no torn end.
-    let mut flipped = bytes.clone();
-    flipped[written / 2] ^= 16;
-    let flipped = damage(&flipped);
-    let refused = athermal(&[&"serve", &machine]).ended(3);
-    assert!(
-        refused.told.contains(" is damaged at byte "),
-        "{}",
-        refused.told
-    );
-    assert_eq!(fs::read(&segment).unwrap(), flipped, "it is left as it was");
-    // The end may be torn: it is cut off, and the service goes on.
-    damage(&bytes[..written - 5]);
+    // The end may be torn: it is left out, and the service goes on.
+    fs::write(&segment, &bytes[..written - 5]).unwrap();
     append(&scratch, 200, 300);
     let mut child = serve(&scratch, &[]);
     until_rows(&scratch.path("history.csv"), 300, &mut child);
