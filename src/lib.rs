@@ -60,12 +60,22 @@ use athermal_command::{message, output, terminal};
 extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
+#[cfg(feature = "parquet")]
+use athermal_arrow as _;
 use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;
 use athermal_estimators as _;
+#[cfg(feature = "cli")]
+use athermal_export as _;
 use athermal_features as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_http as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_log as _;
 use athermal_simulation as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_systemd as _;
 
 /// The pages of the guide, so that their code is compiled and run as tests.
 #[cfg(doctest)]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use athermal::core::compile::Plan;
-use athermal::files::{Dataset, FileError, Format, Options, Report};
+use athermal::files::{Dataset, FileError, Format, Options, Report, recordings_in};
 use athermal::run::model::DataCard;
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
@@ -24,14 +24,31 @@ use athermal_analysis::figures::{DATES_S, count, counted, instant};
 /// Recorded data.
 #[derive(Debug, Args)]
 pub struct Data {
-    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
-    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
-    files: Vec<PathBuf>,
+    /// CSV or JSON lines, or a folder of them; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
+    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
+    given: Vec<Given>,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
     #[command(flatten)]
     reading: Reading,
+}
+
+/// A file, or the files of a folder, by the name that was given.
+#[derive(Debug, Clone)]
+struct Given {
+    name: PathBuf,
+    files: Vec<PathBuf>,
+}
+
+impl From<PathBuf> for Given {
+    fn from(name: PathBuf) -> Self {
+        let mut files = recordings_in(&name);
+        if files.is_empty() {
+            files.push(name.clone());
+        }
+        Self { name, files }
+    }
 }
 
 /// How several files are read as one recording.
@@ -85,18 +102,18 @@ impl Data {
     #[must_use]
     pub fn of(files: Vec<PathBuf>, reading: Reading) -> Self {
         Self {
-            files,
+            given: files.into_iter().map(Given::from).collect(),
             lenient: false,
             reading,
         }
     }
 
     /// The files that the name in an offset stands for: a path, or the name of files in any folder.
-    fn named<'a>(&'a self, name: &'a Path) -> impl Iterator<Item = &'a PathBuf> {
-        let is_it = move |file: &&PathBuf| {
-            **file == *name || file.file_name().is_some_and(|of| of == name.as_os_str())
+    fn named<'a>(&'a self, name: &'a Path) -> impl Iterator<Item = &'a Path> {
+        let is_it = move |file: &&Path| {
+            *file == name || file.file_name().is_some_and(|of| of == name.as_os_str())
         };
-        self.files.iter().filter(is_it)
+        self.paths().filter(is_it)
     }
 
     /// Refuses an offset of a file that is neither among these nor among others.
@@ -144,32 +161,33 @@ impl Data {
 
     /// The paths of the files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.files.iter().map(PathBuf::as_path)
+        let files = self.given.iter().flat_map(|given| &given.files);
+        files.map(PathBuf::as_path)
     }
 
     /// Other files, read in the same way.
     #[must_use]
     pub fn others(&self, files: Vec<PathBuf>) -> Self {
         Self {
-            files,
             lenient: self.lenient,
-            reading: self.reading.clone(),
+            ..Self::of(files, self.reading.clone())
         }
     }
 
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
-        if let Some(journal) = self.files.first().and_then(|path| journal_of(path)) {
+        let first = self.paths().next();
+        if let Some((name, journal)) = first.and_then(|path| Some((path, journal_of(path)?))) {
             let recording = Rc::new(JournalRecording::in_state(&journal));
-            return Dataset::of(self.files[0].clone(), recording);
+            return Dataset::of(name.to_owned(), recording);
         }
         let offsets = self.reading.offsets.iter().flat_map(|(name, by)| {
             let files = self.named(name);
-            files.map(|file| (file.clone(), by.as_ns()))
+            files.map(|file| (file.to_owned(), by.as_ns()))
         });
         Dataset::new(
-            self.files.clone(),
+            self.paths().map(Path::to_owned).collect(),
             Options {
                 lenient: self.lenient,
                 segments: self.reading.segments,
@@ -195,8 +213,8 @@ impl Data {
             ["--offset".to_owned(), quoted(&offset)]
         });
         let options = options.chain(offsets);
-        let files = self.files.iter();
-        let files = files.map(|path| quoted(&path.display().to_string()));
+        let files = self.given.iter();
+        let files = files.map(|given| quoted(&given.name.display().to_string()));
         let words = options.chain(["--data".to_owned()]);
         words.chain(files).collect()
     }
@@ -213,7 +231,7 @@ impl Data {
     /// A name for other data, with the ending of these.
     #[must_use]
     pub fn unseen(&self) -> String {
-        let kind = self.files.first().and_then(|file| file.extension());
+        let kind = self.paths().next().and_then(Path::extension);
         let kind = kind.map_or("csv".into(), |kind| kind.to_string_lossy());
         format!("OTHER.{kind}")
     }
@@ -243,7 +261,7 @@ impl Data {
     /// When a file cannot be read.
     pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
         let reports = dataset.reports();
-        let card = |path: &PathBuf| {
+        let card = |path: &Path| {
             let name = path.display().to_string();
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
@@ -262,7 +280,7 @@ impl Data {
             };
             card.map_err(|error| Failure::Outside(format!("cannot read {name}: {error}")))
         };
-        self.files.iter().map(card).collect()
+        self.paths().map(card).collect()
     }
 }
 

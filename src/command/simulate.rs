@@ -42,7 +42,7 @@ Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` ma
 pub struct Simulate {
     /// The machine; all are listed when none is named
     machine: Option<String>,
-    /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV
+    /// CSV, JSON lines or what else is written, by its ending, CSV without one; `-` is standard output, as CSV
     #[arg(long, short, value_name = "FILE", requires = "machine")]
     output: Option<PathBuf>,
     /// Length of the recording in days
@@ -216,7 +216,8 @@ pub fn write_recording(
 ) -> Result<u64, Failure> {
     let mut simulation = Watched::start(recording, terminal)?;
     let channels = machine.channels();
-    if FileFormat::from_path(output) == Some(FileFormat::JsonLines) {
+    let format = FileFormat::from_path(output);
+    if matches!(format, Some(FileFormat::JsonLines | FileFormat::Typed)) {
         let mut row = Row::empty(channels);
         return write_rows(output, &table_columns(channels, truth), |values| {
             let more = simulation.next(&mut row);

@@ -12,6 +12,7 @@ use athermal_core::node::{InputPort, Kind, Read, kinds};
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
+use athermal_serve::companion::companion_kinds;
 use athermal_serve::connector::{ConnectorKind, sink_kinds, source_kinds};
 use athermal_serve::deployment;
 use athermal_trial::TestTable;
@@ -53,6 +54,10 @@ pub fn graph_schema() -> Value {
     schema["properties"]["time"]["properties"]["unit"]["enum"] = json!(TIME_UNITS);
     schema["properties"]["table"] = table(&format);
     schema["properties"]["runtime"] = runtime;
+    for kind in companion_kinds().filter(|kind| !kind.section.is_empty()) {
+        let section = adopt(kind.section, &(kind.schema)(), &mut definitions);
+        schema["properties"][kind.section] = section;
+    }
     let sources = connectors(source_kinds(), &source, &mut definitions);
     schema["properties"]["sources"]["additionalProperties"] = sources;
     let sinks = connectors(sink_kinds(), &sink, &mut definitions);

@@ -7,6 +7,8 @@
 mod workbench;
 
 mod architecture_page;
+#[cfg(unix)]
+mod asked_services;
 mod command_line;
 mod compare;
 mod data_warnings;
@@ -34,6 +36,8 @@ mod not_files;
 mod nothing_to_score;
 mod orders;
 mod other_processors;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plugin_crates;
 mod report;
 mod report_graphs;

@@ -27,6 +27,18 @@ impl Message {
         }
     }
 
+    /// What happened, by its name.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// What is known of it, as JSON.
+    #[must_use]
+    pub fn facts(&self) -> String {
+        Value::Object(self.facts.clone()).to_string()
+    }
+
     /// For programs: an object on one line, with how grave it is.
     #[must_use]
     pub fn line(&self, level: &str) -> String {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use athermal_analysis::figures::counted;
@@ -175,6 +176,9 @@ impl Terminal {
 
     /// Writes an event for programs or a line for people, with a label of this colour where it is graver than a note.
     fn write(&self, level: &str, colour: Option<&str>, message: &Message) {
+        if let Some(to) = &*diversion() {
+            return to(level, message);
+        }
         match colour {
             _ if self.events => self.print(message.line(level)),
             Some(colour) if self.colour => {
@@ -191,6 +195,19 @@ impl Terminal {
     fn print(&self, text: impl fmt::Display) {
         let _ = writeln!(std::io::stderr(), "{text}");
     }
+}
+
+/// Where reports go instead of standard error: they are given with `note`, `warning` or `error`.
+pub type Diversion = Box<dyn Fn(&str, &Message) + Send>;
+
+/// From here on reports of this process go elsewhere, such as into a log.
+pub fn divert(to: Option<Diversion>) {
+    *diversion() = to;
+}
+
+fn diversion() -> MutexGuard<'static, Option<Diversion>> {
+    static DIVERSION: Mutex<Option<Diversion>> = Mutex::new(None);
+    DIVERSION.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes to standard output; a reader who has seen enough ends the program quietly.

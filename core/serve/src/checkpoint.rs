@@ -136,6 +136,14 @@ impl Checkpoints {
         Ok(newest_first.map(|(_, path)| Checkpoint::read(&path)))
     }
 
+    /// Removes those that were taken after more than so many ticks, beats, breaks and freezes.
+    pub fn remove_after(&self, happenings: u64) {
+        let files = self.files().unwrap_or_default();
+        for (_, path) in files.iter().filter(|(of, _)| *of > happenings) {
+            let _ = fs::remove_file(path);
+        }
+    }
+
     /// After how many ticks, beats, breaks and freezes the oldest one was taken: the journal is needed from there.
     ///
     /// # Errors

@@ -131,6 +131,20 @@ impl StatePaths {
         Checkpoints::new(self.swaps(), usize::MAX)
     }
 
+    /// The revision of the graph that the service was given last and ran; none where that is not known.
+    #[must_use]
+    pub fn given(&self) -> Option<String> {
+        fs::read_to_string(self.0.join("given")).ok()
+    }
+
+    /// Notes the revision of the graph that the service was given.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn note_given(&self, revision: &str) -> io::Result<()> {
+        write_whole(&self.0.join("given"), revision.as_bytes())
+    }
+
     /// Keeps a model by its revision, so that a checkpoint of it is of use.
     ///
     /// # Errors

@@ -110,6 +110,19 @@ impl Keeper {
         Ok(())
     }
 
+    /// Takes a checkpoint now; it is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it
+    /// is; none where none can be taken.
+    pub fn take_now(&mut self) -> Option<u64> {
+        self.take();
+        self.waiting.as_ref().map(|of| of.happenings)
+    }
+
+    /// After how many ticks, beats, breaks and freezes the last checkpoint was saved.
+    #[must_use]
+    pub fn last(&self) -> u64 {
+        self.last
+    }
+
     /// Saves what the replica knows now, once the journal is synced up to it. For the end, when the journal is finished.
     ///
     /// # Errors
@@ -136,6 +149,12 @@ impl Keeper {
     #[must_use]
     pub fn checkpoints(&self) -> &Checkpoints {
         &self.checkpoints
+    }
+
+    /// The control of the graph, to be looked at.
+    #[must_use]
+    pub fn look(&self) -> &Control {
+        &self.control
     }
 
     /// The control of the graph.
@@ -187,6 +206,11 @@ pub enum CommitError {
     NotKept(FolderError),
     /// It cannot take over.
     NotStaged(StageError),
+    /// It was compared, and its error is larger by more than the margin.
+    Worse {
+        /// Its error relative to that of what runs.
+        ratio: Option<f64>,
+    },
 }
 
 impl std::fmt::Display for CommitError {
@@ -196,6 +220,11 @@ impl std::fmt::Display for CommitError {
             Self::Hangs => f.write_str("the disk of the state hangs: try again once it does not"),
             Self::NotKept(error) => error.fmt(f),
             Self::NotStaged(error) => error.fmt(f),
+            Self::Worse { ratio: Some(ratio) } => write!(
+                f,
+                "its error is {ratio:.3} times that of what runs, more than the margin allows"
+            ),
+            Self::Worse { ratio: None } => f.write_str("there was nothing to compare it by"),
         }
     }
 }

@@ -23,9 +23,11 @@
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
+//! | [`companion`] | what runs beside it and asks it things |
 
 mod aside;
 pub mod checkpoint;
+pub mod companion;
 pub mod connector;
 pub mod deployment;
 pub mod folder;

@@ -75,7 +75,11 @@ impl<'de> Deserialize<'de> for TimeConstants {
 }
 
 impl TimeConstants {
-    fn list(&self) -> Result<Vec<Duration>, Mistake> {
+    /// Them, in order.
+    ///
+    /// # Errors
+    /// When a grid is none, or one stands twice.
+    pub fn list(&self) -> Result<Vec<Duration>, Mistake> {
         let list = match self {
             Self::List(list) => list.clone(),
             Self::Grid(grid) => grid.list()?,

@@ -46,8 +46,8 @@ impl Begun {
         // Only a part of the file is read, whose lines are counted from where it begins.
         let of_line = |line: &str, error: FileError| {
             let message = match (&error, format) {
-                (FileError::Empty { .. }, Format::Csv) => "it names no columns".to_owned(),
                 (FileError::Empty { .. }, Format::JsonLines) => "it is no JSON object".to_owned(),
+                (FileError::Empty { .. }, _) => "it names no columns".to_owned(),
                 _ => error.to_string(),
             };
             let place = error.place().map(|place| format!("{place}: "));
@@ -58,8 +58,8 @@ impl Begun {
         let expected = [&[time.columns.title()], columns].concat();
         let found = ends.names(format);
         let named = match format {
-            Format::Csv => FIRST_LINE,
             Format::JsonLines => LAST_LINE,
+            _ => FIRST_LINE,
         };
         let found = found.map_err(|error| of_line(named, error))?;
         if found != expected {
@@ -70,9 +70,9 @@ impl Begun {
             )));
         }
         let rows = match format {
-            Format::Csv if ends.is_one_line => None,
-            Format::Csv => Some([&*ends.first, &*ends.last].concat()),
             Format::JsonLines => Some(ends.last.clone()),
+            _ if ends.is_one_line => None,
+            _ => Some([&*ends.first, &*ends.last].concat()),
         };
         let time = time.written();
         let last = rows
@@ -210,8 +210,8 @@ impl Ends {
 
     fn names(&self, format: Format) -> Result<Vec<String>, FileError> {
         match format {
-            Format::Csv => self.csv_names(),
             Format::JsonLines => self.json_names(),
+            _ => self.csv_names(),
         }
     }
 

@@ -30,6 +30,12 @@ pub(crate) fn value(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     }
 }
 
+/// The value of a text, as the cell of a table has it: `NaN` where it says that there is none; nothing where it is no number.
+#[must_use]
+pub fn number(text: &[u8]) -> Option<f64> {
+    value(text, false)
+}
+
 #[cold]
 fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     if cell.is_empty() || cell.eq_ignore_ascii_case(b"null") {

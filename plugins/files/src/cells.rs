@@ -12,6 +12,14 @@ pub(crate) trait Cells {
     /// The cell of a channel of the layout; empty if there is none.
     fn channel(&self, index: usize) -> &[u8];
     fn place(&self) -> Place;
+    /// The instant in ns since 1970, whether it is one of UTC, and its text, where the format has instants.
+    fn instant(&self) -> Option<(i64, bool, &str)> {
+        None
+    }
+    /// The values of the channels, where the format has numbers.
+    fn numbers(&self) -> Option<&[f64]> {
+        None
+    }
     /// Takes the columns from here on as the current row names them, if that is what it does.
     fn take_header(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {
         Ok(false)

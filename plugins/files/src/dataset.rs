@@ -12,7 +12,7 @@ use athermal_run::recording::{self, Samples, Source, SourceError};
 use crate::merge::{self, Joint};
 use crate::recording::offset_of;
 use crate::stream::next_of;
-use crate::{ChannelColumn, FileError, Layout, Options, Report, TimeColumn, TimeForm};
+use crate::{ChannelColumn, FileError, Format, Layout, Options, Report, TimeColumn, TimeForm};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -64,6 +64,27 @@ pub fn layout(plan: &Plan) -> Layout {
             .collect(),
         table: plan.table.clone(),
     }
+}
+
+/// The recordings in a folder and in the folders inside it, in the order of their paths: what has a name that promises a format, and
+/// begins neither with a dot nor with `_`. None where there is no such folder.
+#[must_use]
+pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    let is_hidden = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(['.', '_'])
+    };
+    paths.retain(|path| !is_hidden(path));
+    let found = paths.into_iter().flat_map(|path| match path.is_dir() {
+        true => recordings_in(&path),
+        false => Format::of_file(&path).map(|_| path).into_iter().collect(),
+    });
+    found.collect()
 }
 
 /// One or more files as a data set, or a recording of another kind.

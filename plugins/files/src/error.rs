@@ -19,13 +19,16 @@ const EXCERPT: usize = 60;
 pub struct Place {
     /// The name of the file as it was given, or `standard input`.
     pub file: Arc<str>,
-    /// The line, counted from 1; the first of a row that spans several.
+    /// The line, or the row of what is no text, counted from 1; the first of a row that spans several. 0 is the file as a whole.
     pub line: u64,
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.file, self.line)
+        match self.line {
+            0 => f.write_str(&self.file),
+            line => write!(f, "{}:{line}", self.file),
+        }
     }
 }
 

@@ -46,12 +46,13 @@ mod reader;
 mod recording;
 mod runs;
 mod stream;
+mod typed;
 mod unpacked;
 mod writer;
 
 pub use begun::begun_columns;
-pub use cell::with_decimal_point;
-pub use dataset::{Dataset, layout};
+pub use cell::{number, with_decimal_point};
+pub use dataset::{Dataset, layout, recordings_in};
 pub use detect::{
     Description, Format, LongFormat, NumberForm, apart, other_time, zone_in_name, zone_of,
 };
@@ -64,4 +65,11 @@ pub use merge::{Joint, MergeError};
 pub use reader::{Options, Reader, Row};
 pub use recording::{Event, Recording};
 pub use stream::WithRevision;
+pub use typed::{FileKind, Selection, TypedFile, TypedRows, TypedSink, TypedTime};
 pub use writer::{Flush, Writer};
+
+/// What the macros of this crate use.
+#[doc(hidden)]
+pub mod __private {
+    pub use inventory;
+}

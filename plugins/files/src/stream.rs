@@ -41,7 +41,7 @@ impl Sink for Writer {
     }
 
     fn finish(&mut self) -> Result<(), SinkError> {
-        Ok(self.flush_all()?)
+        Ok(self.end()?)
     }
 }
 

@@ -12,7 +12,8 @@ use crate::begun::Begun;
 use crate::cell::text_of;
 use crate::json_objects::JsonObjects;
 use crate::lines::BUFFER;
-use crate::{FileError, Format, TimeColumn};
+use crate::typed::kind_by_name;
+use crate::{FileError, FileKind, Format, TimeColumn, TypedSink};
 
 /// When a row leaves the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +43,7 @@ pub struct Writer {
 enum Rows {
     Csv(Box<csv::Writer<Box<dyn Write + Send>>>),
     Json(JsonObjects),
+    Typed(Box<dyn TypedSink>),
 }
 
 impl Writer {
@@ -69,6 +71,9 @@ impl Writer {
             );
         }
         let output = create(path).map_err(|source| FileError::cannot_open(path, source))?;
+        if let Some(kind) = kind_by_name(path) {
+            return Self::of_kind(kind, path, output, time_column, columns);
+        }
         let mut writer = Self::to_file(path, output, time_column, columns, flush)?;
         writer.write_header(time_column, columns)?;
         writer.keep_header(time_column, columns)?;
@@ -90,6 +95,15 @@ impl Writer {
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
         let format = format_of(path);
+        let stands = path.metadata().is_ok_and(|of| of.is_file() && of.len() > 0);
+        if let Some(kind) = kind_by_name(path)
+            && stands
+        {
+            return Err(FileError::NotBegun {
+                file: path.display().to_string().into(),
+                reason: format!("a file of {} ends where it was ended once", kind.name),
+            });
+        }
         let Some(begun) = Begun::of(path, format, time, columns, seen)? else {
             return Self::create(path, &time.columns.title(), columns, flush);
         };
@@ -108,6 +122,31 @@ impl Writer {
     /// The instant of the last row that stood in the file before.
     pub fn stood(&self) -> Option<Instant> {
         self.stood_ns.map(Instant::from_ns)
+    }
+
+    fn of_kind(
+        kind: &FileKind,
+        path: &Path,
+        output: File,
+        time_column: &str,
+        columns: &[String],
+    ) -> Result<Self, FileError> {
+        let name = path.display().to_string();
+        let Some(create) = kind.create else {
+            let reason = format!("{} is read, but not written", kind.name);
+            return Err(FileError::cannot_open(path, io::Error::other(reason)));
+        };
+        let nothing = io::sink();
+        let mut writer = Self::headless(
+            &name,
+            nothing,
+            Format::Csv,
+            time_column,
+            columns,
+            Flush::Buffered,
+        );
+        writer.rows = Rows::Typed(create(output, time_column, columns));
+        Ok(writer)
     }
 
     fn to_file(
@@ -155,8 +194,8 @@ impl Writer {
     ) -> Self {
         let output: Box<dyn Write + Send> = Box::new(output);
         let rows = match format {
-            Format::Csv => Rows::Csv(Box::new(csv_to(output))),
             Format::JsonLines => Rows::Json(JsonObjects::new(output, time_column, columns)),
+            _ => Rows::Csv(Box::new(csv_to(output))),
         };
         Self {
             file: name.into(),
@@ -229,6 +268,7 @@ impl Writer {
         let written = match &mut self.rows {
             Rows::Csv(csv) => write_cells(csv, &mut self.number, time_text, values, label),
             Rows::Json(json) => json.write(&mut self.number, time_text, values, label),
+            Rows::Typed(rows) => rows.write(time_ns, values, label),
         };
         written
             .and_then(|()| self.flush_when(self.flush == Flush::EachRow))
@@ -240,7 +280,16 @@ impl Writer {
     /// # Errors
     /// Writing failed.
     pub fn finish(mut self) -> Result<(), FileError> {
-        self.flush_all()
+        self.end()
+    }
+
+    /// Writes what is still held back, and the end of what has one.
+    pub(crate) fn end(&mut self) -> Result<(), FileError> {
+        let ended = match &mut self.rows {
+            Rows::Typed(rows) => rows.finish(),
+            _ => self.flush_when(true),
+        };
+        ended.map_err(|source| self.failed(source))
     }
 
     pub(crate) fn flush_all(&mut self) -> Result<(), FileError> {
@@ -295,6 +344,8 @@ impl Writer {
             _ if !now => Ok(()),
             Rows::Csv(csv) => csv.flush(),
             Rows::Json(json) => json.flush(),
+            // What it holds back goes with its next piece.
+            Rows::Typed(_) => Ok(()),
         }
     }
 

@@ -25,7 +25,7 @@ type Piece = io::Result<Vec<u8>>;
 /// may send several. Where there are no signals it is as it was.
 pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     let (give, pieces) = sync_channel(WAITING);
-    if !listen(give.clone()) {
+    if !listen(give.clone(), true) {
         return input;
     }
     // The thread may wait for an input that gives nothing more, and goes with the program.
@@ -33,20 +33,20 @@ pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     Box::new(Pieces::new(pieces))
 }
 
-/// Notes signals to stop, for whoever looks at [`is_stopped`]. A second one ends the program at once.
+/// Notes SIGINT and SIGTERM, for whoever looks at [`is_stopped`]. A second one ends the program at once.
 pub fn listen_for_the_end() {
     let (give, _) = sync_channel(1);
-    let _ = listen(give);
+    let _ = listen(give, false);
 }
 
 /// Ends the input at the first signal; whether signals can be listened to.
 #[cfg(unix)]
-fn listen(give: SyncSender<Piece>) -> bool {
+fn listen(give: SyncSender<Piece>, hangs_up: bool) -> bool {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    let hangs_up = ends_at_a_hangup().then_some(SIGHUP);
+    let hangs_up = (hangs_up && ends_at_a_hangup()).then_some(SIGHUP);
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(hangs_up)) else {
         return false;
     };
@@ -74,7 +74,7 @@ fn ends_at_a_hangup() -> bool {
 }
 
 #[cfg(not(unix))]
-fn listen(_give: SyncSender<Piece>) -> bool {
+fn listen(_give: SyncSender<Piece>, _hangs_up: bool) -> bool {
     false
 }
 

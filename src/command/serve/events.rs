@@ -53,6 +53,10 @@ impl Events<'_> {
             ServiceEvent::NotStaged(reason) => terminal.warning(format_args!(
                 "another graph than the one that ran last was given, and cannot take over: {reason}; what ran last goes on"
             )),
+            ServiceEvent::Compared { verdict, .. } => terminal.note(swap_words::shadow(&verdict)),
+            ServiceEvent::NotTakenOver(reason) => terminal.warning(format_args!(
+                "the staged graph does not take over: {reason}; what runs goes on"
+            )),
             ServiceEvent::HostClock { is_synchronised } => terminal.note(if is_synchronised {
                 "the host's clock is synchronised: stamps are compared with it from now on"
             } else {

@@ -57,6 +57,7 @@ impl Serve {
         let options = ServiceOptions {
             is_dry: self.dry_run,
             frozen: self.frozen,
+            machine: self.machine.clone(),
             ..ServiceOptions::new(state.clone())
         };
         stop::listen_for_the_end();

@@ -196,7 +196,7 @@ fn session(
                 let factor = if other < 0.0 { -1e5 } else { 1e5 };
                 let (next, _) = self::model(scratch, fitted, name, factor, by_rate);
                 // One that is still on its way is not overtaken.
-                let _ = service.swap(&next);
+                let _ = service.stage(&next, "test").is_ok() && service.commit("test").is_ok();
             }
             _ => std::thread::sleep(Duration::from_millis(3)),
         }

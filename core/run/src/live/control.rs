@@ -44,7 +44,12 @@ pub struct Control {
     frozen: bool,
     generation: u64,
     row: Vec<f64>,
+    /// What happened and has not been reported yet.
+    notices: Vec<Notice>,
+    look: Option<Look>,
 }
+
+type Look = Box<dyn FnMut(Instant, &Engine) + Send>;
 
 /// The graph before the last swap, kept warm for a while yet.
 struct Previous {
@@ -125,6 +130,8 @@ pub(super) fn pair(
     let control = Control {
         retained: Retained::new(feed.len(), span, options.memory),
         row: vec![f64::NAN; record],
+        notices: Vec::new(),
+        look: None,
         replica: Some(seat(replica)),
         running,
         options,
@@ -148,7 +155,18 @@ impl Control {
     /// Takes in the ticks that have been stepped since the last call, and returns what happened. Call it often enough that
     /// the ring does not fill: at least once in [`LiveOptions::mirrored`] ticks.
     pub fn pump(&mut self) -> Vec<Notice> {
-        let mut notices = Vec::new();
+        self.catch_up();
+        std::mem::take(&mut self.notices)
+    }
+
+    /// From now on `look` sees each tick, and what runs as it is after it. Ticks that are missed are not seen.
+    pub fn look_on(&mut self, look: impl FnMut(Instant, &Engine) + Send + 'static) {
+        self.look = Some(Box::new(look));
+    }
+
+    /// Takes in what there is. What happened is kept for whoever pumps.
+    fn catch_up(&mut self) {
+        let mut notices = std::mem::take(&mut self.notices);
         while let Ok(chunk) = self.ticks.read_chunk(self.row.len()) {
             let (first, second) = chunk.as_slices();
             self.row[..first.len()].copy_from_slice(first);
@@ -157,7 +175,7 @@ impl Control {
             self.take_in(&mut notices);
         }
         self.take_back(&mut notices);
-        notices
+        self.notices = notices;
     }
 
     /// Makes a graph ready to take over: all that it can is carried from what runs, the rest is warmed by the retained past.
@@ -167,7 +185,7 @@ impl Control {
     /// # Errors
     /// When it cannot take over, or another graph is on its way; what runs, and what was staged before, is untouched.
     pub fn stage(&mut self, model: &Model, carry_learned: bool) -> Result<&Staged, StageError> {
-        self.pump();
+        self.catch_up();
         if self.committed.is_some() {
             return Err(StageError::Busy);
         }
@@ -231,7 +249,7 @@ impl Control {
     /// # Errors
     /// When nothing is staged, or ticks were missed.
     pub fn shadow(&mut self, duration: Duration, margin: f64) -> Result<(), StageError> {
-        self.pump();
+        self.catch_up();
         let staged = self.staged.as_mut().ok_or(StageError::NothingStaged)?;
         let replica = self.replica.as_ref().ok_or(StageError::NotMirrored)?;
         staged.shadow = Some(Shadow::new(
@@ -272,7 +290,7 @@ impl Control {
     /// # Errors
     /// When nothing is staged, or a graph is still on its way; what is staged stays so.
     pub fn commit(&mut self) -> Result<(), StageError> {
-        self.pump();
+        self.catch_up();
         let mut staged = self.staged.take().ok_or(StageError::NothingStaged)?;
         // A rollback may have come between, to a graph that it was not set against.
         let unfit = StageError::between(&self.running, staged.live.engine.plan());
@@ -297,7 +315,7 @@ impl Control {
     /// # Errors
     /// When there is none that is still warm, or a graph is still on its way.
     pub fn rollback(&mut self) -> Result<(), StageError> {
-        self.pump();
+        self.catch_up();
         let mut previous = self.previous.take().ok_or(StageError::NothingToTakeBack)?;
         if let Err(error) = self.send(&mut previous.live) {
             self.previous = Some(previous);
@@ -418,6 +436,9 @@ impl Control {
             let _ = live.step(time, samples);
         });
         self.retained.push(time, samples);
+        if let (Some(look), Some(replica)) = (&mut self.look, &self.replica) {
+            look(time, &replica.engine);
+        }
         if let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica)
             && let Some(shadow) = &mut staged.shadow
         {

@@ -71,6 +71,13 @@ pub struct SourceCounts {
 }
 
 impl SourceCounts {
+    /// How many samples wait for the engine thread.
+    #[must_use]
+    pub fn waiting(&self) -> u64 {
+        let taken = self.taken.load(Ordering::Acquire);
+        self.given.load(Ordering::Acquire).saturating_sub(taken)
+    }
+
     /// Whether it is connected.
     #[must_use]
     pub fn is_connected(&self) -> bool {

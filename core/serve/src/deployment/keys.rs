@@ -9,7 +9,7 @@ use crate::document::{Data, Table, Value, decode};
 use crate::node::out_of_range;
 
 /// Reads a table as a type; nothing where there are mistakes, all of which are reported.
-pub(super) fn read<T: DeserializeOwned + JsonSchema>(
+pub(crate) fn read<T: DeserializeOwned + JsonSchema>(
     table: &Value,
     what: &str,
     diagnostics: &mut Diagnostics,

@@ -10,12 +10,14 @@ mod sinks;
 mod size;
 mod sources;
 
+pub(crate) use keys::read as read_keys;
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
 pub use size::Size;
 
 use std::path::PathBuf;
 
+use crate::companion::{Companion, companion_kinds};
 use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Sink, SinkKind, Source, SourceKind};
 use crate::diagnostic::{Diagnostics, Sources};
@@ -35,6 +37,8 @@ pub struct Deployment {
     pub sources: Vec<DeclaredSource>,
     /// `[sinks.NAME]`, in the order of the file.
     pub sinks: Vec<DeclaredSink>,
+    /// What runs beside the service, by its sections.
+    pub companions: Vec<Box<dyn Companion>>,
 }
 
 /// A source that a machine file declares.
@@ -121,10 +125,16 @@ impl Deployment {
         let sinks = section("sinks")
             .map(|section| sinks::read(section, graph, plan, files, diagnostics))
             .unwrap_or_default();
+        let mut companions = Vec::new();
+        for kind in companion_kinds() {
+            let what = format!("`[{}]`", kind.section);
+            companions.extend((kind.read)(section(kind.section), &what, diagnostics));
+        }
         let deployment = Self {
             runtime: runtime?,
             sources,
             sinks,
+            companions,
         };
         (diagnostics.error_count() == before).then_some(deployment)
     }

@@ -223,10 +223,12 @@ impl EngineThread {
                 hurried,
                 last,
                 newest: known,
+                stamps,
                 is_synchronised,
                 ..
             } = &mut *snapshot;
             counts.clone_from_slice(sequencer.counts());
+            stamps.copy_from_slice(sequencer.timeline().stamps());
             *hurried = sequencer.hurried();
             *last = sequencer.timeline().last();
             *known = newest;

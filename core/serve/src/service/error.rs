@@ -45,6 +45,8 @@ pub enum ServiceError {
     Unfit(EngineError),
     /// The engine cannot be copied.
     NoTwin(RestoreError),
+    /// What is to run beside the service cannot start.
+    Companion(ConnectorError),
     /// A thread cannot be started.
     Thread(io::Error),
 }
@@ -63,6 +65,7 @@ impl fmt::Display for ServiceError {
             }
             Self::Unfit(error) => error.fmt(f),
             Self::NoTwin(error) => error.fmt(f),
+            Self::Companion(error) => error.fmt(f),
             Self::Thread(error) => write!(f, "cannot start a thread: {error}"),
         }
     }

@@ -1,6 +1,6 @@
 //! What a service reports while it runs. Whoever runs it puts that into words.
 
-use athermal_run::live::Notice;
+use athermal_run::live::{Notice, Verdict};
 
 use crate::checkpoint::CheckpointError;
 use crate::connector::ConnectorError;
@@ -62,6 +62,15 @@ pub enum ServiceEvent {
     },
     /// Another graph than that of the last checkpoint was given, and cannot take over: what ran last goes on.
     NotStaged(String),
+    /// The comparison of a staged graph with what runs is over.
+    Compared {
+        /// The revision of the staged graph.
+        revision: String,
+        /// What it has come to.
+        verdict: Verdict,
+    },
+    /// A graph was to take over after its comparison, and does not; what runs goes on.
+    NotTakenOver(String),
     /// Whether the host's clock is known to be right, where that matters to a source: at the start, and once it is.
     HostClock {
         /// Until it is, clocks of sources are not judged, and the first stamp may be any.

@@ -23,6 +23,18 @@ pub struct SinkCounts {
     pub behind: AtomicU64,
     /// How often it failed.
     pub failures: AtomicU64,
+    /// Rows that were handed to its thread, and those that the thread took.
+    sent: AtomicU64,
+    taken: AtomicU64,
+}
+
+impl SinkCounts {
+    /// How many rows wait.
+    #[must_use]
+    pub fn waiting(&self) -> u64 {
+        let taken = self.taken.load(Ordering::Acquire);
+        self.sent.load(Ordering::Acquire).saturating_sub(taken)
+    }
 }
 
 impl SinkCounts {
@@ -50,6 +62,7 @@ pub(super) struct FrameSender {
 #[derive(Debug)]
 pub(super) struct FrameReceiver {
     ring: Consumer<u64>,
+    counts: Arc<SinkCounts>,
     words: Vec<u64>,
     outputs: Vec<f64>,
 }
@@ -78,6 +91,7 @@ pub(super) fn frames(
     };
     let receiver = FrameReceiver {
         ring: consumer,
+        counts: Arc::clone(counts),
         words: vec![0; width],
         outputs: vec![f64::NAN; outputs],
     };
@@ -116,6 +130,7 @@ impl FrameSender {
             *place = word;
         }
         chunk.commit_all();
+        self.counts.sent.fetch_add(1, Ordering::Release);
     }
 }
 
@@ -129,6 +144,7 @@ impl FrameReceiver {
         self.words[..first.len()].copy_from_slice(first);
         self.words[first.len()..].copy_from_slice(second);
         chunk.commit_all();
+        self.counts.taken.fetch_add(1, Ordering::Release);
         for (output, word) in self.outputs.iter_mut().zip(&self.words[HEAD..]) {
             *output = f64::from_bits(*word);
         }

@@ -12,8 +12,11 @@ mod engine_thread;
 mod error;
 mod event;
 mod frames;
+mod handle;
 mod host_clock;
+mod observer;
 mod position;
+mod replacing;
 mod sink_thread;
 mod sinks;
 mod source_thread;
@@ -31,17 +34,21 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_run::live::{Feed, LiveOptions, pair_from};
+use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+pub use crate::keeper::CommitError;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
+pub use handle::{NoAnswer, ServiceHandle};
+pub use observer::Observer;
 pub use status::Snapshot;
 
 use crate::aside::Aside;
 use crate::checkpoint::Checkpoints;
+use crate::companion::Beside;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
@@ -50,14 +57,17 @@ use crate::host;
 use crate::journal::{
     FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
 };
-use crate::keeper::{CommitError, Keeper};
+use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Admission, Sequencer};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order};
+use handle::Work;
 use host_clock::HostClock;
+use observer::Observers;
+use replacing::Comparison;
 use sinks::OpenSink;
 use status::Shared;
 use watch::Watch;
@@ -77,6 +87,8 @@ pub struct ServiceOptions {
     pub is_dry: bool,
     /// Whether estimators learn nothing.
     pub frozen: bool,
+    /// The machine file.
+    pub machine: PathBuf,
     /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
     pub host_time: fn() -> Option<Instant>,
 }
@@ -89,6 +101,7 @@ impl ServiceOptions {
             state,
             is_dry: false,
             frozen: false,
+            machine: PathBuf::new(),
             host_time: host::synchronised,
         }
     }
@@ -96,6 +109,14 @@ impl ServiceOptions {
 
 /// A service at work.
 pub struct Service {
+    handle: ServiceHandle,
+    asked: Receiver<Work>,
+    observers: Observers,
+    companions: Vec<Box<dyn Send>>,
+    comparison: Option<Comparison>,
+    is_asked_to_end: bool,
+    /// The revision of the graph that the machine file gave.
+    given: String,
     keeper: Keeper,
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
@@ -123,6 +144,7 @@ pub struct Service {
     /// How many nodes were given up and reported.
     given_up: usize,
     has_failed: bool,
+    began: Clock,
 }
 
 /// What is left of a service that has ended.
@@ -154,6 +176,7 @@ impl Service {
             runtime,
             sources,
             sinks,
+            companions,
         } = deployment;
         let folder = StateFolder::open(&options.state)?;
         if let Some(revision) = model.revision() {
@@ -211,9 +234,16 @@ impl Service {
             channels: given.clone(),
             ..LiveOptions::default()
         };
-        let differs = recovered.model.revision() != model.revision();
+        // What ran before goes on unless another graph is given than then.
+        let given = model.revision().unwrap_or_default();
+        let is_another = recovered.model.revision() != model.revision();
+        let differs = is_another && folder.given().as_ref() != Some(&given);
+        folder.commits().remove_after(happenings);
         let was_frozen = recovered.engine.frozen();
-        let (stepper, control) = pair_from(recovered.engine, live)?;
+        let (stepper, mut control) = pair_from(recovered.engine, live)?;
+        let observers = Observers::default();
+        let looking = observers.clone();
+        control.look_on(move |at, engine| looking.tick(at, engine));
         let every = wait(runtime.checkpoint);
         let keeper = Keeper::new(
             control,
@@ -265,7 +295,15 @@ impl Service {
             spawn("source", move || source.run(&stop, &tell))
         });
         let source_threads = source_threads.collect::<Result<Vec<_>, _>>()?;
+        let (handle, asked) = ServiceHandle::new();
         let mut service = Self {
+            handle,
+            asked,
+            observers,
+            companions: Vec::new(),
+            comparison: None,
+            is_asked_to_end: false,
+            given,
             keeper,
             engine: engine_thread,
             orders: to_engine,
@@ -291,10 +329,19 @@ impl Service {
             is_degraded: false,
             given_up: 0,
             has_failed: false,
+            began: Clock::now(),
         };
         service.own.extend(service.host.first());
         if differs {
             service.replace(model);
+        } else if !is_another {
+            service.note_given(&service.given.clone());
+        }
+        let beside = service.beside(model, options);
+        for companion in companions {
+            let running = companion.start(&beside);
+            let running = running.map_err(ServiceError::Companion)?;
+            service.companions.push(running);
         }
         Ok((service, recovered.report))
     }
@@ -305,6 +352,9 @@ impl Service {
         match self.keeper.pump() {
             Ok(notices) => events.extend(notices.into_iter().map(ServiceEvent::Swap)),
             Err(error) => events.push(ServiceEvent::NoCheckpoint(error)),
+        }
+        while let Ok(work) = self.asked.try_recv() {
+            work(self);
         }
         while let Ok((admission, count)) = self.remarks.pop() {
             events.push(ServiceEvent::NotAccepted { admission, count });
@@ -349,13 +399,67 @@ impl Service {
                 }
             });
         }
+        self.compare(&mut events);
+        for event in &events {
+            if let ServiceEvent::Swap(Notice::TookOver { revision, .. }) = event {
+                self.note_given(revision);
+            }
+        }
+        self.observers.events(&events);
         events
     }
 
-    /// Whether all sources have come to their ends, or the engine cannot go on.
+    /// Whether all sources have come to their ends, the engine cannot go on, or the end was asked for.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.engine.is_finished()
+        self.is_asked_to_end || self.engine.is_finished()
+    }
+
+    /// Asks for the end: whoever runs the service stops it.
+    pub fn ask_to_end(&mut self, by: &str) {
+        self.note(&format!("{by}: asked for the end"));
+        self.is_asked_to_end = true;
+    }
+
+    /// Reports something that happened, as if it had happened here.
+    pub fn report(&mut self, event: ServiceEvent) {
+        self.own.push(event);
+    }
+
+    /// To ask it from other threads.
+    #[must_use]
+    pub fn handle(&self) -> ServiceHandle {
+        self.handle.clone()
+    }
+
+    /// Lets somebody look on.
+    pub fn observe(&mut self, observer: Box<dyn Observer>) {
+        self.observers.add(observer);
+    }
+
+    /// How long it has been running.
+    #[must_use]
+    pub fn uptime(&self) -> Wait {
+        self.began.elapsed()
+    }
+
+    /// Takes a checkpoint, which is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it is;
+    /// none where none can be taken.
+    pub fn checkpoint(&mut self, by: &str) -> Option<u64> {
+        self.note(&format!("{by}: checkpoint"));
+        self.keeper.take_now()
+    }
+
+    /// After how many ticks, beats, breaks and freezes the last checkpoint was saved.
+    #[must_use]
+    pub fn last_checkpoint(&self) -> u64 {
+        self.keeper.last()
+    }
+
+    /// The state folder.
+    #[must_use]
+    pub fn folder(&self) -> &StateFolder {
+        &self.folder
     }
 
     /// How often the engine thread has gone round: it lives for as long as this grows.
@@ -404,24 +508,14 @@ impl Service {
         self.order(Order::Note(text.into()));
     }
 
-    /// Lets a graph take over before the next tick, with what it can take of the states of what runs.
-    ///
-    /// # Errors
-    /// When it cannot take over; what runs is untouched.
-    pub fn swap(&mut self, model: &Model) -> Result<Vec<crate::engine::NodeCarry>, CommitError> {
-        if let Some(revision) = model.revision() {
-            self.folder.keep_model(model, &revision)?;
-        }
-        let carry = self.keeper.control().stage(model, false)?.carry().to_vec();
-        self.keeper.commit()?;
-        Ok(carry)
-    }
-
     /// Ends: what waits is stepped, rows are put out, the journal is synced, and a checkpoint is taken.
     ///
     /// # Errors
     /// When the last checkpoint cannot be written. Everything is in the journal all the same.
     pub fn stop(mut self) -> Result<(Ended, Vec<ServiceEvent>), ServiceError> {
+        // Whoever still asks is answered that it has ended.
+        drop(std::mem::replace(&mut self.asked, ServiceHandle::new().1));
+        self.companions.clear();
         self.stop_sources.ask();
         self.order(Order::Stop);
         let mut events = Vec::new();
@@ -468,14 +562,35 @@ impl Service {
 
     /// Lets the graph that was given take over from the one that ran last.
     fn replace(&mut self, model: &Model) {
-        let event = match self.swap(model) {
+        let by = "start";
+        let staged = self.stage(model, by).map(|of| of.carry().to_vec());
+        let event = match staged.and_then(|carry| self.commit(by).map(|()| carry)) {
             Ok(carry) => ServiceEvent::Staged {
-                revision: model.revision().unwrap_or_default(),
+                revision: self.given.clone(),
                 carry,
             },
             Err(error) => ServiceEvent::NotStaged(error.to_string()),
         };
         self.own.push(event);
+    }
+
+    /// Keeps in mind that the graph that was given ran: a restart with the same one goes on with what ran last.
+    fn note_given(&self, revision: &str) {
+        if revision == self.given {
+            // Where it cannot be written, a restart lets the given graph take over again.
+            let _ = self.folder.note_given(revision);
+        }
+    }
+
+    fn beside(&self, model: &Model, options: &ServiceOptions) -> Beside {
+        let stem = options.machine.file_stem();
+        let stem = stem.map(|of| of.to_string_lossy().into_owned());
+        Beside {
+            name: model.graph.name.clone().or(stem).unwrap_or_default(),
+            machine: options.machine.clone(),
+            state: self.folder.path().to_owned(),
+            handle: self.handle(),
+        }
     }
 }
 

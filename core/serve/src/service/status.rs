@@ -27,6 +27,7 @@ impl Shared {
                 happenings: 0,
                 last: Instant::MIN,
                 newest: None,
+                stamps: vec![Instant::MIN; channels],
                 is_synchronised: false,
             }),
         }
@@ -54,6 +55,8 @@ pub struct Snapshot {
     pub last: Instant,
     /// The newest stamp, and the time since.
     pub newest: Option<Instant>,
+    /// The stamp of each channel's newest sample that was stepped; [`Instant::MIN`] before the first.
+    pub stamps: Vec<Instant>,
     /// Whether the host's time is known to be right. Until then clocks of sources are not judged, and the first stamp may be any.
     pub is_synchronised: bool,
 }

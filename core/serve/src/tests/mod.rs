@@ -5,6 +5,7 @@ mod failures;
 mod kills;
 mod recoveries;
 mod replays;
+mod swaps;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -14,10 +14,11 @@ use crate::columns::numbered;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
+use crate::typed::{self, TypedCells};
 
 use super::header::is_value;
 use super::{Format, LongFormat, begins_json_array, units};
-use crate::FileError;
+use crate::{FileError, TypedFile};
 
 /// The columns of a file and the texts of its first rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,6 +42,9 @@ impl Description {
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
         let path = path.as_ref();
+        if let Some(kind) = typed::kind_of(path) {
+            return of_typed(path, typed::open(kind, path)?, rows);
+        }
         let mut described = of_lines(Lines::open(path, None)?, Format::of_file(path), rows)?;
         if let Some(encoding) = marked(path) {
             described.table.encoding = Some(encoding);
@@ -214,9 +218,28 @@ fn of_lines(
     rows: usize,
 ) -> Result<Description, FileError> {
     match lines.format_or(format)? {
-        Format::Csv => of_csv(lines, rows),
         Format::JsonLines => of_json(lines, rows),
+        _ => of_csv(lines, rows),
     }
+}
+
+fn of_typed(path: &Path, file: Box<dyn TypedFile>, rows: usize) -> Result<Description, FileError> {
+    let mut cells = TypedCells::of_texts(path, file)?;
+    let columns = cells.names().to_vec();
+    let mut ledger = Ledger::new(true, None);
+    let mut texts = Vec::new();
+    while texts.len() < rows && cells.advance(&mut ledger)? {
+        let row = (0..columns.len()).map(|at| cells.channel(at));
+        let row = row.map(|cell| String::from_utf8_lossy(cell).into_owned());
+        texts.push(row.collect());
+    }
+    Ok(Description {
+        format: Format::Typed,
+        table: TableFormat::default(),
+        columns,
+        units: Vec::new(),
+        rows: texts,
+    })
 }
 
 fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {

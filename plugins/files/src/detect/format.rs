@@ -1,6 +1,8 @@
-//! Which of the two formats a file has: from its name, else from its first byte. Not how either is read.
+//! Which format a file has: from its name, else from its first bytes. Not how it is read.
 
 use std::path::Path;
+
+use crate::typed::kind_by_name;
 
 /// A format of recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,11 +11,19 @@ pub enum Format {
     Csv,
     /// One JSON object per line.
     JsonLines,
+    /// A kind that is no text, which another crate brings.
+    Typed,
 }
 
 impl Format {
-    /// The format that a file's name promises: `.csv`, `.tsv`, `.txt`, or `.jsonl`, `.ndjson`, `.json`; `None` for others.
+    /// The format that a file's name promises: `.csv`, `.tsv`, `.txt`, or `.jsonl`, `.ndjson`, `.json`, or what crates bring; `None`
+    /// for others.
     pub fn from_path(path: &Path) -> Option<Self> {
+        Self::of_text(path).or_else(|| kind_by_name(path).map(|_| Self::Typed))
+    }
+
+    /// The same of texts alone.
+    pub(crate) fn of_text(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         match extension.as_str() {
             "csv" | "tsv" | "txt" => Some(Self::Csv),

@@ -1,0 +1,52 @@
+//! Who looks on at a service.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::ServiceEvent;
+use crate::engine::Engine;
+use crate::time::Instant;
+
+/// Looks on at a service, on its control thread: it must not wait. What is slow takes copies away through a bounded queue.
+pub trait Observer: Send {
+    /// Something happened.
+    fn event(&mut self, event: &ServiceEvent) {
+        let _ = event;
+    }
+
+    /// A tick, and what runs as it is after it. Ticks that the control thread missed are not seen.
+    fn tick(&mut self, at: Instant, engine: &Engine) {
+        let _ = (at, engine);
+    }
+
+    /// Whether it looks on no longer.
+    fn is_gone(&self) -> bool {
+        false
+    }
+}
+
+/// All that look on.
+#[derive(Clone, Default)]
+pub(super) struct Observers(Arc<Mutex<Vec<Box<dyn Observer>>>>);
+
+impl Observers {
+    pub(super) fn add(&self, observer: Box<dyn Observer>) {
+        self.all().push(observer);
+    }
+
+    pub(super) fn tick(&self, at: Instant, engine: &Engine) {
+        self.all().iter_mut().for_each(|of| of.tick(at, engine));
+    }
+
+    pub(super) fn events(&self, events: &[ServiceEvent]) {
+        let mut all = self.all();
+        all.retain(|of| !of.is_gone());
+        for observer in &mut *all {
+            events.iter().for_each(|event| observer.event(event));
+        }
+    }
+
+    /// They are called by the control thread alone, so that nobody waits here.
+    fn all(&self) -> MutexGuard<'_, Vec<Box<dyn Observer>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

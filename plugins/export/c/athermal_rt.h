@@ -1,0 +1,348 @@
+/* The runtime of exported graphs: C99, no allocation, no recursion, state of fixed size. Of the C library it uses math.h alone.
+ *
+ * A plan is constant data that `athermal export c` writes. Its state is two arrays, of integers and of numbers, which the generated
+ * header declares. Absence is NaN. Times are nanoseconds. All sums are taken in the order in which the engine takes them, so that
+ * results are the same to the bit, as long as the compiler neither fuses products with sums nor computes wider than double:
+ * build with -std=c99 -ffp-contract=off, and let the self test of the plan say whether it did. */
+#ifndef ATHERMAL_RT_H
+#define ATHERMAL_RT_H
+
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef ATHERMAL_FLOAT
+/* Single precision: for small processors, within the error that the self test prints. */
+typedef float at_real;
+#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0)
+#error "numbers must be computed in their own precision: FLT_EVAL_METHOD must be 0 (gcc on x86: -msse2 -mfpmath=sse)"
+#endif
+#define AT_LIMIT 1.0e15f
+#define AT_SMALLEST FLT_MIN
+#define AT_LARGEST 1.0e35f
+#else
+typedef double at_real;
+#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0)
+#error "numbers must be computed in their own precision: FLT_EVAL_METHOD must be 0 (gcc on x86: -msse2 -mfpmath=sse)"
+#endif
+#define AT_LIMIT 1.0e100
+#define AT_SMALLEST DBL_MIN
+#define AT_LARGEST 1.0e290
+#endif
+
+/* A constant in the precision of the runtime. */
+#define AT_R(x) ((at_real)(x))
+
+/* What a step says; 0 is well. */
+#define AT_REFUSED 1u /* the time is not after the last one: nothing has changed */
+#define AT_FULL 2u    /* ticks came faster than the plan has room for: the oldest were forgotten, results are no longer the engine's */
+#define AT_REJECTED 4u /* a sample was infinite or out of its range, and counts as absent */
+
+/* A value that is read: which slot, how far back, and how old it may be; the history of the slot, -1 where it is read as it is now. */
+typedef struct {
+    int32_t slot;
+    int32_t history;
+    int64_t lag;
+    int64_t max_age;
+    at_real factor; /* into the unit of the reader; 1 where it is the same */
+} at_entry;
+
+/* Values that are read together; `held` ones count until they are too old, others only at their own tick. */
+typedef struct {
+    int32_t first;
+    int32_t count;
+    int32_t held;
+} at_gather;
+
+/* The past of a slot: a ring of `room` values from number `reals` on, their instants and, where `stamped`, stamps from `ints` on. */
+typedef struct {
+    int32_t slot;
+    int32_t room;
+    int32_t ints;
+    int32_t reals;
+    int32_t stamped;
+    int64_t depth;
+} at_history;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+    int32_t windows;
+    const int64_t *width;
+    const int64_t *needed_span;
+    const int64_t *needed_open;
+    const int32_t *order; /* of the windows, the shortest first */
+    const at_real *factors;
+    int64_t min_samples;
+    int32_t room;
+    int32_t blocks;
+    int32_t ints;
+    int32_t reals;
+} at_slope;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+    int32_t lags;
+    const int64_t *lag;
+    const int64_t *max_age;
+    int32_t first_history;
+} at_lag;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+    int32_t bank;
+    const at_real *rates;
+    int32_t difference;
+    int32_t ints;
+    int32_t reals;
+} at_first_order;
+
+/* How far a row of regressors lies outside of those of the fit. */
+typedef struct {
+    int32_t directions;
+    at_real edge;
+    const at_real *mean;
+    const at_real *inverse;
+    const at_real *along; /* by regressor: its part in each direction */
+} at_novelty;
+
+#define AT_PASS 0
+#define AT_SHRINK 1
+#define AT_GONE 2
+
+typedef struct {
+    int32_t trigger; /* the gather that lets it run; -1: it runs at every tick */
+    int32_t slot;
+    int32_t novelty_slot; /* -1 where nobody reads it */
+    int32_t width;
+    int32_t same; /* it repeats its only regressor */
+    const at_entry *entries;
+    at_real constant;
+    const at_real *coefficients;
+    const at_novelty *novelty; /* NULL where nobody heeds it */
+    int32_t outside;
+    at_real centre;
+} at_linear;
+
+#define AT_AUTO_WEIGHTED 0
+#define AT_MEAN 1
+#define AT_MIDDLE 2
+#define AT_BEST 3
+#define AT_FALLBACK 4
+#define AT_GUARD 5
+#define AT_STATE_GATE 6
+
+#define AT_BY_TIME 0
+#define AT_BY_COUNT 1
+
+#define AT_INVERSE_POWER 0
+#define AT_AS_PRINTED 1
+#define AT_AS_PRINTED_RAW 2
+
+typedef struct {
+    int32_t rule;
+    int32_t voters;    /* the gather of the votes */
+    int32_t state;     /* the gather of the state that it goes by; -1 */
+    int32_t novelties; /* the gather of the novelties; -1 */
+    const int32_t *which; /* the votes that these are of */
+    int32_t slot;
+    int32_t weights_slot; /* -1 where nobody reads them; the same of the others */
+    int32_t reason_slot;
+    int32_t novelty_slot;
+    int32_t truth; /* the slot of the truth; -1 */
+    int64_t ahead;
+    int64_t limit;
+    int64_t embargo;
+    int32_t runs;    /* room for so many runs and truths that wait, and for the errors of each voter */
+    int32_t waiting;
+    int32_t errors;
+    int32_t memory;
+    int64_t longest; /* how long errors count, or how many */
+    int32_t form;
+    at_real shrinkage;
+    at_real floor;
+    at_real share;
+    at_real min_truths;
+    at_real least_trust;
+    int64_t dwell;
+    int32_t ints;
+    int32_t reals;
+} at_vote;
+
+typedef struct {
+    at_real factor;
+    at_real range;
+    at_real rate;
+    at_real slew;
+    at_real deadband;
+    int32_t stops;
+    at_real below;
+    at_real above;
+} at_compensate_limits;
+
+typedef struct {
+    int32_t rate;
+    int32_t state;     /* gathers; of none the count is 0 */
+    int32_t realigned;
+    int32_t slot;
+    int32_t channels;
+    const at_compensate_limits *limits;
+    int32_t stops[3];
+    int64_t max_gap;
+    int32_t ints;
+    int32_t reals;
+} at_compensate;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+    const at_real *stable;
+    const at_real *transient;
+    const at_real *hysteresis;
+    int64_t dwell;
+    int32_t ints;
+} at_stability;
+
+typedef struct {
+    int32_t signal;
+    int32_t distrust;
+    int32_t slot;
+    int32_t channels;
+    const at_real *when_lost; /* NaN: hold */
+    const at_real *slew;
+    int64_t after;
+    int64_t max_gap;
+    int32_t ints;
+    int32_t reals;
+} at_safe_state;
+
+typedef struct {
+    int32_t position;
+    int32_t applied;
+    int32_t slot;
+    int32_t channels;
+    const at_real *factors;
+    int32_t from_start;
+    int32_t ints;
+} at_uncorrected;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+    const at_real *coefficients;
+} at_loss;
+
+typedef struct {
+    int32_t loss;
+    int32_t set_point;
+    int32_t slot;
+    at_real below;
+    at_real change;
+    int64_t hold;
+    int64_t same_change;
+    int64_t max_gap;
+    int32_t ints;
+    int32_t reals;
+} at_settled;
+
+typedef struct {
+    int32_t gather;
+    int32_t slot;
+    int32_t channels;
+} at_pick;
+
+#define AT_SLOPE 0
+#define AT_LAG 1
+#define AT_FIRST_ORDER 2
+#define AT_LINEAR 3
+#define AT_VOTE 4
+#define AT_COMPENSATE 5
+#define AT_STABILITY 6
+#define AT_SAFE_STATE 7
+#define AT_UNCORRECTED 8
+#define AT_LOSS 9
+#define AT_SETTLED 10
+#define AT_PICK 11
+#define AT_GATHER 12 /* as a step: reads whether anything in a gather is new */
+
+/* What is done at a tick, in order: a kind and the number of its parameters in the table of that kind. */
+typedef struct {
+    int32_t kind;
+    int32_t nth;
+} at_step;
+
+typedef struct {
+    int32_t sources;
+    int32_t slots;
+    int32_t steps;
+    int32_t gathers;
+    int32_t histories;
+    int32_t outputs;
+    int32_t slot_ints;    /* where the stamps and ticks of slots lie, and what gathers found */
+    int32_t gather_ints;
+    int32_t rejected_ints;
+    int32_t slot_reals;
+    int32_t scratch;      /* room for what is needed within a step alone */
+    int32_t ints;
+    int32_t reals;
+    uint64_t revision;    /* of the graph and its fit */
+    const at_real *lowest;
+    const at_real *highest;
+    const at_step *step;
+    const at_entry *entry;
+    const at_gather *gather;
+    const at_history *history;
+    int32_t recorded;     /* of the histories, how many are of slots; the others belong to lags */
+    const int32_t *output;
+    const at_slope *slope;
+    const at_lag *lag;
+    const at_first_order *first_order;
+    const at_linear *linear;
+    const at_vote *vote;
+    const at_compensate *compensate;
+    const at_stability *stability;
+    const at_safe_state *safe_state;
+    const at_uncorrected *uncorrected;
+    const at_loss *loss;
+    const at_settled *settled;
+    const at_pick *pick;
+} at_plan;
+
+/* The state of a plan. */
+typedef struct {
+    int64_t *i;
+    at_real *r;
+} at_memory;
+
+/* Begins cold. */
+void at_init(const at_plan *plan, at_memory m);
+
+/* Takes the measurements of one instant, NaN where a channel has no new value, and gives the outputs, NaN where there is none. */
+uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in[], double out[]);
+
+/* The next tick belongs to another segment: windows and lags start afresh, what votes have learned stays. */
+void at_segment(const at_plan *plan, at_memory m);
+
+/* The bytes that at_save writes: the state, independent of the order of bytes of the processor. */
+size_t at_saved_size(const at_plan *plan);
+
+/* Writes the state; 0 where there is too little room, else the number of bytes. */
+size_t at_save(const at_plan *plan, const int64_t ints[], const at_real reals[], uint8_t bytes[], size_t room);
+
+/* Goes on from a state; 0, or 1 where it is none of this plan or damaged: the state is as it was. */
+int at_load(const at_plan *plan, at_memory m, const uint8_t bytes[], size_t length);
+
+/* The bits of a number, and FNV-1a over bytes of it. */
+uint64_t at_bits(double value);
+uint64_t at_hash(uint64_t hash, uint64_t bits);
+#define AT_HASH_BEGIN UINT64_C(0xcbf29ce484222325)
+
+#endif

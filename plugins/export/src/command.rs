@@ -1,0 +1,169 @@
+//! The command: which graph is exported, how often samples come, and what it takes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use athermal_command::{Answer, Command, Failure, Format, Terminal, println};
+use athermal_core::engine::Engine;
+use athermal_core::time::Duration;
+use athermal_run::model::Model;
+use clap::{Args, ValueEnum};
+
+use crate::lower::Rates;
+use crate::{ExportError, Exported, Options, c, export_c, state};
+
+/// What a graph is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Target {
+    /// C99 with a runtime, a self test and recipes
+    C,
+}
+
+/// Write a fitted graph for a controller
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// As what
+    target: Target,
+    /// A fitted model
+    model: PathBuf,
+    /// The folder that is written
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+    /// The time between two samples, of all signals or of one: 1s, position=10s
+    #[arg(long, value_name = "[SIGNAL=]TIME", default_value = "1s")]
+    rate: Vec<String>,
+    /// The name of files and functions; that of the graph by default
+    #[arg(long)]
+    name: Option<String>,
+    /// Export what goes on learning as it was fitted
+    #[arg(long)]
+    frozen: bool,
+    /// Build in single precision, and measure its error where there is a C compiler
+    #[arg(long)]
+    float: bool,
+    /// The state of a run (`athermal run --state`) to go on from: written as DIR/NAME.state
+    #[arg(long, value_name = "FILE")]
+    state: Option<PathBuf>,
+    /// What NAME_save wrote, as a state for `athermal run --state`: written as DIR/run.state
+    #[arg(long, value_name = "FILE")]
+    state_back: Option<PathBuf>,
+}
+
+athermal_command::register_command!(Export, "export");
+
+impl Command for Export {
+    fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let Target::C = self.target;
+        let mut engine = Model::load(&self.model)?.engine()?;
+        let options = Options {
+            rates: self.rates()?,
+            frozen: self.frozen,
+            name: self.name.clone(),
+        };
+        let exported = export_c(&engine, &options, self.float).map_err(failure)?;
+        c::write(&exported.files, &self.output).map_err(failure)?;
+        self.carry(&mut engine, &exported)?;
+        self.report(terminal, &exported);
+        Ok(Answer::Fine)
+    }
+}
+
+fn failure(error: ExportError) -> Failure {
+    match error {
+        ExportError::Write { .. } => Failure::Outside(error.to_string()),
+        _ => Failure::Request(error.to_string()),
+    }
+}
+
+impl Export {
+    fn rates(&self) -> Result<Rates, Failure> {
+        let mut rates = Rates {
+            signals: BTreeMap::new(),
+            ..Rates::default()
+        };
+        for rate in &self.rate {
+            let (signal, time) = match rate.split_once('=') {
+                Some((signal, time)) => (Some(signal), time),
+                None => (None, &**rate),
+            };
+            let time: Duration = time
+                .parse()
+                .map_err(|error| Failure::Request(format!("--rate {rate}: {error}")))?;
+            match signal {
+                Some(signal) => drop(rates.signals.insert(signal.to_owned(), time)),
+                None => rates.period = time,
+            }
+        }
+        Ok(rates)
+    }
+
+    /// Writes states that go over between the engine and C.
+    fn carry(&self, engine: &mut Engine, exported: &Exported) -> Result<(), Failure> {
+        let request = |path: &Path, error: &dyn std::fmt::Display| {
+            Failure::Request(format!("{}: {error}", path.display()))
+        };
+        let read = |path: &Path| {
+            std::fs::read(path)
+                .map_err(|error| Failure::Outside(format!("{}: {error}", path.display())))
+        };
+        let write = |name: &str, bytes: &[u8]| {
+            let path = self.output.join(name);
+            std::fs::write(&path, bytes)
+                .map_err(|error| Failure::Outside(format!("{}: {error}", path.display())))
+        };
+        if let Some(path) = &self.state_back {
+            state::from_c(engine, &exported.form, &read(path)?)
+                .map_err(|error| request(path, &error))?;
+            write("run.state", &engine.snapshot())?;
+        }
+        if let Some(path) = &self.state {
+            engine
+                .restore(&read(path)?)
+                .map_err(|error| request(path, &error))?;
+            let bytes =
+                state::to_c(engine, &exported.form).map_err(|error| request(path, &error))?;
+            write(&format!("{}.state", exported.form.name), &bytes)?;
+        }
+        Ok(())
+    }
+
+    fn report(&self, terminal: &Terminal, exported: &Exported) {
+        let form = &exported.form;
+        let (double, single) = (form.layout.bytes(8), form.layout.bytes(4));
+        let operations = c::operations(form);
+        let error = self
+            .float
+            .then(|| c::single_precision_error(&self.output, form));
+        let error = error.flatten();
+        if terminal.format == Format::Json {
+            let facts = serde_json::json!({
+                "name": form.name,
+                "revision": form.revision,
+                "state_bytes": if self.float { single } else { double },
+                "operations": operations,
+                "single_precision_error": error,
+            });
+            println!("{facts:#}");
+            return;
+        }
+        println!(
+            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state, about {operations} operations a tick",
+            self.output.display(),
+            form.name,
+            form.sources.len(),
+            form.outputs.len(),
+            if self.float { single } else { double },
+        );
+        match (self.float, error) {
+            (true, Some(error)) => println!(
+                "single precision is off by {error:.1e} of the largest size of an output at most, in {} ticks",
+                crate::TICKS
+            ),
+            (true, None) => terminal.note(
+                "without a C compiler (`cc`) the error of single precision is not known: the example prints it",
+            ),
+            (false, _) => {}
+        }
+        terminal.note(format!("next: make -C {} test", self.output.display()));
+    }
+}

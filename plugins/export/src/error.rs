@@ -1,0 +1,69 @@
+//! Why something is not exported, by node, and the way that there is.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use athermal_core::engine::EngineError;
+use thiserror::Error;
+
+/// Why a graph is not exported.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// Nodes that have no counterpart on a controller.
+    #[error("{}", listed(.0))]
+    Nodes(Vec<Refusal>),
+    /// Two samples come at the same time, or so slowly that nothing is left of a window.
+    #[error(
+        "the rate of `{signal}` is {given}: give the time between two samples, above 0, such as --rate {signal}=1s"
+    )]
+    Rate {
+        /// The signal.
+        signal: String,
+        /// What was given.
+        given: String,
+    },
+    /// A rate of a signal that the graph does not have.
+    #[error("there is no signal `{signal}`: the graph has {known}")]
+    UnknownSignal {
+        /// The signal.
+        signal: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// The engine that works out the ticks of the self test.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// A node that is not exported.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The node.
+    pub node: String,
+    /// What cannot be exported.
+    pub why: String,
+    /// What to do.
+    pub way: String,
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{}`: {}; {}", self.node, self.why, self.way)
+    }
+}
+
+fn listed(refusals: &[Refusal]) -> String {
+    let lines: Vec<String> = refusals.iter().map(|of| format!("\n  {of}")).collect();
+    format!(
+        "not everything in this graph can be exported:{}",
+        lines.concat()
+    )
+}

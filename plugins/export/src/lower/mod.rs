@@ -1,0 +1,277 @@
+//! Lowers a plan and its fit to what a controller can step: which kinds there are, and how much room their past takes.
+
+mod estimators;
+mod features;
+mod rates;
+mod votes;
+
+use std::ops::Range;
+
+use athermal_core::compile::{Plan, PlannedNode, PlannedRole, Step as PlannedStep};
+use athermal_core::engine::Engine;
+use athermal_core::node::Read;
+use athermal_core::time::Duration;
+
+pub use rates::Rates;
+
+use crate::error::{ExportError, Refusal};
+use crate::form::{Bundle, Entry, Form, History, Layout, Port, Record, Step};
+use rates::Periods;
+
+/// Room beyond what regular ticks take.
+const SPARE: usize = 8;
+
+/// What is exported, and how.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The time between two samples, of which the room for the past follows.
+    pub rates: Rates,
+    /// Whether what goes on learning is exported as it was fitted.
+    pub frozen: bool,
+    /// The name of the files and functions; by default that of the graph.
+    pub name: Option<String>,
+}
+
+/// Why a node is not exported.
+type Refused = Vec<(String, String)>;
+
+/// The plan of an engine with its fit, lowered.
+///
+/// # Errors
+/// Where there is a node without a counterpart on a controller: all of them are named.
+pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
+    let plan = engine.plan();
+    let periods = Periods::new(plan, &options.rates)?;
+    let mut lowering = Lowering::new(plan, periods);
+    let mut refusals = Vec::new();
+    let mut places = Vec::with_capacity(plan.nodes.len());
+    let mut nodes = Vec::new();
+    for node in &plan.nodes {
+        places.push(nodes.len());
+        match lowering.node(engine, node, options) {
+            Ok(record) => nodes.push(record),
+            Err(refused) => refusals.extend(refused.into_iter().map(|(why, way)| Refusal {
+                node: node.instance(),
+                why,
+                way,
+            })),
+        }
+    }
+    let planned = plan.sources.iter().filter(|of| of.planned.is_some());
+    refusals.extend(planned.map(|source| Refusal {
+        node: source.name.clone(),
+        why: "a signal that is known ahead cannot be exported".to_owned(),
+        way: "leave out `known_ahead`, and read it as it is measured".to_owned(),
+    }));
+    if !refusals.is_empty() {
+        return Err(ExportError::Nodes(refusals));
+    }
+    let steps = plan.steps.iter().filter_map(|step| match *step {
+        PlannedStep::Gather(gather) => Some(Step::Gather(gather)),
+        PlannedStep::Run(node) => Some(Step::Run(places[node])),
+        PlannedStep::Capture(_) => None,
+    });
+    let port = |slot: usize, name: &str| Port {
+        name: name.to_owned(),
+        unit: plan.channels[slot].channel.unit.to_string(),
+    };
+    let title = plan.name.clone().unwrap_or_else(|| "graph".to_owned());
+    Ok(Form {
+        name: identifier(options.name.as_deref().unwrap_or(&title)),
+        title,
+        revision: engine.revision().to_owned(),
+        sources: (plan.sources.iter().enumerate())
+            .map(|(slot, source)| port(slot, &source.name))
+            .collect(),
+        ranges: plan.sources.iter().map(|source| source.range).collect(),
+        slots: (plan.channels.iter())
+            .map(|channel| channel.name.clone())
+            .collect(),
+        outputs: (plan.outputs.iter())
+            .map(|output| port(output.slot, &output.name))
+            .collect(),
+        output_slots: plan.outputs.iter().map(|output| output.slot).collect(),
+        steps: steps.collect(),
+        nodes,
+        recorded: lowering.recorded,
+        period_ns: lowering.periods.tick,
+        periods_ns: lowering.periods.slots[..plan.sources.len()].to_vec(),
+        warm_up_ns: plan.warm_up.as_ns(),
+        gathers: lowering.gathers,
+        histories: lowering.histories,
+        layout: lowering.layout,
+    })
+}
+
+/// A name as an identifier of C, lower case.
+#[must_use]
+pub fn identifier(name: &str) -> String {
+    let word = |c: char| match c.is_ascii_alphanumeric() {
+        true => c.to_ascii_lowercase(),
+        false => '_',
+    };
+    let name: String = name.chars().map(word).collect();
+    match name.chars().next() {
+        Some(first) if !first.is_ascii_digit() => name,
+        _ => format!("g_{name}"),
+    }
+}
+
+/// A plan while it is lowered.
+struct Lowering<'a> {
+    plan: &'a Plan,
+    periods: Periods,
+    gathers: Vec<Bundle>,
+    histories: Vec<History>,
+    recorded: usize,
+    layout: Layout,
+}
+
+impl<'a> Lowering<'a> {
+    fn new(plan: &'a Plan, periods: Periods) -> Self {
+        let mut lowering = Self {
+            plan,
+            periods,
+            gathers: Vec::new(),
+            histories: Vec::new(),
+            recorded: 0,
+            layout: Layout {
+                // The first eight are those of the tick.
+                ints: 8,
+                ..Layout::default()
+            },
+        };
+        let slots = plan.channels.len();
+        lowering.layout.slot_ints = lowering.ints(2 * slots);
+        lowering.layout.gather_ints = lowering.ints(plan.gathers.len());
+        lowering.layout.rejected_ints = lowering.ints(plan.sources.len());
+        lowering.layout.slot_reals = lowering.reals(slots);
+        let mut of_slot = vec![None; slots];
+        for (slot, channel) in plan.channels.iter().enumerate() {
+            if let Some(depth) = channel.history {
+                of_slot[slot] = Some(lowering.histories.len());
+                let stamped = !lowering.is_stamped_now(slot);
+                let period = lowering.periods.slots[slot];
+                lowering.history(Some(slot), depth, period, stamped);
+            }
+        }
+        lowering.recorded = lowering.histories.len();
+        for gather in &plan.gathers {
+            let mut entries: Vec<Entry> = gather
+                .entries
+                .iter()
+                .map(|entry| Entry {
+                    slot: entry.slot,
+                    history: of_slot[entry.slot].filter(|_| !entry.lag.is_zero()),
+                    lag_ns: entry.lag.as_ns(),
+                    max_age_ns: entry.max_age.as_ns(),
+                    factor: 1.0,
+                })
+                .collect();
+            for conversion in &gather.conversions {
+                entries[conversion.entry].factor = conversion.factor();
+            }
+            lowering.gathers.push(Bundle {
+                entries,
+                held: gather.read != Read::Fresh,
+            });
+        }
+        lowering
+    }
+
+    /// Where so many integers lie.
+    fn ints(&mut self, count: usize) -> usize {
+        let first = self.layout.ints;
+        self.layout.ints += count;
+        first
+    }
+
+    /// Where so many numbers lie.
+    fn reals(&mut self, count: usize) -> usize {
+        let first = self.layout.reals;
+        self.layout.reals += count;
+        first
+    }
+
+    /// Makes room for what is needed within a step.
+    fn scratch(&mut self, count: usize) {
+        self.layout.scratch = self.layout.scratch.max(count);
+    }
+
+    fn history(&mut self, slot: Option<usize>, depth: Duration, period: i64, stamped: bool) {
+        let room = samples(depth, period) + SPARE;
+        let ints = self.ints(2 + if stamped { 2 * room } else { room });
+        let reals = self.reals(room);
+        self.histories.push(History {
+            slot,
+            room,
+            ints,
+            reals,
+            stamped,
+            depth_ns: depth.as_ns(),
+        });
+    }
+
+    /// Whether a slot's values always have the stamp of their tick.
+    fn is_stamped_now(&self, slot: usize) -> bool {
+        let Some(node) = self.plan.channels[slot].node else {
+            return true;
+        };
+        let kinds = [
+            "slope",
+            "first_order",
+            "compensate",
+            "stability",
+            "safe_state",
+        ];
+        kinds.contains(&self.plan.nodes[node].kind.name)
+    }
+
+    fn node(
+        &mut self,
+        engine: &Engine,
+        node: &PlannedNode,
+        options: &Options,
+    ) -> Result<Record, Refused> {
+        let record = match &node.role {
+            PlannedRole::Feature { .. } => self.feature(node),
+            PlannedRole::Estimator { .. } => self.estimator(engine, node, options),
+            PlannedRole::Combiner { .. } => self.combiner(node),
+        }?;
+        // What is needed within a step lies behind all else.
+        Ok(record)
+    }
+}
+
+impl Form {
+    /// Puts the room that is needed within a step behind all else.
+    pub(crate) fn with_scratch(mut self) -> Self {
+        let needed = self.layout.scratch;
+        self.layout.scratch = self.layout.reals;
+        self.layout.reals += needed;
+        self
+    }
+}
+
+/// How many samples there are within a time.
+fn samples(time: Duration, period: i64) -> usize {
+    let count = (time.as_ns().max(0) + period - 1) / period.max(1);
+    usize::try_from(count).unwrap_or(usize::MAX / 64)
+}
+
+/// A refusal of one kind.
+fn refuse<T>(why: impl Into<String>, way: impl Into<String>) -> Result<T, Refused> {
+    Err(vec![(why.into(), way.into())])
+}
+
+/// Refuses an output port that somebody reads.
+fn unread(node: &PlannedNode, port: &str) -> Result<(), Refused> {
+    refuse(
+        format!("the port `{port}` of `{}` is read", node.kind.name),
+        "leave out what reads it",
+    )
+}
+
+fn first(slots: &Range<usize>) -> usize {
+    slots.start
+}

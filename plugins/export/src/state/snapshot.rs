@@ -1,0 +1,106 @@
+//! The form of an engine's snapshot, field by field: what is not read here is passed on as it is.
+
+use std::collections::BTreeMap;
+
+use athermal_core::engine::{EngineState, RestoreError, fnv_1a};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::CarryError;
+
+const MAGIC: &[u8; 16] = b"athermal state 1";
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Snapshot {
+    version: String,
+    revision: String,
+    pub(super) tick: u64,
+    pub(super) last: i64,
+    pub(super) before_break: Option<i64>,
+    pub(super) rejected: BTreeMap<String, u64>,
+    pub(super) refused: u64,
+    pub(super) slots: BTreeMap<String, Slot>,
+    pub(super) histories: BTreeMap<String, Past>,
+    pub(super) nodes: BTreeMap<String, Node>,
+    blending: BTreeMap<String, Value>,
+    frozen: bool,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Slot {
+    pub(super) value: f64,
+    pub(super) stamp: i64,
+    pub(super) written: u64,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Past {
+    depth: String,
+    pub(super) entries: Vec<PastEntry>,
+    dropped: u64,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct PastEntry {
+    pub(super) at: i64,
+    pub(super) value: f64,
+    pub(super) stamp: i64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Node {
+    pub(super) own: Option<Vec<u8>>,
+    pub(super) learning: Option<Embargo>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recent: Option<Value>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Embargo {
+    pub(super) pairing: Pairing,
+    pub(super) withheld: Vec<Withheld>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Pairing {
+    ahead: String,
+    limit: String,
+    pub(super) runs: Runs,
+    pub(super) past: usize,
+    pub(super) number: u64,
+    pub(super) needed: u64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Runs {
+    width: usize,
+    pub(super) times: Vec<i64>,
+    pub(super) numbers: Vec<f64>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Withheld {
+    pub(super) arrived: i64,
+    pub(super) truth: f64,
+    pub(super) note: f64,
+    pub(super) run: u64,
+}
+
+impl Snapshot {
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, CarryError> {
+        // The engine looks at the name and the checksum.
+        EngineState::from_bytes(bytes)?;
+        let payload = bytes.get(MAGIC.len() + 8..);
+        let payload = payload.ok_or(RestoreError::NotASnapshot)?;
+        rmp_serde::from_slice(payload).map_err(|error| CarryError::of("the engine", error))
+    }
+
+    pub(super) fn write(&self, of: &str) -> Result<Vec<u8>, CarryError> {
+        let payload = rmp_serde::to_vec_named(self);
+        let payload = payload.map_err(|error| CarryError::of(of, error))?;
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend_from_slice(&fnv_1a(&payload).to_le_bytes());
+        bytes.extend_from_slice(&payload);
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,10 @@
+//! What is exported computes what the engine computes, to the bit.
+
+// Shared functions of tests are none of `cfg(test)`.
+#![allow(clippy::unwrap_used)]
+
+mod processors;
+mod random;
+mod refusals;
+mod shipped;
+mod support;

@@ -1,0 +1,109 @@
+//! The same bits on other processors: Cortex-M3, M4 and M7 on emulated boards, and AArch64. Prints sizes and instructions.
+
+use std::path::Path;
+use std::process::Command;
+
+use athermal_export::Rates;
+
+use crate::shipped::{second, shipped};
+use crate::support::{Exhibit, Scratch, has, project, ran};
+
+/// What a program says of the self test: its number and the hash over all outputs.
+fn self_test(said: &str) -> (i32, &str) {
+    let number = said
+        .split("self test ")
+        .nth(1)
+        .and_then(|rest| rest.split(',').next());
+    let hash = said
+        .split("hash ")
+        .nth(1)
+        .and_then(|rest| rest.split(',').next());
+    (number.unwrap().parse().unwrap(), hash.unwrap())
+}
+
+fn on_cortex(exhibit: &Exhibit, cpu: &str, variables: &[&str]) -> Command {
+    let mut make = Command::new("make");
+    make.arg("-s")
+        .arg("-C")
+        .arg(project().join("examples/cortex-m"))
+        .arg("run");
+    make.arg(format!("EXPORT={}", exhibit.folder.display()));
+    make.arg(format!("NAME={}", exhibit.form.name))
+        .arg(format!("CPU={cpu}"));
+    make.args(variables);
+    make
+}
+
+#[test]
+fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
+    let needed = ["gcc", "make", "arm-none-eabi-gcc", "qemu-system-arm"];
+    if !needed.iter().all(|program| has(program)) {
+        return;
+    }
+    let scratch = Scratch::new("cortex");
+    for name in [
+        "die-tester.toml",
+        "die-tester-compensate.toml",
+        "die-tester-control.toml",
+    ] {
+        let (_, exported) = shipped(name, Rates::every(second(10.0)));
+        let exhibit = Exhibit::new(&exported, &scratch.path(name));
+        let host = ran(&mut Command::new(exhibit.built(
+            "gcc",
+            &["-O2"],
+            "example/main.c",
+        )));
+        for cpu in ["m3", "m4", "m7"] {
+            let said = ran(&mut on_cortex(&exhibit, cpu, &[]));
+            println!("{name}, cortex-{cpu}\n{said}");
+            assert_eq!(self_test(&said), self_test(&host), "{name}, {cpu}");
+            // The runtime comes first of the two.
+            let code = said
+                .lines()
+                .nth(1)
+                .and_then(|line| line.split_whitespace().next());
+            let code: usize = code.unwrap().parse().unwrap();
+            assert!(code <= 32_768, "{code} bytes of runtime");
+        }
+        let out = format!("OUT={}", exhibit.folder.join("fused").display());
+        let fused = on_cortex(&exhibit, "m7", &["CONTRACT=fast", &out])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&fused.stdout).into_owned();
+        assert!(!fused.status.success() && self_test(&said).0 > 0, "{said}");
+    }
+}
+
+#[test]
+fn aarch64_gives_the_hash_of_the_host_and_fused_products_are_seen() {
+    if !["gcc", "aarch64-linux-gnu-gcc", "qemu-aarch64"]
+        .iter()
+        .all(|program| has(program))
+    {
+        return;
+    }
+    let scratch = Scratch::new("aarch64");
+    let (_, exported) = shipped("die-tester-compensate.toml", Rates::every(second(10.0)));
+    let exhibit = Exhibit::new(&exported, &scratch.path("exported"));
+    let host = ran(&mut Command::new(exhibit.built(
+        "gcc",
+        &["-O2"],
+        "example/main.c",
+    )));
+    let emulated = |program: &Path| {
+        let output = Command::new("qemu-aarch64").arg(program).output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    for level in ["-O0", "-O3"] {
+        let program = exhibit.built(
+            "aarch64-linux-gnu-gcc",
+            &[level, "-static"],
+            "example/main.c",
+        );
+        let said = emulated(&program);
+        assert_eq!(self_test(&said), self_test(&host), "{level}");
+    }
+    let flags = ["-O2", "-static", "-ffp-contract=fast"];
+    let said = emulated(&exhibit.built("aarch64-linux-gnu-gcc", &flags, "example/main.c"));
+    assert!(self_test(&said).0 > 0, "{said}");
+}

@@ -1,0 +1,552 @@
+//! Random graphs of all kinds that are exported, stepped over irregular times with gaps, absent samples, spikes and segments: the same
+//! bits as the engine with every compiler and level of optimisation. `ATHERMAL_LONG=1` steps 100,000 ticks of a hundred graphs,
+//! `ATHERMAL_SEED=7` one graph.
+
+use std::fmt::Write as _;
+
+use athermal_core::engine::Engine;
+use athermal_core::prng::Prng;
+use athermal_core::time::Duration;
+use athermal_export::{Options, Rates, export_c, state};
+
+use crate::support::{
+    Event, Exhibit, LEVELS, Scratch, compilers, difference, has, made_up, plan, ran, stepped,
+};
+
+fn one_of<'a>(random: &mut Prng, words: &[&'a str]) -> &'a str {
+    words[(random.between(0.0, words.len() as f64) as usize).min(words.len() - 1)]
+}
+
+fn chance(random: &mut Prng, share: f64) -> bool {
+    random.between(0.0, 1.0) < share
+}
+
+/// A list of different durations in seconds.
+fn durations(random: &mut Prng, most: usize, from: f64, to: f64) -> String {
+    let count = 1 + random.between(0.0, most as f64) as usize;
+    let mut list: Vec<u64> = (0..count)
+        .map(|_| random.between(from, to) as u64)
+        .collect();
+    list.sort_unstable();
+    list.dedup();
+    if chance(random, 0.5) {
+        list.reverse();
+    }
+    let list: Vec<String> = list.iter().map(|s| format!("\"{s}s\"")).collect();
+    format!("[{}]", list.join(", "))
+}
+
+/// A graph of everything, with parameters at random.
+pub fn graph(random: &mut Prng) -> String {
+    let channels = 1 + random.between(0.0, 10.0) as usize;
+    let channels: Vec<String> = (0..channels).map(|nth| format!("\"t{nth}\"")).collect();
+    let span = 20 + random.between(0.0, 40.0) as u64;
+    let ahead = [0, span / 2, span, span + 7][random.between(0.0, 4.0) as usize % 4];
+    let legal = span.saturating_sub(ahead);
+    let lag = |random: &mut Prng| legal + random.between(0.0, 60.0) as u64;
+    let lags = [lag(random), lag(random) + 61, lag(random) + 122];
+    let cold = one_of(random, &["absent", "partial"]);
+    let outside = one_of(random, &["shrink", "absent", "pass"]);
+    let mut text = format!(
+        r#"schema = 1
+name = "random graph"
+[sets]
+axis = ["X", "Z"]
+[time]
+column = "t"
+[signals.temperature]
+unit = "Cel"
+channels = [{}]
+range = ["-50 Cel", "150 Cel"]
+max_age = "{}s"
+[signals.position]
+unit = "nm"
+channels = "axis"
+max_age = "{}s"
+[signals.applied]
+unit = "um"
+channels = "axis"
+max_age = "20s"
+[signals.mark]
+unit = "1"
+channels = ["m"]
+max_age = "5s"
+[nodes.own]
+type = "uncorrected"
+inputs = {{ position = "position", applied = "applied" }}
+until_first = "{}"
+[nodes.drift]
+type = "slope"
+inputs.signal = "own"
+windows = ["{span}s"]
+unit = "nm/min"
+min_samples = {}
+min_coverage = {}
+[nodes.gradients]
+type = "slope"
+inputs.signal = "temperature"
+windows = {}
+unit = "mK/min"
+min_samples = {}
+min_coverage = {}
+cold = "{cold}"
+[nodes.before]
+type = "lag"
+inputs.signal = "temperature"
+lags = {}
+[nodes.masses]
+type = "first_order"
+inputs.signal = "temperature"
+time_constants = {}
+output = "{}"
+[nodes.chosen]
+type = "pick"
+inputs.signal = "gradients.t0*"
+"#,
+        channels.join(", "),
+        2 + random.between(0.0, 30.0) as u64,
+        2 + random.between(0.0, 30.0) as u64,
+        one_of(random, &["absent", "zero"]),
+        2 + random.between(0.0, 4.0) as u64,
+        one_of(random, &["0.0", "0.3", "0.5", "0.8"]),
+        durations(random, 7, 4.0, 150.0),
+        2 + random.between(0.0, 4.0) as u64,
+        one_of(random, &["0.0", "0.3", "0.5", "0.8"]),
+        durations(random, 3, 0.0, 60.0),
+        durations(random, 4, 1.0, 300.0),
+        one_of(random, &["difference", "value"]),
+    );
+    let _ = write!(
+        text,
+        r#"
+[nodes.thermal]
+type = "linear"
+each = "axis"
+inputs.features = "gradients"
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+outside = "{outside}"
+[nodes.masses_too]
+type = "linear"
+each = "axis"
+inputs.features = {{ from = ["masses", "chosen", "before"], max_age = "15s" }}
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+[nodes.motion]
+type = "ar"
+each = "axis"
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+lags = ["{}s", "{}s"]
+outside = "{outside}"
+[nodes.both]
+type = "arx"
+each = "axis"
+inputs.features = "gradients"
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+lags = ["{}s", "{}s", "{}s"]
+feature_lags = ["0s", "13s"]
+[nodes.nothing]
+type = "zero"
+each = "axis"
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+[nodes.lasting]
+type = "persistence"
+each = "axis"
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+"#,
+        lags[0], lags[1], lags[0], lags[1], lags[2],
+    );
+    // What is made of drift may not choose who predicts it while windows overlap.
+    let state = if legal > 0 { "mark" } else { "state.{axis}" };
+    votes(random, state, &mut text);
+    control(random, &mut text);
+    text
+}
+
+fn votes(random: &mut Prng, state: &str, text: &mut String) {
+    let voters = r#"["thermal.{axis}", "motion.{axis}", "both.{axis}", "masses_too.{axis}"]"#;
+    let memory = |random: &mut Prng| {
+        let truths = 1 + random.between(0.0, 30.0) as u64;
+        if chance(random, 0.3) {
+            return format!("{{ truths = {truths} }}");
+        }
+        format!("\"{}s\"", 5 + random.between(0.0, 200.0) as u64)
+    };
+    let (weighted, best) = (memory(random), memory(random));
+    let guard = 30 + random.between(0.0, 100.0) as u64;
+    let weights = one_of(random, &["inverse_power", "as_printed", "as_printed_raw"]);
+    let kept_apart = if weights == "as_printed_raw" || chance(random, 0.4) {
+        String::new()
+    } else {
+        format!(
+            "shrinkage = {}\nfloor = {}\n",
+            one_of(random, &["0.0", "0.2", "1.0"]),
+            one_of(random, &["0.0", "0.1", "0.4"])
+        )
+    };
+    let _ = write!(
+        text,
+        r#"
+[nodes.vote]
+type = "auto_weighted"
+each = "axis"
+inputs.voters = {voters}
+inputs.truth = "drift.{{axis}}"
+memory = {weighted}
+weights = "{weights}"
+{kept_apart}
+[nodes.mean]
+type = "mean"
+each = "axis"
+inputs.voters = {voters}
+[nodes.median]
+type = "median"
+each = "axis"
+inputs.voters = {voters}
+[nodes.trimmed]
+type = "trimmed"
+each = "axis"
+inputs.voters = {voters}
+share = {}
+[nodes.best]
+type = "best"
+each = "axis"
+inputs.voters = {voters}
+inputs.truth = "drift.{{axis}}"
+memory = {best}
+[nodes.fallback]
+type = "fallback"
+each = "axis"
+inputs.voters = {{ from = {voters}, max_age = "8s" }}
+[nodes.guard]
+type = "guard"
+each = "axis"
+inputs.voters = ["vote.{{axis}}", "motion.{{axis}}"]
+inputs.truth = "drift.{{axis}}"
+memory = "{guard}s"
+min_truths = {}
+most_novel = {}
+[nodes.gate]
+type = "state_gate"
+each = "axis"
+inputs = {{ voters = ["thermal.{{axis}}", "both.{{axis}}", "motion.{{axis}}"], state = "{state}" }}
+dwell = "{}s"
+"#,
+        one_of(random, &["0.0", "0.2", "0.3", "0.49"]),
+        1 + random.between(0.0, 6.0) as u64,
+        one_of(random, &["1.0", "1.5", "3.0"]),
+        random.between(0.0, 20.0) as u64,
+    );
+}
+
+fn control(random: &mut Prng, text: &mut String) {
+    let stop = one_of(
+        random,
+        &["", "stop = { below = \"3 nm/min\", above = \"20 nm/min\" }"],
+    );
+    let when_lost = one_of(
+        random,
+        &[
+            "when_lost = \"hold\"",
+            "when_lost = \"zero\"",
+            "when_lost = \"value\"\nvalue = \"0.5 um\"",
+        ],
+    );
+    let distrust = one_of(random, &["", "inputs.distrust = \"mark\""]);
+    let _ = write!(
+        text,
+        r#"
+[nodes.state]
+type = "stability"
+inputs.drift = "drift"
+stable_below = "60 nm/min"
+transient_above = "400 nm/min"
+hysteresis = "{} nm/min"
+dwell = "{}s"
+[nodes.compensate]
+type = "compensate"
+inputs = {{ rate = "vote", state = "state", realigned = "mark" }}
+range = "{} um"
+max_rate = "{} nm/min"
+max_slew = "60 nm/s"
+deadband = "{} nm/min"
+{stop}
+stop_in = [{}]
+max_gap = "{}s"
+[nodes.safe]
+type = "safe_state"
+inputs.signal = {{ from = "compensate", max_age = "3s" }}
+{distrust}
+{when_lost}
+after = {}
+max_slew = "20 nm/s"
+[nodes.loss]
+type = "optical_loss"
+inputs.drift = "drift"
+preset = "mandelli"
+[nodes.settled]
+type = "settled"
+inputs = {{ loss = "loss", set_point = "temperature.t0" }}
+below = "0.5 dB"
+change = "1 K"
+for = "40s"
+same_change = "30s"
+[outputs]
+own = "own"
+drift = "drift"
+gradients = "gradients"
+before = "before"
+masses = "masses"
+chosen = "chosen"
+thermal = "thermal"
+novelty = "thermal:novelty"
+masses_too = "masses_too"
+motion = "motion"
+both = "both"
+nothing = "nothing"
+lasting = "lasting"
+vote = "vote"
+weights = "vote:weights"
+of_vote = "vote:novelty"
+mean = "mean"
+median = "median"
+middle = "median:weights"
+trimmed = "trimmed"
+best = "best"
+chosen_best = "best:weights"
+fallback = "fallback"
+guard = "guard"
+guarded = "guard:reason"
+gate = "gate"
+gated = "gate:reason"
+state = "state"
+worst = "state:worst"
+correction = "compensate"
+why = "compensate:why"
+safe = "safe"
+why_safe = "safe:why"
+loss = "loss"
+share = "loss:share"
+settled = "settled"
+since = "settled:since"
+"#,
+        one_of(random, &["0", "5", "40"]),
+        random.between(0.0, 20.0) as u64,
+        one_of(random, &["1", "20", "0.2"]),
+        one_of(random, &["300", "3000"]),
+        one_of(random, &["0", "10"]),
+        one_of(random, &["", "\"stable\"", "\"stable\", \"quasi_stable\""]),
+        one_of(random, &["2", "20", "60"]),
+        random.between(0.0, 5.0) as u64,
+    );
+}
+
+/// What happens to it: times that jitter, gaps, absent samples and channels, spikes, samples that stay, and segments.
+pub fn events(random: &mut Prng, sources: &[String], ticks: usize) -> Vec<Event> {
+    let mut events = Vec::with_capacity(ticks);
+    let mut now: i64 = 1_700_000_000_000_000_000;
+    let mut level: Vec<f64> = sources.iter().map(|_| 20.0 + random.normal()).collect();
+    let mut speed = vec![0.0; sources.len()];
+    let mut silent_until = vec![0; sources.len()];
+    let mut calm = 0;
+    for tick in 0..ticks {
+        let regular = tick / 500 % 2 == 0;
+        let step = if regular {
+            1.0
+        } else {
+            random.between(0.25, 2.5)
+        };
+        now += (step * 1e9) as i64;
+        if chance(random, 0.003) {
+            now += (random.between(1.0, 400.0) * 1e9) as i64;
+        }
+        if chance(random, 0.0008) {
+            events.push(Event::Break);
+            // Another log may begin earlier.
+            now -= (random.between(-100.0, 5000.0) * 1e9) as i64;
+        }
+        if chance(random, 0.002) {
+            calm = tick + 80;
+        }
+        let mut row = Vec::with_capacity(sources.len());
+        for (nth, name) in sources.iter().enumerate() {
+            let temperature = name.starts_with("temperature");
+            if tick >= calm {
+                speed[nth] = 0.98 * speed[nth] + 0.02 * random.normal();
+                let scale = if temperature { 0.2 } else { 15.0 };
+                level[nth] += scale * speed[nth] + 0.02 * scale * random.normal();
+                if temperature {
+                    level[nth] = level[nth].clamp(-60.0, 160.0);
+                }
+            }
+            if chance(random, 0.0005) {
+                silent_until[nth] = tick + random.between(1.0, 120.0) as usize;
+            }
+            let often = match name.split('.').next() {
+                Some("position") => 0.7,
+                Some("applied") => 0.3,
+                Some("mark") => 0.1,
+                _ if regular => 1.0,
+                _ => 0.93,
+            };
+            let value = if tick < silent_until[nth] || !chance(random, often) {
+                f64::NAN
+            } else if name.starts_with("mark") {
+                f64::from(u8::from(chance(random, 0.1)))
+            } else if name.starts_with("applied") {
+                1e-3 * level[nth]
+            } else if chance(random, 0.0005) {
+                [f64::INFINITY, 1e9, -1e120, 0.0, -0.0][random.between(0.0, 5.0) as usize % 5]
+            } else {
+                level[nth]
+            };
+            row.push(value);
+        }
+        events.push(Event::Tick(now, row));
+    }
+    events
+}
+
+fn options() -> Options {
+    Options {
+        rates: Rates::every(Duration::from_ns(240_000_000)),
+        ..Options::default()
+    }
+}
+
+fn cases() -> (std::ops::Range<u64>, usize) {
+    let seed = std::env::var("ATHERMAL_SEED").ok();
+    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
+    let ticks = if is_long { 100_000 } else { 3_000 };
+    match seed.and_then(|seed| seed.parse().ok()) {
+        Some(seed) => (seed..seed + 1, ticks),
+        None => (0..if is_long { 100 } else { 6 }, ticks),
+    }
+}
+
+#[test]
+fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_optimisation() {
+    let compilers = compilers();
+    if compilers.is_empty() {
+        return;
+    }
+    let (seeds, ticks) = cases();
+    let scratch = Scratch::new("random");
+    let mut values = 0;
+    for seed in seeds {
+        let mut random = Prng::stream(seed, "an exported graph");
+        let text = graph(&mut random);
+        let plan = plan(&text);
+        let fitted = made_up(&plan, &mut random);
+        let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+        let exported = export_c(&engine, &options(), false).unwrap();
+        let exhibit = Exhibit::new(&exported, &scratch.path(&seed.to_string()));
+        let names: Vec<String> = plan.sources.iter().map(|of| of.name.clone()).collect();
+        let events = events(&mut random, &names, ticks);
+        let expected = stepped(&mut engine, &events);
+        let there = expected.iter().flatten();
+        values += there
+            .filter(|&&bits| !f64::from_bits(bits).is_nan())
+            .count();
+        for (nth, compiler) in compilers.iter().enumerate() {
+            // Each seed takes two of the levels with each compiler, the two together all of them.
+            for level in [
+                LEVELS[(seed as usize + 2 * nth) % 4],
+                LEVELS[(seed as usize + 2 * nth + 1) % 4],
+            ] {
+                let program = exhibit.built(compiler, &[level], "driver.c");
+                let (found, said) = exhibit.stepped(&program, &events);
+                let differs = difference(&exhibit.form, &expected, &found);
+                assert_eq!(differs, None, "seed {seed}, {compiler} {level}\n{text}");
+                assert_eq!(said & 3, 0, "seed {seed}: refused or full");
+                assert_eq!(
+                    handed_over(&exhibit, &program, &plan, &fitted, &events),
+                    None,
+                    "seed {seed}"
+                );
+            }
+        }
+    }
+    assert!(values > 100_000, "{values}");
+}
+
+/// An engine goes on in C from the middle, and C goes on in an engine: the first difference from the engine that went all the way.
+fn handed_over(
+    exhibit: &Exhibit,
+    program: &std::path::Path,
+    plan: &std::sync::Arc<athermal_core::compile::Plan>,
+    fitted: &athermal_core::engine::Fitted,
+    events: &[Event],
+) -> Option<String> {
+    let (before, after) = events.split_at(events.len() / 2 + 7);
+    let mut engine = Engine::new(plan.clone(), fitted).unwrap();
+    stepped(&mut engine, before);
+    let saved = state::to_c(&engine, &exhibit.form).unwrap();
+    let (begin, end) = (exhibit.folder.join("begin"), exhibit.folder.join("end"));
+    std::fs::write(&begin, &saved).unwrap();
+    let expected = stepped(&mut engine, after);
+    let (found, _) = exhibit.stepped_from(program, after, Some(&begin), None);
+    let differs = difference(&exhibit.form, &expected, &found);
+    if differs.is_some() {
+        return differs.map(|differs| format!("from the engine to C: {differs}"));
+    }
+    exhibit.stepped_from(program, before, None, Some(&end));
+    let mut engine = Engine::new(plan.clone(), fitted).unwrap();
+    let mut saved = std::fs::read(&end).unwrap();
+    saved[64] ^= 1;
+    assert!(state::from_c(&mut engine, &exhibit.form, &saved).is_err());
+    saved[64] ^= 1;
+    state::from_c(&mut engine, &exhibit.form, &saved).unwrap();
+    let found = stepped(&mut engine, after);
+    difference(&exhibit.form, &expected, &found)
+        .map(|differs| format!("from C to the engine: {differs}"))
+}
+
+#[test]
+fn no_byte_is_touched_that_is_not_of_the_state_as_valgrind_and_sanitizers_see_it() {
+    if !["gcc", "valgrind"].iter().all(|program| has(program)) {
+        return;
+    }
+    let scratch = Scratch::new("memory");
+    let mut random = Prng::stream(77, "an exported graph");
+    let plan = plan(&graph(&mut random));
+    let fitted = made_up(&plan, &mut random);
+    let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+    let names: Vec<String> = plan.sources.iter().map(|of| of.name.clone()).collect();
+    let events = events(&mut random, &names, 2_500);
+    let expected = stepped(&mut engine, &events);
+    // With room for all ticks, and with room for one in ten: rings that are full.
+    for (name, period) in [("roomy", 240_000_000), ("tight", 2_400_000_000)] {
+        let options = Options {
+            rates: Rates::every(Duration::from_ns(period)),
+            ..Options::default()
+        };
+        let exported = export_c(&engine, &options, false).unwrap();
+        let exhibit = Exhibit::new(&exported, &scratch.path(name));
+        let sanitized = [
+            "-O1",
+            "-g",
+            "-fsanitize=address,undefined",
+            "-fno-sanitize-recover=all",
+        ];
+        let (found, said) = exhibit.stepped(&exhibit.built("gcc", &sanitized, "driver.c"), &events);
+        assert_eq!(said & 2 > 0, name == "tight", "{name}: full");
+        if name == "roomy" {
+            assert_eq!(difference(&exhibit.form, &expected, &found), None);
+        }
+        let program = exhibit.built("gcc", &["-O1", "-g"], "driver.c");
+        let words = [
+            exhibit.folder.join("events"),
+            exhibit.folder.join("valgrind.out"),
+        ];
+        let mut valgrind = std::process::Command::new("valgrind");
+        ran(valgrind
+            .args(["-q", "--error-exitcode=9"])
+            .arg(program)
+            .args(words));
+    }
+}

@@ -1,0 +1,128 @@
+//! What cannot be exported is named by node, with a way.
+
+use athermal_core::engine::Engine;
+use athermal_core::prng::Prng;
+use athermal_core::time::Duration;
+use athermal_export::{ExportError, Options, Rates, lower};
+
+use crate::support::{made_up, plan};
+
+const GRAPH: &str = r#"schema = 1
+name = "7 of all"
+[time]
+column = "t"
+[signals.temperature]
+unit = "Cel"
+channels = ["a"]
+max_age = "20s"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+max_age = "20s"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["60s"]
+unit = "nm/min"
+[nodes.smooth]
+type = "moving"
+inputs.signal = "temperature"
+windows = ["60s"]
+[nodes.warm]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["60s"]
+[nodes.thermal]
+type = "linear"
+inputs.features = "warm"
+inputs.truth = "drift"
+ahead = "60s"
+[nodes.nothing]
+type = "zero"
+inputs.truth = "drift"
+ahead = "60s"
+[nodes.hedge]
+type = "hedge"
+inputs.voters = ["thermal", "nothing"]
+inputs.truth = "drift"
+[nodes.vote]
+type = "auto_weighted"
+inputs.voters = ["thermal", "nothing"]
+inputs.truth = "drift"
+memory = { half_life = "5min" }
+[nodes.learner]
+type = "rls"
+inputs.features = "warm"
+inputs.truth = "drift"
+ahead = "60s"
+[outputs]
+smooth = "smooth"
+error = "warm:stderr"
+thermal = "thermal"
+hedge = "hedge"
+vote = "vote"
+learner = "learner"
+"#;
+
+#[test]
+fn all_nodes_that_cannot_be_exported_are_named_each_with_a_way() {
+    let engine = Engine::new(plan(GRAPH), &Default::default()).unwrap();
+    let error = lower(&engine, &Options::default()).unwrap_err();
+    let ExportError::Nodes(refusals) = &error else {
+        panic!("{error}");
+    };
+    let nodes: Vec<&str> = refusals.iter().map(|of| &*of.node).collect();
+    assert_eq!(
+        nodes,
+        ["smooth", "warm", "thermal", "hedge", "vote", "learner"]
+    );
+    let text = error.to_string();
+    for part in [
+        "`smooth`: the kind `moving` of athermal-features cannot be exported; leave it out",
+        "`warm`: the port `stderr` of `slope` is read; leave out what reads it",
+        "`thermal`: it has not been fitted; fit the graph first",
+        "`hedge`: the kind `hedge` of athermal-combiners cannot be exported; use `auto_weighted`",
+        "`vote`: a memory with a `half_life` cannot be exported; use a time",
+        "`learner`: it goes on learning while it runs; `--frozen` exports it as it was fitted",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+}
+
+#[test]
+fn a_rate_of_no_signal_and_one_of_nothing_are_refused() {
+    let plan = plan(&crate::random::graph(&mut Prng::stream(1, "a graph")));
+    let fitted = made_up(&plan, &mut Prng::stream(1, "fits"));
+    let engine = Engine::new(plan, &fitted).unwrap();
+    let with = |rates| {
+        let options = Options {
+            rates,
+            ..Options::default()
+        };
+        lower(&engine, &options)
+            .map(|form| form.layout.ints)
+            .map_err(|error| error.to_string())
+    };
+    let second = Duration::from_ns(1_000_000_000);
+    let error = with(Rates::every(second).with("postion", second)).unwrap_err();
+    assert!(
+        error.contains("no signal `postion`") && error.contains("position"),
+        "{error}"
+    );
+    let error = with(Rates::every(Duration::ZERO)).unwrap_err();
+    assert!(error.contains("above 0"), "{error}");
+    let slow = with(Rates::every(second)).unwrap();
+    let fast = with(Rates::every(Duration::from_ns(100_000_000))).unwrap();
+    assert!(fast > 5 * slow, "{fast} {slow}");
+}
+
+#[test]
+fn names_become_identifiers() {
+    for (name, expected) in [
+        ("die-tester", "die_tester"),
+        ("7 of all", "g_7_of_all"),
+        ("", "g_"),
+    ] {
+        assert_eq!(athermal_export::identifier(name), expected);
+    }
+}

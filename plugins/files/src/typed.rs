@@ -1,0 +1,299 @@
+//! Files that are no text: their kinds, which other crates bring, and their rows as cells. Not how such a file is read.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::cells::Cells;
+use crate::columns::{self, Columns};
+use crate::ledger::Ledger;
+use crate::{CellFault, FileError, Layout, Place};
+
+/// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
+#[derive(Debug)]
+pub struct FileKind {
+    /// What it is called.
+    pub name: &'static str,
+    /// How names of such files end, in small letters and without the dot.
+    pub endings: &'static [&'static str],
+    /// The first bytes of such a file.
+    pub mark: &'static [u8],
+    /// Opens a file that is there; the error says why it is none.
+    pub open: fn(&Path) -> Result<Box<dyn TypedFile>, String>,
+    /// Begins to write rows with a column of this name for the time, and these; nothing where the kind is only read.
+    #[allow(clippy::type_complexity)] // it is this once
+    pub create: Option<fn(File, &str, &[String]) -> Box<dyn TypedSink>>,
+}
+
+inventory::collect!(FileKind);
+
+/// Makes a kind of file known: a [`FileKind`](crate::FileKind).
+#[macro_export]
+macro_rules! register_file_kind {
+    ($kind:expr) => {
+        $crate::__private::inventory::submit! { $kind }
+    };
+}
+
+/// A file whose columns are known, and no row yet.
+pub trait TypedFile: Send {
+    /// The names of all columns.
+    fn names(&self) -> Vec<String>;
+    /// The rows from the first on, of some columns.
+    ///
+    /// # Errors
+    /// Why a column cannot be what is wanted of it.
+    fn select(self: Box<Self>, wanted: Selection) -> Result<Box<dyn TypedRows>, String>;
+}
+
+/// Which columns are read, by their places among the names, and as what.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// The columns of the time.
+    pub time: Vec<usize>,
+    /// The columns of numbers; none where a column is not there.
+    pub values: Vec<Option<usize>>,
+    /// The columns of texts; the same.
+    pub texts: Vec<Option<usize>>,
+}
+
+/// What a cell of the time is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TypedTime<'a> {
+    /// An instant in ns since 1970, by UTC or by a clock of which is not said where it stands.
+    At {
+        /// The instant in ns.
+        ns: i64,
+        /// Whether it is one of UTC.
+        is_utc: bool,
+        /// The same as RFC 3339 has it, without the `Z` where it is not known to be one of UTC.
+        text: &'a str,
+    },
+    /// A number or a text, written out; empty where there is none.
+    Text(&'a [u8]),
+}
+
+/// The rows of a file, one after the other.
+pub trait TypedRows: Send {
+    /// Goes to the next row; false at the end.
+    ///
+    /// # Errors
+    /// Why there is no more to be read.
+    fn advance(&mut self) -> Result<bool, String>;
+    /// A cell of the time, by its place in the [`Selection`].
+    fn time(&self, index: usize) -> TypedTime<'_>;
+    /// The numbers of the row, `NaN` where there is none.
+    fn values(&self) -> &[f64];
+    /// The numbers that are texts which are none, by their places among the values.
+    fn no_numbers(&self) -> &[(usize, String)];
+    /// A cell as a text, by its place in the [`Selection`]; empty where there is none.
+    fn text(&self, index: usize) -> &[u8];
+}
+
+/// Takes rows to a file.
+pub trait TypedSink: Send {
+    /// Writes a row: its instant in ns, its numbers, and where the last column is one of texts that.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn write(&mut self, time_ns: i64, values: &[f64], label: Option<&str>) -> io::Result<()>;
+    /// Ends the file. Nothing is written behind that; doing it twice does nothing.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn finish(&mut self) -> io::Result<()>;
+}
+
+/// The kind that the ending of a name says.
+pub(crate) fn kind_by_name(path: &Path) -> Option<&'static FileKind> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    let mut kinds = inventory::iter::<FileKind>.into_iter();
+    kinds.find(|kind| kind.endings.contains(&ending.as_str()))
+}
+
+/// The kind of a file that is there, by its name, else by its first bytes.
+pub(crate) fn kind_of(path: &Path) -> Option<&'static FileKind> {
+    if path == Path::new("-") || crate::Format::of_text(path).is_some() {
+        return None;
+    }
+    kind_by_name(path).or_else(|| {
+        let mut kinds = inventory::iter::<FileKind>.into_iter().peekable();
+        kinds.peek()?;
+        if !path.is_file() {
+            return None;
+        }
+        let mut first = Vec::new();
+        File::open(path)
+            .ok()?
+            .take(16)
+            .read_to_end(&mut first)
+            .ok()?;
+        kinds.find(|kind| first.starts_with(kind.mark))
+    })
+}
+
+/// Opens a file of a kind.
+pub(crate) fn open(kind: &FileKind, path: &Path) -> Result<Box<dyn TypedFile>, FileError> {
+    // What cannot be opened at all says so as every file does.
+    File::open(path).map_err(|source| FileError::cannot_open(path, source))?;
+    (kind.open)(path).map_err(|reason| failed(path.display().to_string().into(), 0, reason))
+}
+
+fn failed(file: Arc<str>, line: u64, reason: String) -> FileError {
+    FileError::Read {
+        place: Place { file, line },
+        source: Arc::new(io::Error::other(reason)),
+    }
+}
+
+/// The rows of a file that is no text, as cells.
+pub(crate) struct TypedCells {
+    file: Arc<str>,
+    names: Vec<String>,
+    columns: Columns,
+    /// The names of the columns of numbers.
+    channels: Vec<String>,
+    rows: Box<dyn TypedRows>,
+    row: u64,
+    /// Whether there are numbers, and not texts alone.
+    has_numbers: bool,
+}
+
+impl TypedCells {
+    /// Looks the columns of a layout up; those behind the first `numbers` channels are texts.
+    pub fn new(
+        path: &Path,
+        file: Box<dyn TypedFile>,
+        layout: &Layout,
+        numbers: usize,
+    ) -> Result<Self, FileError> {
+        let name: Arc<str> = path.display().to_string().into();
+        let place = Place {
+            file: name.clone(),
+            line: 0,
+        };
+        let names = columns::numbered(file.names());
+        let columns = Columns::of(layout, &names);
+        let lacking = columns.lacking(layout);
+        if !lacking.is_empty() {
+            let ambiguous = columns::ambiguous(place.clone(), &lacking, &names);
+            return Err(ambiguous.unwrap_or_else(|| columns::missing(place, lacking, &names, "")));
+        }
+        let planned = layout.channels.iter().zip(&columns.channels);
+        let planned = planned.filter(|(of, at)| of.is_instant && at.is_some());
+        if let Some((of, _)) = planned.into_iter().next() {
+            let reason = format!(
+                "`{}`: when a plan applies is read from CSV and JSON lines alone",
+                of.column
+            );
+            return Err(failed(name, 0, reason));
+        }
+        let channels = layout.channels[..numbers].iter();
+        let channels = channels.map(|of| of.column.clone()).collect();
+        Self::of(name, file, names, columns, channels)
+    }
+
+    /// All columns as texts.
+    pub fn of_texts(path: &Path, file: Box<dyn TypedFile>) -> Result<Self, FileError> {
+        let names = columns::numbered(file.names());
+        let columns = Columns {
+            time: Vec::new(),
+            channels: (0..names.len()).map(Some).collect(),
+        };
+        Self::of(
+            path.display().to_string().into(),
+            file,
+            names,
+            columns,
+            Vec::new(),
+        )
+    }
+
+    fn of(
+        name: Arc<str>,
+        file: Box<dyn TypedFile>,
+        names: Vec<String>,
+        columns: Columns,
+        channels: Vec<String>,
+    ) -> Result<Self, FileError> {
+        let wanted = Selection {
+            time: columns.time.iter().flatten().copied().collect(),
+            values: columns.channels[..channels.len()].to_vec(),
+            texts: columns.channels[channels.len()..].to_vec(),
+        };
+        let rows = file.select(wanted);
+        let rows = rows.map_err(|reason| failed(name.clone(), 0, reason))?;
+        Ok(Self {
+            file: name,
+            names,
+            columns,
+            has_numbers: !channels.is_empty(),
+            channels,
+            rows,
+            row: 0,
+        })
+    }
+
+    /// Which channels have a column.
+    pub fn present(&self) -> Vec<bool> {
+        let channels = self.columns.channels.iter();
+        channels.map(Option::is_some).collect()
+    }
+
+    /// The names of the columns.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+}
+
+impl Cells for TypedCells {
+    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
+        let is_there = self.rows.advance();
+        let is_there = is_there.map_err(|reason| failed(self.file.clone(), self.row, reason))?;
+        self.row += u64::from(is_there);
+        for (index, found) in self.rows.no_numbers() {
+            ledger.bad_cell(*index, || FileError::BadCell {
+                place: self.place(),
+                column: self.channels[*index].clone(),
+                found: crate::error::excerpt(found.as_bytes()),
+                fault: CellFault::NoNumber,
+            })?;
+        }
+        Ok(is_there)
+    }
+
+    fn time(&self, column: usize) -> &[u8] {
+        match self.rows.time(column) {
+            TypedTime::Text(text) => text,
+            TypedTime::At { text, .. } => text.as_bytes(),
+        }
+    }
+
+    fn channel(&self, index: usize) -> &[u8] {
+        match index.checked_sub(self.channels.len()) {
+            Some(index) => self.rows.text(index),
+            None => &[],
+        }
+    }
+
+    fn place(&self) -> Place {
+        Place {
+            file: self.file.clone(),
+            line: self.row,
+        }
+    }
+
+    fn instant(&self) -> Option<(i64, bool, &str)> {
+        match self.rows.time(0) {
+            TypedTime::At { ns, is_utc, text } if self.columns.time.len() == 1 => {
+                Some((ns, is_utc, text))
+            }
+            _ => None,
+        }
+    }
+
+    fn numbers(&self) -> Option<&[f64]> {
+        self.has_numbers.then(|| self.rows.values())
+    }
+}

@@ -1,0 +1,114 @@
+//! The companion of a service: opens its sockets, and starts the thread that serves them.
+
+use std::fs;
+use std::io;
+use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration as Wait;
+
+use athermal_core::engine::fnv_1a;
+use athermal_serve::companion::{Beside, Companion};
+use athermal_serve::connector::ConnectorError;
+
+use crate::hub::{Hub, Looker};
+use crate::routes::Routes;
+use crate::server::{Doors, Server};
+use crate::settings::Control;
+use crate::token::Token;
+
+/// Where services have their sockets, by name.
+const RUN: &str = "/run/athermal";
+/// The socket in a state folder, where that folder cannot be written.
+const SOCKET: &str = "control.sock";
+/// How many bytes the path of a socket has at most, on all systems.
+const LONGEST: usize = 100;
+/// How long the service may take to let somebody look on.
+const PATIENCE: Wait = Wait::from_secs(10);
+
+impl Companion for Control {
+    fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
+        let failed = |what: String| {
+            move |error: io::Error| ConnectorError::new(format!("[control] {what}: {error}"))
+        };
+        let (path, unix) = self.socket(beside)?;
+        let tcp = self.http.map(|of| {
+            let listener = TcpListener::bind(of.0).map_err(failed(of.0.to_string()))?;
+            let token = Token::of(&beside.state).map_err(failed("token".to_owned()))?;
+            Ok::<_, ConnectorError>((listener, token))
+        });
+        let tcp = tcp.transpose()?;
+        // Whoever asks finds the socket by the state folder, wherever it is.
+        let noted = fs::write(
+            beside.state.join("socket"),
+            path.as_os_str().as_encoded_bytes(),
+        );
+        noted.map_err(failed("socket".to_owned()))?;
+        let hub = Arc::new(Hub::default());
+        let looker = Looker::new(Arc::clone(&hub));
+        let handle = beside.handle.clone();
+        // The service answers once it is pumped, which is after this.
+        std::thread::spawn(move || {
+            handle.ask(PATIENCE, move |service| service.observe(Box::new(looker)))
+        });
+        let routes = Routes::new(beside.clone(), hub);
+        let doors = Doors { unix, tcp, path };
+        let server = Server::start(doors, routes).map_err(failed("thread".to_owned()))?;
+        Ok(Box::new(server))
+    }
+}
+
+impl Control {
+    fn socket(&self, beside: &Beside) -> Result<(PathBuf, UnixListener), ConnectorError> {
+        let path = match &self.socket {
+            Some(path) => path.clone(),
+            None => socket_of(&beside.name, &beside.state),
+        };
+        let bound = bind(&path);
+        let bound = bound.map_err(|error| {
+            ConnectorError::new(format_args!("[control] {}: {error}", path.display()))
+        });
+        Ok((path, bound?))
+    }
+}
+
+/// The socket of a service, by its name and state folder.
+fn socket_of(name: &str, state: &Path) -> PathBuf {
+    let run = Path::new(RUN);
+    let probe = run.join(format!(".{}", std::process::id()));
+    let is_writable = fs::File::create(&probe).is_ok();
+    let _ = fs::remove_file(probe);
+    match is_writable && !name.is_empty() && !name.contains('/') {
+        true => run.join(format!("{name}.sock")),
+        false => short(state.join(SOCKET)),
+    }
+}
+
+/// A path that a socket can have: one that is too long stands among temporary files, and the state folder says where.
+fn short(path: PathBuf) -> PathBuf {
+    if path.as_os_str().len() <= LONGEST {
+        return path;
+    }
+    let hash = fnv_1a(path.as_os_str().as_encoded_bytes());
+    std::env::temp_dir().join(format!("athermal-{hash:016x}.sock"))
+}
+
+/// Binds a socket that its user and group may use. One that nobody listens on any more is taken over.
+fn bind(path: &Path) -> io::Result<UnixListener> {
+    if path.exists() {
+        if UnixStream::connect(path).is_ok() {
+            return Err(io::Error::other("another service listens there"));
+        }
+        fs::remove_file(path)?;
+    }
+    // Made elsewhere and renamed, so that nobody finds it before it has its rights.
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let aside = folder.join(format!(".s{}", std::process::id()));
+    let _ = fs::remove_file(&aside);
+    let listener = UnixListener::bind(&aside)?;
+    fs::set_permissions(&aside, fs::Permissions::from_mode(0o660))?;
+    fs::rename(&aside, path)?;
+    Ok(listener)
+}

@@ -1,0 +1,115 @@
+//! How large the errors of predictions have been of late: each paired with the truth that it was of, once that is known.
+
+use std::sync::Arc;
+
+use athermal_core::compile::{Plan, TruthLink};
+use athermal_core::engine::{Engine, Pairing};
+use athermal_core::time::Instant;
+
+/// After so many seconds an error counts half.
+const HALF_LIFE_S: f64 = 3_600.0;
+
+/// The errors of all predictions of a graph.
+#[derive(Default, Clone)]
+pub struct PredictionErrors {
+    plan: Option<Arc<Plan>>,
+    all: Vec<PredictionError>,
+}
+
+/// The error of a prediction.
+#[derive(Clone)]
+pub struct PredictionError {
+    /// The channel that predicts.
+    pub name: String,
+    /// The unit of its errors.
+    pub unit: String,
+    slot: usize,
+    truth: usize,
+    pairing: Pairing,
+    squares: f64,
+    weight: f64,
+    last: Option<Instant>,
+}
+
+impl PredictionErrors {
+    /// The errors.
+    pub fn iter(&self) -> impl Iterator<Item = &PredictionError> {
+        self.all.iter()
+    }
+
+    /// Looks at what a tick did.
+    pub fn look(&mut self, now: Instant, engine: &Engine) {
+        let plan = engine.plan();
+        if !self.plan.as_ref().is_some_and(|of| Arc::ptr_eq(of, plan)) {
+            self.all = predictions(plan);
+            self.plan = Some(Arc::clone(plan));
+        }
+        for error in &mut self.all {
+            error.look(now, engine);
+        }
+    }
+}
+
+impl PredictionError {
+    /// The root mean square; none before there was a truth.
+    pub fn rmse(&self) -> Option<f64> {
+        (self.weight > 0.0).then(|| (self.squares / self.weight).sqrt())
+    }
+
+    fn look(&mut self, now: Instant, engine: &Engine) {
+        // What lies before a new segment pairs with nothing in it.
+        if self.last.is_some_and(|last| now <= last) {
+            self.pairing.clear();
+            self.last = None;
+        }
+        if engine.ran(self.slot) {
+            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
+        }
+        let truth = engine.value(self.truth);
+        if truth.is_nan() {
+            return;
+        }
+        let predicted = self.pairing.truth(now).map_or(f64::NAN, |pair| pair.row[0]);
+        if predicted.is_nan() {
+            return;
+        }
+        let passed = self
+            .last
+            .map_or(0.0, |last| (now - last).as_ns() as f64 / 1e9);
+        self.last = Some(now);
+        let kept = 0.5_f64.powf(passed / HALF_LIFE_S);
+        self.squares = self.squares * kept + (predicted - truth).powi(2);
+        self.weight = self.weight * kept + 1.0;
+    }
+}
+
+fn predictions(plan: &Plan) -> Vec<PredictionError> {
+    let prediction = |(slot, channel): (usize, &athermal_core::compile::PlannedChannel)| {
+        let truth_slot = channel.predicts?;
+        let truth = &plan.channels[truth_slot];
+        let own = plan.nodes[channel.node?].role.truth();
+        let link = TruthLink {
+            slot: truth_slot,
+            ahead: channel.channel.ahead,
+            span: truth.channel.span,
+            limit: own
+                .map(|link| link.limit)
+                .or(truth.channel.default_max_age())?,
+        };
+        Some(PredictionError {
+            name: channel.name.clone(),
+            unit: truth.channel.unit.difference().to_string(),
+            slot,
+            truth: truth_slot,
+            pairing: Pairing::new(&link, 1),
+            squares: 0.0,
+            weight: 0.0,
+            last: None,
+        })
+    };
+    plan.channels
+        .iter()
+        .enumerate()
+        .filter_map(prediction)
+        .collect()
+}

@@ -1,0 +1,151 @@
+//! How long a row takes through a service, from its source to its sink, in quiet and under attack.
+
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration as Wait, Instant as Clock};
+
+use athermal_core::time::Instant;
+use athermal_serve::connector::{
+    ConnectorError, Inlet, OutRow, Outflow, Outlet, Sink, SinkWiring, Source, SourceWiring, Stamps,
+    Stop,
+};
+use athermal_serve::{register_sink, register_source};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::Bench;
+use crate::client::Address;
+
+/// When each row was sent, and when each came, by number.
+static SENT: Mutex<Vec<Clock>> = Mutex::new(Vec::new());
+static TOOK: Mutex<Vec<Wait>> = Mutex::new(Vec::new());
+
+/// A row each two milliseconds.
+#[derive(Debug, Deserialize, JsonSchema)]
+struct Pulse {}
+
+register_source!(Pulse, "pulse");
+
+impl Source for Pulse {
+    fn stamps(&self) -> Stamps {
+        Stamps::Order
+    }
+
+    fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
+        Ok(Box::new(Pulsing(wiring.channels.len())))
+    }
+}
+
+struct Pulsing(usize);
+
+impl Inlet for Pulsing {
+    fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
+        out.connected();
+        let mut nth = 0_i64;
+        while !stop.is_asked() {
+            std::thread::sleep(Wait::from_millis(2));
+            let values: Vec<_> = (0..self.0)
+                .map(|of| 20.0 + (nth as usize * 7 + of) as f64 % 3.0)
+                .collect();
+            SENT.lock().unwrap().push(Clock::now());
+            if !out.row(Instant::from_ns(nth * 100_000_000), &values, stop) {
+                break;
+            }
+            nth += 1;
+        }
+        Ok(())
+    }
+}
+
+/// Notes how long each row took.
+#[derive(Debug, Deserialize, JsonSchema)]
+struct Watch {}
+
+register_sink!(Watch, "watch");
+
+impl Sink for Watch {
+    fn open(&self, _wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError> {
+        Ok(Box::new(Watching))
+    }
+}
+
+struct Watching;
+
+impl Outlet for Watching {
+    fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError> {
+        let nth = (row.at.as_ns() / 100_000_000) as usize;
+        let sent = SENT.lock().unwrap()[nth];
+        TOOK.lock().unwrap().push(sent.elapsed());
+        Ok(())
+    }
+}
+
+const MACHINE: &str = r#"
+[runtime]
+wait = "0 s"
+settle = "0 s"
+[sources.log]
+type = "pulse"
+[sinks.out]
+type = "watch"
+"#;
+
+/// The median and the 99.9th percentile of so many seconds.
+fn measured(seconds: u64) -> (Wait, Wait) {
+    TOOK.lock().unwrap().clear();
+    std::thread::sleep(Wait::from_secs(seconds));
+    let mut took = TOOK.lock().unwrap().clone();
+    took.sort();
+    assert!(took.len() > 300 * seconds as usize, "{} rows", took.len());
+    (took[took.len() / 2], took[took.len() * 999 / 1000])
+}
+
+#[test]
+fn rows_are_no_later_under_attack() {
+    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
+    let seconds = if is_long { 20 } else { 3 };
+    let bench = Bench::start_with(super::GRAPH, MACHINE);
+    let Address::Socket(path) = bench.address() else {
+        panic!("it is a socket")
+    };
+    let quiet = measured(seconds);
+    let over = Arc::new(AtomicBool::new(false));
+    // Some that never read, and one that asks and sends rubbish without a pause.
+    let deaf: Vec<_> = (0..6)
+        .filter_map(|_| {
+            let mut stream = UnixStream::connect(&path).ok()?;
+            let ask = b"GET /v1/events?channel=* HTTP/1.1\r\nHost: x\r\n\r\n";
+            stream.write_all(ask).ok().map(|()| stream)
+        })
+        .collect();
+    let attacker = std::thread::spawn({
+        let over = Arc::clone(&over);
+        move || {
+            let mut count = 0;
+            while !over.load(Ordering::Relaxed) {
+                let Ok(mut stream) = UnixStream::connect(&path) else {
+                    continue;
+                };
+                let text: &[u8] = match count % 3 {
+                    0 => b"GET /metrics HTTP/1.0\r\n\r\n",
+                    1 => b"POST /v1/stage HTTP/1.0\r\nContent-Length: 7\r\n\r\n{\"a\": 1",
+                    _ => b"\0\x01rubbish\r\n\r\n",
+                };
+                let _ = stream.write_all(text);
+                count += 1;
+                std::thread::sleep(Wait::from_millis(1));
+            }
+            count
+        }
+    });
+    let attacked = measured(seconds);
+    over.store(true, Ordering::Relaxed);
+    let count = attacker.join().unwrap();
+    drop(deaf);
+    println!("median and 99.9 %: {quiet:?} in quiet, {attacked:?} under {count} requests");
+    // Two shared cores are noisy: what must not be is a row that waits for a listener.
+    let limit = 3 * quiet.1 + Wait::from_millis(10);
+    assert!(attacked.1 < limit, "{attacked:?} against {quiet:?}");
+}

@@ -1,0 +1,62 @@
+//! The token that orders over TCP need: a file that its owner alone reads.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::path::Path;
+
+/// The name of the file in the state folder.
+pub const FILE: &str = "token";
+
+/// A secret that is compared in a time that does not depend on where it differs.
+#[derive(Clone)]
+pub struct Token(String);
+
+impl Token {
+    /// The token of a state folder; it is made where there is none.
+    ///
+    /// # Errors
+    /// When others can read it, or it cannot be read or made.
+    pub fn of(state: &Path) -> io::Result<Self> {
+        let path = state.join(FILE);
+        match File::open(&path) {
+            Ok(mut file) => {
+                let mode = file.metadata()?.permissions().mode();
+                if mode & 0o077 != 0 {
+                    return Err(io::Error::other(format!(
+                        "{} can be read by others: `chmod 600` it, or remove it for a new one",
+                        path.display()
+                    )));
+                }
+                let mut text = String::new();
+                file.read_to_string(&mut text)?;
+                let text = text.trim().to_owned();
+                if text.len() < 16 {
+                    let words = format!("{} is too short: remove it for a new one", path.display());
+                    return Err(io::Error::other(words));
+                }
+                Ok(Self(text))
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Self::make(&path),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn make(path: &Path) -> io::Result<Self> {
+        let mut bytes = [0; 32];
+        File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+        let text: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let mut options = OpenOptions::new();
+        let file = options.write(true).create_new(true).mode(0o600).open(path);
+        writeln!(file?, "{text}")?;
+        Ok(Self(text))
+    }
+
+    /// Whether a text is the token.
+    pub fn is(&self, text: &str) -> bool {
+        let (own, given) = (self.0.as_bytes(), text.as_bytes());
+        let pairs = own.iter().zip(given.iter().chain(std::iter::repeat(&0)));
+        let difference = pairs.fold(0, |all, (a, b)| all | (a ^ b));
+        difference == 0 && own.len() == given.len()
+    }
+}

@@ -1,0 +1,95 @@
+//! Recordings in Parquet, of a program that was built with them, beside the same recordings as CSV.
+
+use athermal::files::{Layout, Options, Reader, Row, TimeForm};
+
+use crate::workbench::{Scratch, athermal, athermal_on, graph};
+
+#[test]
+fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
+    let scratch = Scratch::new("parquet");
+    let mut results = Vec::new();
+    for ending in ["csv", "parquet"] {
+        let of = |name: &str| scratch.path(&format!("{name}.{ending}"));
+        let (train, test) = (of("logs/train"), of("test"));
+        std::fs::create_dir_all(train.parent().unwrap()).unwrap();
+        for (log, seed) in [(&train, "1"), (&test, "2")] {
+            athermal(&[
+                &"simulate",
+                &"die-tester",
+                &"--days",
+                &"1",
+                &"--seed",
+                &seed,
+                &"-o",
+                log,
+            ])
+            .ended(0);
+        }
+        let graph = scratch.path(&format!("{ending}.toml"));
+        let model = scratch.path(&format!("{ending}.json"));
+        athermal(&[&"init", &train, &"-o", &graph, &"--force"]).ended(0);
+        athermal_on("fit", &graph, &train, &[&"-o", &model]).ended(0);
+        let scores = athermal_on("evaluate", &model, &test, &[&"--format", &"json"]).ended(0);
+        let output = of("out");
+        athermal(&[&"run", &model, &"--input", &test, &"--output", &output]).ended(0);
+        let model: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+        results.push((
+            model["fitted"].clone(),
+            scores.json()["scores"].clone(),
+            output,
+        ));
+    }
+    let [
+        (fitted, scores, csv),
+        (of_parquet, scores_of_parquet, parquet),
+    ] = &*results
+    else {
+        panic!("two of them")
+    };
+    assert!(!fitted.is_null() && fitted == of_parquet);
+    assert_eq!(scores, scores_of_parquet);
+    // What was put out is a recording too.
+    let text = std::fs::read_to_string(csv).unwrap();
+    let (header, _) = text.split_once('\n').unwrap();
+    let columns: Vec<&str> = header.split(',').skip(1).collect();
+    let rows = |path| {
+        let layout = Layout::new("time_s", TimeForm::SECONDS, columns.clone());
+        let mut reader = Reader::open(path, layout, Options::default()).unwrap();
+        let (mut rows, mut row) = (Vec::new(), Row::default());
+        while reader.next_into(&mut row).unwrap() {
+            let values: Vec<u64> = row.values.iter().map(|value| value.to_bits()).collect();
+            rows.push((row.time_ns, values));
+        }
+        rows
+    };
+    assert!(rows(csv).len() > 1000 && rows(csv) == rows(parquet));
+}
+
+#[test]
+fn files_of_a_folder_are_one_recording_with_what_their_paths_say() {
+    let scratch = Scratch::new("hive");
+    for (date, seed) in [("2026-03-01", "1"), ("2026-03-02", "2")] {
+        let log = scratch.path(&format!("logs/machine=dt07/date={date}/log.parquet"));
+        std::fs::create_dir_all(log.parent().unwrap()).unwrap();
+        let words: [&dyn AsRef<std::ffi::OsStr>; 8] = [
+            &"simulate",
+            &"linear-axis",
+            &"--days",
+            &"0.2",
+            &"--seed",
+            &seed,
+            &"-o",
+            &log,
+        ];
+        athermal(&words).ended(0);
+    }
+    let logs = scratch.path("logs");
+    std::fs::write(logs.join("_SUCCESS"), "").unwrap();
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph("linear-axis-sensor"), &logs, &[&"-o", &model]).ended(0);
+    let model = std::fs::read_to_string(&model).unwrap();
+    for date in ["2026-03-01", "2026-03-02"] {
+        assert!(model.contains(&format!("machine=dt07/date={date}/log.parquet")));
+    }
+}
