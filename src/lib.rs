@@ -73,6 +73,10 @@ use athermal_features as _;
 use athermal_http as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_log as _;
+#[cfg(feature = "mqtt")]
+use athermal_mqtt as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_retrain as _;
 use athermal_simulation as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_systemd as _;

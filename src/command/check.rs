@@ -18,12 +18,15 @@ use serde_json::json;
 use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
 use athermal_analysis::figures::counted;
 
+/// How long a source may take to give one of everything.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
+
 /// Look for mistakes in a graph file
 ///
 /// Reports all mistakes at once, each with its place and a way out. Nothing is fitted and no data are read.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml"
+    after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml\n  athermal check --live machine.toml"
 )]
 pub struct Check {
     /// Graph files
@@ -32,6 +35,9 @@ pub struct Check {
     /// Fail on warnings too (exit status 1)
     #[arg(long)]
     strict: bool,
+    /// Ask the sources of machine files for one of everything, and show it (exit status 1 where something is missing)
+    #[arg(long)]
+    live: bool,
 }
 
 /// What a graph without mistakes has.
@@ -84,10 +90,14 @@ pub(super) fn plan_and_tests(
 }
 
 /// A graph that can run: no mistake in it, in its tests, or in the model that it names.
-fn machine(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) -> Option<Model> {
+fn machine(
+    path: &Path,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<(Model, Deployment)> {
     let (graph, plan) = graph_and_plan(path, sources, diagnostics)?;
     trial::declare(&graph, &plan, &Disk, sources, diagnostics);
-    Deployment::check(&graph, &plan, sources, diagnostics);
+    let deployment = Deployment::check(&graph, &plan, sources, diagnostics);
     let mut machine = Model {
         graph,
         plan: Arc::new(plan),
@@ -95,7 +105,7 @@ fn machine(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) ->
         card: None,
     };
     machine.take_named(path, Wanted::default(), sources, diagnostics);
-    Some(machine).filter(|_| !diagnostics.has_errors())
+    Some((machine, deployment?)).filter(|_| !diagnostics.has_errors())
 }
 
 /// The number of mistakes in the tests of a graph that has no others, read from `sources`.
@@ -112,17 +122,29 @@ impl Check {
     /// When one has mistakes.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-        let mut fine = Vec::new();
+        let (mut fine, mut looked, mut is_whole) = (Vec::new(), Vec::new(), true);
         for path in &self.graphs {
             let mut of_file = Diagnostics::new();
             let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
-            fine.extend(machine.map(|machine| (path, machine.plan)));
+            for found in machine
+                .iter()
+                .filter(|_| self.live)
+                .flat_map(|of| of.1.look(&of.0.plan, PATIENCE))
+            {
+                is_whole &= found.missing == 0;
+                match terminal.format {
+                    Format::Json => looked.push(found.to_json()),
+                    Format::Table => print!("{found}"),
+                }
+            }
+            fine.extend(machine.map(|(machine, _)| (path, machine.plan)));
         }
         if terminal.format == Format::Json {
             let mut facts = diagnostics.to_json(&sources);
             let graphs = fine.iter().map(|(path, plan)| Counts::of(path, plan));
             facts["graphs"] = json!(graphs.collect::<Vec<_>>());
+            facts["live"] = json!(looked);
             println!("{facts:#}");
         } else {
             terminal.diagnostics(&diagnostics, &sources);
@@ -140,7 +162,7 @@ impl Check {
         }
         if diagnostics.has_errors() {
             Err(Failure::Exit(status_of(&diagnostics)))
-        } else if self.strict && !diagnostics.is_empty() {
+        } else if self.strict && !diagnostics.is_empty() || !is_whole {
             Ok(Answer::No)
         } else {
             Ok(Answer::Fine)

@@ -65,6 +65,7 @@ impl<'a> SourceTrial<'a> {
             },
             address: (*address).to_owned(),
             unit: crate::unit::Unit::one(),
+            mapped: None,
             conversion: None,
             after: Instant::MIN,
         };
@@ -72,6 +73,8 @@ impl<'a> SourceTrial<'a> {
             source,
             wiring: SourceWiring {
                 name: "tried".to_owned(),
+                machine: None,
+                state: folder.join("tried"),
                 folder: folder.to_owned(),
                 channels: channels.iter().map(wired).collect(),
                 time: time_base(),
@@ -274,6 +277,7 @@ pub fn open_sink(
     };
     let opened = sink.open(SinkWiring {
         name: "tried".to_owned(),
+        machine: None,
         folder: folder.to_owned(),
         outputs: outputs.iter().map(wired).collect(),
         time: time_base(),

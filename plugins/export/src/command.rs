@@ -10,13 +10,15 @@ use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 
 use crate::lower::Rates;
-use crate::{ExportError, Exported, Options, c, export_c, state};
+use crate::{ExportError, Exported, Options, c, export_c, lower, onnx, state};
 
 /// What a graph is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Target {
     /// C99 with a runtime, a self test and recipes
     C,
+    /// ONNX, of the linear parts alone
+    Onnx,
 }
 
 /// Write a fitted graph for a controller
@@ -53,13 +55,15 @@ athermal_command::register_command!(Export, "export");
 
 impl Command for Export {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let Target::C = self.target;
         let mut engine = Model::load(&self.model)?.engine()?;
         let options = Options {
             rates: self.rates()?,
             frozen: self.frozen,
             name: self.name.clone(),
         };
+        if self.target == Target::Onnx {
+            return self.onnx(&engine, &options);
+        }
         let exported = export_c(&engine, &options, self.float).map_err(failure)?;
         c::write(&exported.files, &self.output).map_err(failure)?;
         self.carry(&mut engine, &exported)?;
@@ -95,6 +99,20 @@ impl Export {
             }
         }
         Ok(rates)
+    }
+
+    /// Writes the linear parts.
+    fn onnx(&self, engine: &Engine, options: &Options) -> Result<Answer, Failure> {
+        let form = lower(engine, options).map_err(failure)?;
+        let path = format!("{}.onnx", form.name);
+        let count = onnx::estimators(&form).count();
+        let bytes = onnx::model(&form);
+        c::write_bytes(&self.output, &path, &bytes).map_err(failure)?;
+        println!(
+            "wrote {}: {count} linear estimators, whose rows the caller makes",
+            self.output.join(path).display()
+        );
+        Ok(Answer::Fine)
     }
 
     /// Writes states that go over between the engine and C.

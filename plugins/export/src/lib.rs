@@ -13,6 +13,7 @@ mod command;
 mod error;
 mod form;
 mod lower;
+pub mod onnx;
 pub mod state;
 mod ticks;
 

@@ -12,7 +12,9 @@ mod source_link;
 mod stop;
 
 pub use error::ConnectorError;
-pub use inlet::{Inlet, Source, SourceWiring, Stamps, WiredChannel};
+pub use inlet::{
+    Inlet, Mapped, Mapping, ParameterRemark, Seen, Source, SourceWiring, Stamps, WiredChannel,
+};
 pub use kind::{
     ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,
 };

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::path::PathBuf;
 
-use super::ConnectorError;
+use super::{ConnectorError, ParameterRemark};
 use crate::document::TimeBase;
 use crate::time::{Duration, Instant};
 
@@ -12,6 +12,11 @@ pub trait Sink: Debug + Send + Sync {
     /// What it is for.
     fn purpose(&self) -> Purpose {
         Purpose::Log
+    }
+
+    /// As those of a source.
+    fn remarks(&self) -> Vec<ParameterRemark> {
+        Vec::new()
     }
 
     /// The sink at work. Nothing is connected yet: that is for the first [`Outlet::put`].
@@ -35,6 +40,8 @@ pub enum Purpose {
 pub struct SinkWiring {
     /// Its name in the machine file.
     pub name: String,
+    /// The name of the graph, if it has one.
+    pub machine: Option<String>,
     /// The folder that relative paths start from.
     pub folder: PathBuf,
     /// The outputs that it is given, in the order of [`OutRow::outputs`].
@@ -60,6 +67,14 @@ pub trait Outlet: Send {
     /// When it cannot be put out, and why. The same row is given again after a while; rows wait meanwhile, as many as there is room for.
     fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError>;
 
+    /// Whether what it has taken can leave; otherwise why not. What waits is kept meanwhile. Asked after each row, and ten times a second.
+    ///
+    /// # Errors
+    /// Why it cannot leave at the moment.
+    fn state(&mut self) -> Result<(), ConnectorError> {
+        Ok(())
+    }
+
     /// Hands what is still held back to the system. Called when no row waits.
     ///
     /// # Errors
@@ -81,10 +96,10 @@ pub trait Outlet: Send {
 
 /// The rows that a sink keeps.
 pub trait Kept {
-    /// Where its end is, once all rows are on the disk.
+    /// Where its end is, once all rows are on the disk, or wherever they go.
     ///
     /// # Errors
-    /// As [`Outlet::put`].
+    /// As [`Outlet::put`], and where rows are still on their way. The place that was kept before is good until then.
     fn end(&mut self) -> Result<u64, ConnectorError>;
 
     /// How many whole rows stand behind a place that [`end`](Self::end) gave; none where it is gone. What is left of a row is cut off.

@@ -119,9 +119,29 @@ pub struct Outflow {
     /// By channel of the source.
     channels: Vec<FedChannel>,
     stamps: Stamps,
+    written: Safe,
+    synced: Safe,
+}
+
+/// How many samples are safe.
+#[derive(Debug, Default)]
+struct Safe {
     /// What was taken at a look, and the number of records that have it.
     look: (u64, u64),
-    written: u64,
+    samples: u64,
+}
+
+impl Safe {
+    /// Looks again, where so many records are safe.
+    fn after(&mut self, safe: u64, counts: &SourceCounts) -> u64 {
+        let (taken, records) = self.look;
+        if safe >= records {
+            self.samples = taken;
+            let taken = counts.taken.load(Ordering::Acquire);
+            self.look = (taken, counts.records.load(Ordering::Acquire));
+        }
+        self.samples
+    }
 }
 
 /// The end that the engine thread holds.
@@ -157,8 +177,8 @@ pub(crate) fn link(
             })
             .collect(),
         stamps,
-        look: (0, 0),
-        written: 0,
+        written: Safe::default(),
+        synced: Safe::default(),
     };
     let link = SourceLink {
         ring: arrivals,
@@ -265,13 +285,23 @@ impl Outflow {
 
     /// How many of the samples that were given are written into the journal: so many may be acknowledged.
     pub fn written(&mut self) -> u64 {
-        let (taken, records) = self.look;
-        if self.progress.written() >= records {
-            self.written = taken;
-            let taken = self.counts.taken.load(Ordering::Acquire);
-            self.look = (taken, self.counts.records.load(Ordering::Acquire));
+        let written = self.while_journalled(self.progress.written());
+        self.written.after(written, &self.counts)
+    }
+
+    /// The same of samples that survive a power cut too.
+    pub fn synced(&mut self) -> u64 {
+        let synced = self.while_journalled(self.progress.synced());
+        self.synced.after(synced, &self.counts)
+    }
+
+    /// Where the disk has failed the service goes on without its journal: a broker is not to wait for what will not be written.
+    fn while_journalled(&self, records: u64) -> u64 {
+        if self.progress.failed() {
+            u64::MAX
+        } else {
+            records
         }
-        self.written
     }
 
     /// What is counted.

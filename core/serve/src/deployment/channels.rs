@@ -9,6 +9,7 @@ use serde::Deserialize;
 
 use super::keys;
 use super::problem::{NoChannel, OtherUnit};
+use crate::connector::{Mapped, Mapping};
 use crate::diagnostic::{Diagnostics, Names, Place};
 use crate::document::problem::{OneColumn, UnknownPlaceholder, UnknownSet, WrongType};
 use crate::document::{
@@ -79,6 +80,21 @@ pub(super) struct Claim {
     pub(super) address: Option<String>,
     pub(super) conversion: Option<(f64, f64)>,
     pub(super) late: Option<Duration>,
+    pub(super) mapped: Option<Mapped>,
+}
+
+impl Claim {
+    /// A channel that is in its signal's column.
+    pub(super) fn column(channel: usize, place: Place) -> Self {
+        Self {
+            channel,
+            place,
+            address: None,
+            conversion: None,
+            late: None,
+            mapped: None,
+        }
+    }
 }
 
 /// The texts that one with `{set}` in it stands for, each with its members.
@@ -204,14 +220,10 @@ impl<'a> GraphChannels<'a> {
                         }
                     }
                 }
-                let claim = |(channel, place)| Claim {
-                    channel,
-                    place,
-                    address: None,
-                    conversion: None,
-                    late: None,
-                };
-                named.into_iter().map(claim).collect()
+                let claims = named.into_iter();
+                claims
+                    .map(|(channel, place)| Claim::column(channel, place))
+                    .collect()
             }
             _ => {
                 let expected = "a list of channels, or a table of their addresses";
@@ -310,11 +322,57 @@ impl<'a> GraphChannels<'a> {
             }
         }
         let is_sound = diagnostics.error_count() == before;
+        let places = [entry.key, at, entry.value.place_of("unit")];
+        self.claims(found, &keys, places, is_sound, diagnostics)
+    }
+
+    /// The channels that a source names by a parameter of its own, which stands in this table.
+    pub(super) fn own(
+        &self,
+        nth: usize,
+        mapping: &Mapping,
+        parameters: &Value,
+        diagnostics: &mut Diagnostics,
+    ) -> Vec<Claim> {
+        let (value, place, around) = keys::find(parameters, &mapping.at);
+        let part = |key: &str| value.and_then(Value::as_table)?.get(key);
+        let place = part("channel").map_or(place, |of| of.place);
+        let unit = part("unit").map_or(around.place_of("unit"), |of| of.place);
+        let keys = MappedKeys {
+            from: Some(mapping.address.clone()),
+            unit: mapping.unit.clone(),
+            late: mapping.late,
+        };
+        let found = self.find(&mapping.channel, place, diagnostics);
+        let members: Vec<_> = found.iter().map(|(_, pairs)| pairs.clone()).collect();
+        let mut claims = self.claims(found, &keys, [place, place, unit], true, diagnostics);
+        for (claim, pairs) in claims.iter_mut().zip(members) {
+            let channel = ("channel", self.all[claim.channel].channel);
+            let members = pairs.into_iter().chain([channel]);
+            claim.mapped = Some(Mapped {
+                mapping: nth,
+                members: members
+                    .map(|(name, member)| (name.to_owned(), member.to_owned()))
+                    .collect(),
+            });
+        }
+        claims
+    }
+
+    /// What is claimed of channels, each with the members that its pattern stands for. The places are those of the pattern, of the
+    /// address and of the unit.
+    fn claims(
+        &self,
+        found: Vec<(usize, Vec<(&'a str, &'a str)>)>,
+        keys: &MappedKeys,
+        [place, at, unit_place]: [Place; 3],
+        is_sound: bool,
+        diagnostics: &mut Diagnostics,
+    ) -> Vec<Claim> {
         let address = |channel: usize, mut pairs: Vec<(&'a str, &'a str)>| {
             pairs.push(("channel", self.all[channel].channel));
             Some(fill_placeholders(keys.from.as_ref()?, &pairs))
         };
-        let unit_place = entry.value.place_of("unit");
         let mut claims = Vec::new();
         // Of an entry for several channels one has what is wrong with its unit.
         let mut unit = keys.unit.as_ref();
@@ -323,16 +381,16 @@ impl<'a> GraphChannels<'a> {
             let conversion = self.conversion(channel, unit, unit_place, diagnostics);
             unit = unit.filter(|_| diagnostics.error_count() == before);
             claims.push(Claim {
-                channel,
-                place: entry.key,
                 address: address(channel, pairs),
                 conversion,
                 late: keys.late,
+                ..Claim::column(channel, place)
             });
         }
         let distinct: IndexSet<_> = claims.iter().map(|claim| &claim.address).collect();
         if let Some(pattern) = keys
             .from
+            .clone()
             .filter(|_| is_sound && distinct.len() < claims.len())
         {
             let channels = claims.len();

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 
-use crate::diagnostic::Diagnostics;
+use super::problem::{DoubtfulParameter, UnfitParameter};
+use crate::connector::ParameterRemark;
+use crate::diagnostic::{Diagnostics, Place};
 use crate::document::problem::Refused;
 use crate::document::{Data, Table, Value, decode};
 use crate::node::out_of_range;
@@ -41,4 +43,31 @@ pub(super) fn split(table: &Value, keys: &[&str]) -> (Value, Value) {
     [own, others]
         .map(|part: Vec<_>| Value::new(table.place, Data::Table(part.into_iter().collect())))
         .into()
+}
+
+/// What stands at the end of a path of keys and numbers in a table, its place, and the table or list that it stands in; the place of
+/// the last part that is there, where not all are.
+pub(super) fn find<'a>(table: &'a Value, at: &[String]) -> (Option<&'a Value>, Place, &'a Value) {
+    let (mut around, mut value) = (table, Some(table));
+    for step in at {
+        let Some(of) = value else { break };
+        around = of;
+        value = match of.as_list() {
+            Some(list) => step.parse().ok().and_then(|nth: usize| list.get(nth)),
+            None => of.as_table().and_then(|table| table.get(step)),
+        };
+    }
+    (value, value.map_or(around.place, |of| of.place), around)
+}
+
+/// Reports what a source or sink says of its parameters.
+pub(super) fn report(remarks: Vec<ParameterRemark>, table: &Value, diagnostics: &mut Diagnostics) {
+    for remark in remarks {
+        let (_, place, _) = find(table, &remark.at);
+        let (words, advice) = (remark.words, remark.help);
+        match remark.is_mistake {
+            true => diagnostics.report(place, UnfitParameter { words, advice }),
+            false => diagnostics.report(place, DoubtfulParameter { words, advice }),
+        }
+    }
 }

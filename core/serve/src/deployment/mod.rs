@@ -3,6 +3,7 @@
 mod channels;
 mod describe;
 mod keys;
+mod look;
 pub mod problem;
 mod runtime;
 mod schema;
@@ -11,6 +12,7 @@ mod size;
 mod sources;
 
 pub(crate) use keys::read as read_keys;
+pub use look::{Found, NAMES};
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
 pub use size::Size;
@@ -19,11 +21,12 @@ use std::path::PathBuf;
 
 use crate::companion::{Companion, companion_kinds};
 use crate::compile::{Plan, SourceChannel};
-use crate::connector::{Sink, SinkKind, Source, SourceKind};
+use crate::connector::{Mapped, Sink, SinkKind, Source, SourceKind, SourceWiring, WiredChannel};
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::document::GraphFile;
 use crate::sequencer::ClockRule;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
+use crate::unit::Unit;
 
 /// The sections that a deployment is read from.
 pub const SECTIONS: [&str; 3] = ["sources", "sinks", "runtime"];
@@ -67,6 +70,8 @@ pub struct DeclaredChannel {
     pub channel: SourceChannel,
     /// Where the source has it: a column, a topic, a node.
     pub address: String,
+    /// Which of the source's own mappings names it.
+    pub mapped: Option<Mapped>,
     /// The unit of the channel from that of the source: `value * factor + offset`; none where it is the same.
     pub conversion: Option<(f64, f64)>,
     /// A sample no later than this is given to the next tick.
@@ -90,6 +95,35 @@ pub struct DeclaredSink {
     pub behind: Option<Duration>,
     /// By how much a command may change per second, in the unit of each output; without bound where there is none.
     pub rate: Vec<Option<f64>>,
+}
+
+impl DeclaredSource {
+    /// What it is asked for, with nothing known before. `state` is a folder of its own.
+    #[must_use]
+    pub fn wiring(&self, plan: &Plan, state: PathBuf) -> SourceWiring {
+        let unit = |name: &str| {
+            let mut channels = plan.sources.iter().zip(&plan.channels);
+            let found = channels.find(|(of, _)| of.name == name);
+            found.map_or_else(Unit::one, |(_, of)| of.channel.unit.clone())
+        };
+        let channel = |of: &DeclaredChannel| WiredChannel {
+            unit: unit(&of.channel.name),
+            channel: of.channel.clone(),
+            address: of.address.clone(),
+            mapped: of.mapped.clone(),
+            conversion: of.conversion,
+            after: Instant::MIN,
+        };
+        SourceWiring {
+            name: self.name.clone(),
+            machine: plan.name.clone(),
+            state,
+            folder: self.folder.clone(),
+            channels: self.channels.iter().map(channel).collect(),
+            time: plan.time.clone(),
+            table: plan.table.clone(),
+        }
+    }
 }
 
 impl Deployment {

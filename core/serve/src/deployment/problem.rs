@@ -216,6 +216,26 @@ problem! {
     help: "leave one of the crates out when the program is built",
 }
 
+problem! {
+    /// Parameters of a source or sink that cannot be used so.
+    A212 UnfitParameter { words: String, advice: String }
+    error: "parameters that do not fit",
+    explanation: "A source or sink cannot do what its parameters ask for: one lacks what another needs, or names nothing that there is.",
+    message: words.clone(),
+    label: "",
+    help: advice.clone(),
+}
+
+problem! {
+    /// Parameters of a source or sink that may have consequences nobody wants.
+    A213 DoubtfulParameter { words: String, advice: String }
+    warning: "parameters to think about",
+    explanation: "The parameters of a source or sink can be used, but something is lost by them that one would like to keep.",
+    message: words.clone(),
+    label: "",
+    help: advice.clone(),
+}
+
 fn nearest_of(name: &str, known: &Names, there_are: &str) -> String {
     match known.nearest(name) {
         Some(near) => format!("did you mean `{near}`?"),

@@ -121,7 +121,9 @@ fn sink(
         None => (0..outputs.columns.len()).collect(),
     };
     let rate = outputs.rates(by_hand("rate"), &columns, diagnostics);
-    let (kind, parameters) = kind?;
+    let (kind, sink) = kind?;
+    keys::report(sink.remarks(), &parameters, diagnostics);
+    let parameters = sink;
     let is_command = parameters.purpose() == Purpose::Command;
     for key in ["behind", "rate"].into_iter().filter(|_| !is_command) {
         if let Some(entry) = entry.value.as_table().and_then(|table| table.entry(key)) {

@@ -195,21 +195,24 @@ fn part<'a>(
     let (named, own) = keys::split(&own, &["channels"]);
     let what = format!("the source `{name}`");
     let named = named.as_table().and_then(|table| table.get("channels"));
+    let role = ("source", name);
+    let kind = of_kind(role, entry, &parameters, all_sources(), &KEYS, diagnostics);
+    let mut claims = named.map(|value| channels.read(value, diagnostics));
+    let remarks = kind.as_ref().map(|(_, source)| source.remarks());
+    keys::report(remarks.unwrap_or_default(), &parameters, diagnostics);
+    let mappings = kind.as_ref().map(|(_, source)| source.mappings());
+    for (nth, mapping) in mappings.iter().flatten().enumerate() {
+        let own = channels.own(nth, mapping, &parameters, diagnostics);
+        claims.get_or_insert_default().extend(own);
+    }
     Part {
         name,
         place: entry.key,
-        kind: of_kind(
-            ("source", name),
-            entry,
-            &parameters,
-            all_sources(),
-            &KEYS,
-            diagnostics,
-        ),
+        kind,
         keys: keys::read::<SourceKeys>(&own, &what, diagnostics),
         folder: files.resolve(entry.value.place_of("path"), ""),
         at: named.map_or(entry.key, |value| value.place),
-        claims: named.map(|value| channels.read(value, diagnostics)),
+        claims,
     }
 }
 
@@ -264,13 +267,7 @@ fn share<'a>(
             diagnostics.report(place, problem);
             continue;
         }
-        let claim = |&channel: &usize| Claim {
-            channel,
-            place,
-            address: None,
-            conversion: None,
-            late: None,
-        };
+        let claim = |&channel: &usize| Claim::column(channel, place);
         part.claims = Some(rest.iter().map(claim).collect());
         for channel in &rest {
             taken.insert(*channel, (name, place));
@@ -301,6 +298,7 @@ fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Optio
         DeclaredChannel {
             address: claim.address.unwrap_or_else(|| channel.column.clone()),
             channel,
+            mapped: claim.mapped,
             conversion: claim.conversion,
             late: claim.late.unwrap_or(keys.late),
         }

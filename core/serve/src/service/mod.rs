@@ -182,10 +182,9 @@ impl Service {
         if let Some(revision) = model.revision() {
             folder.keep_model(model, &revision)?;
         }
-        let time = &model.plan.time;
         let units = outputs(&model.plan);
         let open = |declared: crate::deployment::DeclaredSink| {
-            let wiring = sinks::wiring(&declared, &units, time);
+            let wiring = sinks::wiring(&declared, &units, &model.plan);
             OpenSink::open(declared, wiring, &folder)
         };
         let sinks: Result<Vec<_>, _> = sinks.into_iter().map(open).collect();
@@ -286,6 +285,7 @@ impl Service {
         let open = sources::open(
             sources,
             model,
+            folder.path(),
             (&feed, &stamps),
             (engine_thread.thread(), &progress),
         )?;

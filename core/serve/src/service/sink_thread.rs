@@ -39,8 +39,7 @@ pub(super) struct SinkThread {
     pub(super) progress: Arc<Progress>,
     pub(super) stop: Stop,
     pub(super) events: Sender<ServiceEvent>,
-    /// Whether what it did last failed.
-    pub(super) has_failed: bool,
+    pub(super) health: Health,
     /// What keeps its position, on a disk that may hang.
     pub(super) keeping: Aside<()>,
 }
@@ -57,13 +56,15 @@ impl SinkThread {
                 };
                 happenings = Some(put);
                 is_dirty = true;
+                self.look();
                 continue;
             }
             if is_dirty {
                 let flushed = guarded(|| self.outlet.flush());
                 is_dirty = flushed.is_err();
-                self.report(flushed);
+                self.health.report(&self.name, &self.events, flushed);
             }
+            self.look();
             let is_over = self.frames.is_over();
             if (is_over || kept.elapsed() >= every)
                 && let Some(happenings) = happenings.take()
@@ -110,7 +111,7 @@ impl SinkThread {
                 let put = guarded(|| self.outlet.put(&row));
                 self.counts.count(&put);
                 gate.is_put(put.is_ok());
-                self.report(put);
+                self.health.report(&self.name, &self.events, put);
             }
             return Some(happenings);
         }
@@ -118,7 +119,7 @@ impl SinkThread {
             let put = guarded(|| self.outlet.put(&row));
             let is_put = put.is_ok();
             self.counts.count(&put);
-            report(&self.name, &mut self.has_failed, &self.events, put);
+            self.health.report(&self.name, &self.events, put);
             if is_put {
                 return Some(happenings);
             }
@@ -128,8 +129,12 @@ impl SinkThread {
         }
     }
 
-    fn report(&mut self, done: Result<(), ConnectorError>) {
-        report(&self.name, &mut self.has_failed, &self.events, done);
+    /// Asks whether what was taken can leave.
+    fn look(&mut self) {
+        if !self.is_dry {
+            let state = guarded(|| self.outlet.state());
+            self.health.look(&self.name, &self.events, state);
+        }
     }
 
     /// Keeps how far the sink is. Where that fails it is tried again; what is kept is always true.
@@ -158,21 +163,46 @@ impl SinkThread {
     }
 }
 
-/// Reports the first failure, and the first success after one.
-fn report(
-    name: &str,
-    has_failed: &mut bool,
-    events: &Sender<ServiceEvent>,
-    done: Result<(), ConnectorError>,
-) {
-    let sink = name.to_owned();
-    let event = match (done, *has_failed) {
-        (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
-        (Ok(()), true) => ServiceEvent::SinkBack { sink },
-        _ => return,
-    };
-    *has_failed = !*has_failed;
-    let _ = events.send(event);
+/// Whether a sink works.
+#[derive(Debug, Default)]
+pub(super) struct Health {
+    /// Whether what it did last failed.
+    has_failed: bool,
+    /// Whether it takes rows that cannot leave.
+    is_held: bool,
+}
+
+impl Health {
+    /// What was taken can leave, or cannot.
+    fn look(
+        &mut self,
+        name: &str,
+        events: &Sender<ServiceEvent>,
+        state: Result<(), ConnectorError>,
+    ) {
+        let is_held = state.is_err();
+        if std::mem::take(&mut self.is_held) || is_held {
+            self.report(name, events, state);
+            self.is_held = is_held;
+        }
+    }
+
+    /// Reports the first failure, and the first success after one. That a row was taken is no news where none can leave.
+    fn report(
+        &mut self,
+        name: &str,
+        events: &Sender<ServiceEvent>,
+        done: Result<(), ConnectorError>,
+    ) {
+        let sink = name.to_owned();
+        let event = match (done, self.has_failed) {
+            (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
+            (Ok(()), true) if !self.is_held => ServiceEvent::SinkBack { sink },
+            _ => return,
+        };
+        self.has_failed = !self.has_failed;
+        let _ = events.send(event);
+    }
 }
 
 fn guarded(work: impl FnOnce() -> Result<(), ConnectorError>) -> Result<(), ConnectorError> {

@@ -8,7 +8,7 @@ use super::command::CommandGate;
 use super::engine_thread::Sinks;
 use super::frames::{FrameReceiver, SinkCounts, frames};
 use super::position::{Position, PositionFile};
-use super::sink_thread::SinkThread;
+use super::sink_thread::{Health, SinkThread};
 use super::{ServiceError, ServiceEvent, spawn};
 use crate::aside::Aside;
 use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
@@ -123,7 +123,10 @@ impl OpenSink {
         {
             kept.cut(of.end, self.again).map_err(failed)?;
         }
-        let end = kept.end().map_err(failed)?;
+        // Where rows are still on their way the place that was kept before holds.
+        let Ok(end) = kept.end() else {
+            return Ok(());
+        };
         let position = Position {
             end,
             happenings,
@@ -141,7 +144,7 @@ impl OpenSink {
 pub(super) fn wiring(
     declared: &DeclaredSink,
     outputs: &[WiredOutput],
-    time: &crate::document::TimeBase,
+    plan: &crate::compile::Plan,
 ) -> SinkWiring {
     let of = |name: &String| {
         let known = outputs.iter().find(|of| of.name == *name);
@@ -152,9 +155,10 @@ pub(super) fn wiring(
     };
     SinkWiring {
         name: declared.name.clone(),
+        machine: plan.name.clone(),
         folder: declared.folder.clone(),
         outputs: declared.outputs.iter().map(of).collect(),
-        time: time.clone(),
+        time: plan.time.clone(),
     }
 }
 
@@ -208,7 +212,7 @@ impl OpenSink {
             progress: Arc::clone(progress),
             stop: stop.clone(),
             events: events.clone(),
-            has_failed: false,
+            health: Health::default(),
             keeping: Aside::default(),
         }
     }

@@ -1,5 +1,6 @@
 //! The sources of a service at its start: opened, and linked to the engine thread.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::Thread;
@@ -10,11 +11,10 @@ use athermal_run::model::Model;
 use super::source_thread::SourceThread;
 use super::watch::Watch;
 use super::{ServiceError, wait};
-use crate::connector::{Remarks, SourceCounts, SourceLink, SourceWiring, Stop, WiredChannel, link};
+use crate::connector::{Remarks, SourceCounts, SourceLink, Stop, link};
 use crate::deployment::DeclaredSource;
 use crate::journal::Progress;
 use crate::time::Instant;
-use crate::unit::Unit;
 
 /// How many arrivals of a source may wait for the engine thread.
 const ARRIVALS: usize = 1 << 14;
@@ -33,6 +33,7 @@ pub(super) struct OpenSources {
 pub(super) fn open(
     sources: Vec<DeclaredSource>,
     model: &Model,
+    state: &Path,
     (feed, stamps): (&[Feed], &[Instant]),
     (engine, progress): (&Thread, &Arc<Progress>),
 ) -> Result<OpenSources, ServiceError> {
@@ -47,27 +48,22 @@ pub(super) fn open(
     let place = |name: &str| feed.iter().position(|of| of.name == name);
     let plan = &model.plan;
     for source in sources {
-        let unit = |name: &str| {
-            let mut channels = plan.sources.iter().zip(&plan.channels);
-            let found = channels.find(|(of, _)| of.name == name);
-            found.map_or_else(Unit::one, |(_, of)| of.channel.unit.clone())
-        };
+        let mut wiring = source.wiring(plan, state.join("sources").join(&source.name));
         // Each channel of a source is one of the feed.
-        let wired = source.channels.into_iter().filter_map(|of| {
-            let place = place(&of.channel.name)?;
-            let channel = WiredChannel {
-                unit: unit(&of.channel.name),
-                channel: of.channel,
-                address: of.address,
-                conversion: of.conversion,
-                after: stamps[place],
-            };
-            Some((channel, place as u32))
-        });
-        let (wired, places): (Vec<_>, Vec<_>) = wired.unzip();
+        wiring
+            .channels
+            .retain(|of| place(&of.channel.name).is_some());
+        let places = wiring
+            .channels
+            .iter()
+            .filter_map(|of| place(&of.channel.name));
+        let places: Vec<_> = places.map(|place| place as u32).collect();
+        for (of, place) in wiring.channels.iter_mut().zip(&places) {
+            of.after = stamps[*place as usize];
+        }
         let (outflow, link) = link(
             ARRIVALS,
-            &wired,
+            &wiring.channels,
             &places,
             source.parameters.stamps(),
             (
@@ -76,13 +72,6 @@ pub(super) fn open(
                 Remarks::new(&source.name, &tell),
             ),
         );
-        let wiring = SourceWiring {
-            name: source.name.clone(),
-            folder: source.folder,
-            channels: wired,
-            time: plan.time.clone(),
-            table: plan.table.clone(),
-        };
         let inlet = source.parameters.open(wiring);
         let inlet = inlet.map_err(|error| ServiceError::Source {
             source: source.name.clone(),

@@ -33,6 +33,7 @@ fn allocations(rows: usize) -> (u64, u64) {
     let sequencer = Sequencer::new(rules, clock.now());
     let (stepper, mut control) = pair(&model, LiveOptions::default()).unwrap();
     let wired = model.plan.sources.iter().map(|of| WiredChannel {
+        mapped: None,
         unit: crate::unit::Unit::kelvin(),
         address: of.column.clone(),
         channel: of.clone(),

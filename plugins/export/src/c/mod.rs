@@ -51,12 +51,17 @@ pub fn files(form: &Form, ticks: &Ticks, float: bool) -> Vec<File> {
 /// When one cannot be written.
 pub fn write(files: &[File], folder: &Path) -> Result<(), ExportError> {
     for file in files {
-        let path = folder.join(&file.path);
-        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-        let written = made.and_then(|()| std::fs::write(&path, &file.text));
-        written.map_err(|source| ExportError::Write { path, source })?;
+        write_bytes(folder, &file.path, file.text.as_bytes())?;
     }
     Ok(())
+}
+
+/// Writes a file into a folder, which is made.
+pub(crate) fn write_bytes(folder: &Path, path: &str, bytes: &[u8]) -> Result<(), ExportError> {
+    let path = folder.join(path);
+    let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    let written = made.and_then(|()| std::fs::write(&path, bytes));
+    written.map_err(|source| ExportError::Write { path, source })
 }
 
 /// The largest error of single precision in the self test of an exported folder, in units of the largest size of the output; none

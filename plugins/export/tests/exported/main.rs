@@ -3,6 +3,8 @@
 // Shared functions of tests are none of `cfg(test)`.
 #![allow(clippy::unwrap_used)]
 
+mod command;
+mod onnx;
 mod processors;
 mod random;
 mod refusals;

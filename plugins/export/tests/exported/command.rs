@@ -1,0 +1,107 @@
+//! The command: what it writes, what it says, and states that go over to C and back.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use athermal_command::terminal::Options;
+use athermal_command::{Failure, Terminal};
+use athermal_core::engine::Engine;
+use athermal_core::prng::Prng;
+use athermal_run::model::Model;
+
+use crate::random::{events, graph};
+use crate::support::{Scratch, made_up, stepped};
+
+fn export(words: &[&str]) -> Result<(), String> {
+    let kind = athermal_command::kind("export").unwrap();
+    let matches = (kind.declare)().try_get_matches_from(["export"].iter().chain(words));
+    let matches = matches.map_err(|error| error.to_string())?;
+    let terminal = Terminal::new(&Options {
+        format: "table".to_owned(),
+        quiet: true,
+    });
+    match (kind.run)(&matches, &terminal) {
+        Ok(_) => Ok(()),
+        Err(Failure::Request(text) | Failure::Outside(text)) => Err(text),
+        Err(other) => panic!("{other:?}"),
+    }
+}
+
+/// A model of a random graph with a fit that is made up.
+fn model(path: &Path) -> Model {
+    let mut random = Prng::stream(11, "an exported graph");
+    let graph_file = path.with_extension("toml");
+    std::fs::write(&graph_file, graph(&mut random)).unwrap();
+    let mut model = Model::load(&graph_file).unwrap();
+    model.fitted = made_up(&model.plan, &mut random);
+    std::fs::write(path, model.to_text().unwrap()).unwrap();
+    model
+}
+
+#[test]
+fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
+    let scratch = Scratch::new("command");
+    let (path, folder) = (scratch.path("model.json"), scratch.path("out"));
+    let model = model(&path);
+    let words = |more: &[&str]| -> Vec<String> {
+        let first = ["c", path.to_str().unwrap(), "-o", folder.to_str().unwrap()];
+        first
+            .iter()
+            .chain(more)
+            .map(|&word| word.to_owned())
+            .collect()
+    };
+    let run = |more: &[&str]| {
+        let words = words(more);
+        export(&words.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    run(&["--rate", "240ms", "--rate", "position=480ms"]).unwrap();
+    let files = [
+        "athermal_rt.h",
+        "athermal_rt.c",
+        "random_graph.h",
+        "random_graph.c",
+        "Makefile",
+        "CMakeLists.txt",
+        "README.md",
+        "example/main.c",
+    ];
+    assert!(files.iter().all(|file| folder.join(file).exists()));
+    let readme = std::fs::read_to_string(folder.join("README.md")).unwrap();
+    assert!(!readme.contains("@name@") && !readme.contains("@rows@"));
+    assert!(
+        readme.contains("| `position.X` | nm | 0.48 s |"),
+        "{readme}"
+    );
+
+    let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
+    let names: Vec<String> = model
+        .plan
+        .sources
+        .iter()
+        .map(|of| of.name.clone())
+        .collect();
+    let events = events(&mut Prng::stream(12, "events"), &names, 2_000);
+    stepped(&mut engine, &events[..1_500]);
+    let state = scratch.path("machine.state");
+    std::fs::write(&state, engine.snapshot()).unwrap();
+    run(&["--rate", "240ms", "--state", state.to_str().unwrap()]).unwrap();
+    let of_c = folder.join("random_graph.state");
+    run(&["--rate", "240ms", "--state-back", of_c.to_str().unwrap()]).unwrap();
+    let mut other = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
+    other
+        .restore(&std::fs::read(folder.join("run.state")).unwrap())
+        .unwrap();
+    assert_eq!(
+        stepped(&mut other, &events[1_500..]),
+        stepped(&mut engine, &events[1_500..])
+    );
+
+    let error = run(&["--rate", "fast"]).unwrap_err();
+    assert!(error.contains("--rate fast"), "{error}");
+    let error = run(&["--rate", "nothing=1s"]).unwrap_err();
+    assert!(error.contains("no signal `nothing`"), "{error}");
+    // Room for another rate is another state.
+    let error = run(&["--rate", "1s", "--state-back", of_c.to_str().unwrap()]).unwrap_err();
+    assert!(error.contains("another length"), "{error}");
+}

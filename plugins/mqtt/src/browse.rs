@@ -1,0 +1,408 @@
+//! `athermal browse mqtt://…`: listens to a broker for a while, and writes the `messages` that a source would take.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::time::Duration as Wait;
+
+use athermal_command::{Answer, Command, Failure, Terminal, print};
+use athermal_core::time::Duration;
+use athermal_core::unit::Unit;
+use clap::Args;
+use serde_json::Value;
+
+use crate::broker::{Broker, Version, keep_alive};
+use crate::client::Settings;
+use crate::listen::{Heard, listen};
+
+/// Listen to a broker, and write the source that takes what it publishes
+///
+/// Subscribes to all topics for a while and prints a `[sources.NAME]` table: the topics, where their values and times stand, and units as
+/// far as names say them. Rename its channels, and leave out what you do not need. Nothing on the broker is changed.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  athermal browse mqtt://localhost\n  athermal browse mqtt://plant:1883 --topic 'line7/#' --for 1min"
+)]
+pub struct Browse {
+    /// The broker: mqtt://HOST, or mqtt://HOST:PORT
+    broker: Broker,
+    /// How long to listen
+    #[arg(long = "for", value_name = "DURATION", default_value = "10s")]
+    patience: Duration,
+    /// The topics to listen to
+    #[arg(long, value_name = "TOPIC", default_value = "#")]
+    topic: String,
+    /// The user to log in as
+    #[arg(long, value_name = "NAME", requires = "password_file")]
+    user: Option<String>,
+    /// A file with the password
+    #[arg(long, value_name = "FILE", requires = "user")]
+    password_file: Option<PathBuf>,
+    /// A file of certificates that the broker's own is judged by
+    #[arg(long, value_name = "FILE")]
+    authorities: Option<PathBuf>,
+}
+
+athermal_command::register_command!(Browse, "browse");
+
+impl Command for Browse {
+    fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let mut broker = self.broker.clone();
+        broker.authorities.clone_from(&self.authorities);
+        let login = match (&self.user, &self.password_file) {
+            (Some(user), Some(path)) => {
+                let read = std::fs::read_to_string(path);
+                let failed =
+                    |error| Failure::Outside(format!("cannot read {}: {error}", path.display()));
+                Some((user.clone(), read.map_err(failed)?.trim().to_owned()))
+            }
+            _ => None,
+        };
+        let settings = Settings {
+            broker,
+            version: Version::Five,
+            client_id: "athermal-browse".to_owned(),
+            login,
+            keep_alive: Wait::from_secs(keep_alive().secs() as u64),
+            receive_maximum: 500,
+            keeps_session: false,
+            last_will: None,
+        };
+        let mut topics = BTreeMap::new();
+        let patience = Wait::from_secs_f64(self.patience.secs().max(0.1));
+        let mut refused = None;
+        let ended = listen(
+            settings,
+            std::slice::from_ref(&self.topic),
+            patience,
+            |heard| {
+                match heard {
+                    Heard::Refused(_, why) => refused = Some(why),
+                    Heard::Message(message) => {
+                        topics.insert(message.topic, message.payload);
+                    }
+                }
+                refused.is_some()
+            },
+        );
+        ended.map_err(|why| Failure::Outside(format!("{}: {why}", self.broker)))?;
+        if let Some(why) = refused {
+            return Err(Failure::Outside(format!(
+                "{} refuses `{}`: {why}",
+                self.broker, self.topic
+            )));
+        }
+        if topics.is_empty() {
+            terminal.warning(format_args!(
+                "nothing came under `{}` in {}: listen for longer, as with `--for 1min`",
+                self.topic, self.patience
+            ));
+            return Ok(Answer::No);
+        }
+        print!("{}", table(&self.broker, &topics));
+        terminal.note(format_args!(
+            "{} topics in {}; next: name the channels as your graph does, then `athermal check --live FILE`",
+            topics.len(),
+            self.patience
+        ));
+        Ok(Answer::Fine)
+    }
+}
+
+/// Names of times, and of qualities.
+const TIMES: [&str; 8] = [
+    "time",
+    "timestamp",
+    "ts",
+    "t",
+    "datetime",
+    "date",
+    "sourcetimestamp",
+    "time_ms",
+];
+const QUALITIES: [&str; 3] = ["quality", "q", "status"];
+const VALUES: [&str; 4] = ["value", "v", "val", "y"];
+const NAMES: [&str; 4] = ["id", "name", "tag", "n"];
+
+/// The table of a source.
+fn table(broker: &Broker, topics: &BTreeMap<String, Vec<u8>>) -> String {
+    let mut text = format!(
+        "[sources.line]\ntype = \"mqtt\"\nbroker = {}\nmessages = [\n",
+        quoted(&broker.to_string())
+    );
+    let mut names = BTreeSet::new();
+    for (topic, payload) in topics {
+        match message(topic, payload, &mut names) {
+            Ok(line) => text += &format!("  {line},\n"),
+            Err(why) => text += &format!("  # {}: {why}\n", topic.escape_debug()),
+        }
+    }
+    text + "]\n"
+}
+
+/// A text as TOML writes it.
+fn quoted(text: &str) -> String {
+    Value::from(text).to_string()
+}
+
+fn message(
+    topic: &str,
+    payload: &[u8],
+    names: &mut BTreeSet<String>,
+) -> Result<String, &'static str> {
+    if topic.starts_with('$') {
+        return Err("of the broker itself");
+    }
+    let text = std::str::from_utf8(payload).map_err(|_| "no text")?;
+    let head = format!("{{ topic = {}", quoted(topic));
+    if text.trim().parse::<f64>().is_ok_and(f64::is_finite) {
+        let channel = channel(topic, topic.rsplit('/').next().unwrap_or(topic), names);
+        return Ok(format!("{head}, time = \"arrival\", {channel} }}"));
+    }
+    let value: Value = serde_json::from_str(text).map_err(|_| "neither a number nor JSON")?;
+    if let Some(line) = list(&value, &head, topic, names) {
+        return Ok(line);
+    }
+    let Value::Object(fields) = &value else {
+        return Err("no object with values");
+    };
+    let mut leaves = Vec::new();
+    collect(&value, "", &mut leaves);
+    let time = time_of(&leaves);
+    let quality = leaves.iter().find(|(at, _)| is(at, &QUALITIES));
+    let numbers: Vec<_> = leaves
+        .iter()
+        .filter(|(at, value)| value.is_number() && !is(at, &TIMES) && !is(at, &QUALITIES))
+        .collect();
+    let quality = quality.map_or(String::new(), |(at, good)| {
+        format!(", quality = {{ at = {}, good = [{good}] }}", quoted(at))
+    });
+    let middle = format!("{head}{time}{quality}");
+    match numbers.as_slice() {
+        [] => Err("it has no numbers"),
+        [(at, _)] if is(at, &VALUES) || fields.len() == 1 => {
+            let last = topic.rsplit('/').next().unwrap_or(topic);
+            let unit = fields
+                .iter()
+                .find(|(key, _)| key.eq_ignore_ascii_case("unit"));
+            let unit = unit.and_then(|(_, unit)| Unit::in_name(unit.as_str()?));
+            let channel = channel_of(last, unit, names);
+            Ok(format!("{middle}, value = {}, {channel} }}", quoted(at)))
+        }
+        several => {
+            let of = several.iter().map(|(at, _)| {
+                let last = at.rsplit('/').next().unwrap_or(at);
+                entry(at, last, names)
+            });
+            let of: Vec<_> = of.collect();
+            Ok(format!("{middle}, channels = {{ {} }} }}", of.join(", ")))
+        }
+    }
+}
+
+/// A list of objects with a name and a value each.
+fn list(value: &Value, head: &str, topic: &str, names: &mut BTreeSet<String>) -> Option<String> {
+    let (at, items) = match value {
+        Value::Array(items) => (String::new(), items),
+        Value::Object(fields) => fields
+            .iter()
+            .find_map(|(key, of)| Some((format!("/{key}"), of.as_array()?)))?,
+        _ => return None,
+    };
+    let first = items.first()?.as_object()?;
+    let key = |known: &[&str]| {
+        let found = first.keys().find(|key| is(key, known))?;
+        Some(format!("/{found}"))
+    };
+    let (name, inner) = (key(&NAMES)?, key(&VALUES)?);
+    let mut leaves = Vec::new();
+    collect(items.first()?, "", &mut leaves);
+    if time_of(&leaves).is_empty() {
+        collect(value, "", &mut leaves);
+    }
+    let time = time_of(&leaves);
+    let quality = leaves.iter().find(|(at, _)| is(at, &QUALITIES));
+    let quality = quality.map_or(String::new(), |(at, good)| {
+        format!(", quality = {{ at = {}, good = [{good}] }}", quoted(at))
+    });
+    let _ = topic;
+    let tags: BTreeSet<_> = items
+        .iter()
+        .filter_map(|of| of.pointer(&name)?.as_str())
+        .collect();
+    let entries: Vec<_> = tags
+        .into_iter()
+        .map(|tag| entry(tag, tag.rsplit(['.', '/']).next().unwrap_or(tag), names))
+        .collect();
+    Some(format!(
+        "{head}, each = {}, name = {}, value = {}{time}{quality}, channels = {{ {} }} }}",
+        quoted(&at),
+        quoted(&name),
+        quoted(&inner),
+        entries.join(", ")
+    ))
+}
+
+/// The values of an object with their pointers.
+fn collect<'a>(value: &'a Value, at: &str, into: &mut Vec<(String, &'a Value)>) {
+    match value {
+        Value::Object(fields) => {
+            for (key, of) in fields {
+                let key = key.replace('~', "~0").replace('/', "~1");
+                collect(of, &format!("{at}/{key}"), into);
+            }
+        }
+        Value::Array(_) => {}
+        leaf => into.push((at.to_owned(), leaf)),
+    }
+}
+
+fn is(at: &str, known: &[&str]) -> bool {
+    let last = at.rsplit('/').next().unwrap_or(at).to_lowercase();
+    known.contains(&last.as_str())
+}
+
+/// The time among values, with the unit that its size says.
+fn time_of(leaves: &[(String, &Value)]) -> String {
+    let Some((at, value)) = leaves.iter().find(|(at, _)| is(at, &TIMES)) else {
+        return String::new();
+    };
+    let unit = value.as_f64().map(|value| match value {
+        ..1e11 => "s",
+        ..1e14 => "ms",
+        ..1e17 => "us",
+        _ => "ns",
+    });
+    let unit = unit.map_or(String::new(), |unit| format!(", unit = \"{unit}\""));
+    format!(", time = {{ at = {}{unit} }}", quoted(at))
+}
+
+/// A channel, and its unit where its name says so.
+fn channel(topic: &str, last: &str, names: &mut BTreeSet<String>) -> String {
+    let _ = topic;
+    channel_of(last, unit_in(last), names)
+}
+
+fn channel_of(last: &str, unit: Option<Unit>, names: &mut BTreeSet<String>) -> String {
+    let unit = unit.or_else(|| unit_in(last));
+    let shown = unit.as_ref().map_or(String::new(), |unit| {
+        format!(", unit = {}", quoted(unit.text()))
+    });
+    format!(
+        "channel = {}{shown}",
+        quoted(&name_of(last, unit.as_ref(), names))
+    )
+}
+
+fn entry(key: &str, last: &str, names: &mut BTreeSet<String>) -> String {
+    let unit = unit_in(last);
+    let name = quoted(&name_of(last, unit.as_ref(), names));
+    match unit {
+        Some(unit) => format!(
+            "{} = {{ channel = {name}, unit = {} }}",
+            quoted(key),
+            quoted(unit.text())
+        ),
+        None => format!("{} = {name}", quoted(key)),
+    }
+}
+
+/// The unit that the last word of a name is.
+fn unit_in(name: &str) -> Option<Unit> {
+    let words: Vec<_> = name
+        .split(['_', ' ', '[', ']', '(', ')'])
+        .filter(|of| !of.is_empty())
+        .collect();
+    let last = words.last().filter(|_| words.len() > 1)?;
+    Unit::in_name(last)
+}
+
+/// The name of a channel: what it measures, if its unit says so, and what it is called.
+fn name_of(last: &str, unit: Option<&Unit>, names: &mut BTreeSet<String>) -> String {
+    let measures =
+        |of: &str| unit.is_some_and(|unit| Unit::parse(of).is_ok_and(|of| unit.measures_same(&of)));
+    let signal = if measures("Cel") {
+        "temperature"
+    } else if measures("nm") {
+        "position"
+    } else {
+        "value"
+    };
+    let kept = last.chars().map(|of| {
+        if of.is_ascii_alphanumeric() || of == '_' {
+            of
+        } else {
+            '_'
+        }
+    });
+    let mut name: String = kept.collect();
+    if let Some((before, _)) = name
+        .rsplit_once('_')
+        .filter(|_| unit.is_some() && unit_in(last).is_some())
+    {
+        name = before.to_owned();
+    }
+    let mut full = format!("{signal}.{name}");
+    let mut number = 2;
+    while !names.insert(full.clone()) {
+        full = format!("{signal}.{name}{number}");
+        number += 1;
+    }
+    full
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(topics: &[(&str, &str)]) -> Vec<String> {
+        let topics = topics
+            .iter()
+            .map(|(topic, payload)| ((*topic).to_owned(), payload.as_bytes().to_vec()))
+            .collect();
+        let text = table(&"mqtt://plant".parse().unwrap(), &topics);
+        text.lines()
+            .skip(4)
+            .map(|line| line.trim().to_owned())
+            .collect()
+    }
+
+    #[test]
+    fn what_a_message_says_decides_where_its_values_stand() {
+        let lines = written(&[
+            ("a/plate_degC", "21.5"),
+            (
+                "b/room",
+                r#"{"timestamp": 1764279677123, "value": 21.5, "unit": "degC", "q": 192}"#,
+            ),
+            (
+                "c/all",
+                r#"{"time": "2025-11-27T21:41:17Z", "T": {"x_degC": 1, "y_degC": 2}, "Z_nm": 3}"#,
+            ),
+            (
+                "d/kepware",
+                r#"{"values": [{"id": "Ch1.Room", "v": 1, "t": 1764279677123, "q": 192}]}"#,
+            ),
+            ("e/text", "on"),
+        ]);
+        assert_eq!(
+            lines,
+            [
+                r#"{ topic = "a/plate_degC", time = "arrival", channel = "temperature.plate", unit = "Cel" },"#,
+                r#"{ topic = "b/room", time = { at = "/timestamp", unit = "ms" }, quality = { at = "/q", good = [192] }, value = "/value", channel = "temperature.room", unit = "Cel" },"#,
+                r#"{ topic = "c/all", time = { at = "/time" }, channels = { "/T/x_degC" = { channel = "temperature.x", unit = "Cel" }, "/T/y_degC" = { channel = "temperature.y", unit = "Cel" }, "/Z_nm" = { channel = "position.Z", unit = "nm" } } },"#,
+                r#"{ topic = "d/kepware", each = "/values", name = "/id", value = "/v", time = { at = "/t", unit = "ms" }, quality = { at = "/q", good = [192] }, channels = { "Ch1.Room" = "value.Room" } },"#,
+                "# e/text: neither a number nor JSON",
+                "]",
+            ]
+        );
+    }
+
+    #[test]
+    fn two_topics_of_one_name_have_two_channels() {
+        let lines = written(&[("a/T", "1"), ("b/T", "2")]);
+        assert!(
+            lines[0].contains("\"value.T\"") && lines[1].contains("\"value.T2\""),
+            "{lines:?}"
+        );
+    }
+}

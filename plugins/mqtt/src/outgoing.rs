@@ -1,0 +1,145 @@
+//! Outputs as messages: what is published under which topic.
+
+use athermal_serve::connector::{OutRow, WiredOutput};
+use serde_json::{Map, Value, json};
+
+use crate::session::shown;
+
+/// A message on its way to a broker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outgoing {
+    /// Its topic.
+    pub topic: String,
+    /// What it says.
+    pub payload: Vec<u8>,
+}
+
+/// How outputs become messages.
+#[derive(Debug)]
+pub struct Form {
+    /// A topic for each output, or one for all.
+    topics: Vec<String>,
+    outputs: Vec<WiredOutput>,
+    /// Whether an absent output is a message too.
+    has_absent: bool,
+}
+
+impl Form {
+    /// With `{output}` in the topic there is one for each output; otherwise a tick is one message.
+    pub fn new(topic: &str, outputs: Vec<WiredOutput>, has_absent: bool) -> Self {
+        let topics = match topic.contains("{output}") {
+            true => outputs.iter().map(|of| topic_of(topic, &of.name)).collect(),
+            false => vec![topic.to_owned()],
+        };
+        Self {
+            topics,
+            outputs,
+            has_absent,
+        }
+    }
+
+    /// The messages of a tick.
+    pub fn messages(&self, row: &OutRow<'_>, into: &mut Vec<Outgoing>) {
+        let facts = json!({
+            "time": shown(row.at),
+            "time_ns": row.at.as_ns(),
+            "behind_s": row.behind.secs(),
+            "revision": format!("{:016x}", row.revision),
+        });
+        let Value::Object(facts) = facts else { return };
+        let outputs = self.outputs.iter().zip(row.outputs);
+        if self.topics.len() == 1 && self.outputs.len() != 1 {
+            let (mut values, mut units) = (Map::new(), Map::new());
+            for (of, value) in outputs {
+                // What is not there is null, never zero.
+                values.insert(of.name.clone(), json!(value));
+                units.insert(of.name.clone(), json!(of.unit));
+            }
+            let mut message = facts;
+            message.insert("values".to_owned(), values.into());
+            message.insert("units".to_owned(), units.into());
+            into.push(outgoing(&self.topics[0], message));
+            return;
+        }
+        for ((of, value), topic) in outputs.zip(&self.topics) {
+            if value.is_nan() && !self.has_absent {
+                continue;
+            }
+            let mut message = Map::from_iter([
+                ("output".to_owned(), json!(of.name)),
+                ("value".to_owned(), json!(value)),
+                ("unit".to_owned(), json!(of.unit)),
+            ]);
+            message.extend(facts.clone());
+            into.push(outgoing(topic, message));
+        }
+    }
+}
+
+fn outgoing(topic: &str, message: Map<String, Value>) -> Outgoing {
+    Outgoing {
+        topic: topic.to_owned(),
+        payload: Value::Object(message).to_string().into_bytes(),
+    }
+}
+
+/// The topic of an output. A name that would be several levels, or none, has `_` in their place.
+fn topic_of(topic: &str, output: &str) -> String {
+    topic.replace("{output}", &output.replace(['/', '+', '#', '\0'], "_"))
+}
+
+#[cfg(test)]
+mod tests {
+    use athermal_core::time::{Duration, Instant};
+
+    use super::*;
+
+    fn messages(topic: &str, outputs: &[(&str, f64)], has_absent: bool) -> Vec<(String, Value)> {
+        let wired = outputs.iter().map(|(name, _)| WiredOutput {
+            name: (*name).to_owned(),
+            unit: Some("nm".to_owned()),
+        });
+        let values: Vec<_> = outputs.iter().map(|(_, value)| *value).collect();
+        let mut all = Vec::new();
+        let form = Form::new(topic, wired.collect(), has_absent);
+        let row = OutRow {
+            at: Instant::from_ns(1_500_000_000),
+            is_beat: false,
+            behind: Duration::from_ns(250_000_000),
+            revision: 0xab,
+            outputs: &values,
+        };
+        form.messages(&row, &mut all);
+        let read = |of: Outgoing| (of.topic, serde_json::from_slice(&of.payload).unwrap());
+        all.into_iter().map(read).collect()
+    }
+
+    #[test]
+    fn each_output_has_a_topic_with_its_value_unit_time_and_revision() {
+        let all = messages("dt/{output}", &[("c.X", 1.5), ("c/Y", -2.0)], true);
+        let expected = json!({
+            "output": "c.X", "value": 1.5, "unit": "nm", "time": "1970-01-01T00:00:01.5Z",
+            "time_ns": 1_500_000_000_i64, "behind_s": 0.25, "revision": "00000000000000ab",
+        });
+        assert_eq!(all[0], ("dt/c.X".to_owned(), expected));
+        assert_eq!(all[1].0, "dt/c_Y");
+    }
+
+    #[test]
+    fn a_tick_is_one_message_where_the_topic_names_no_output() {
+        let all = messages("dt/tick", &[("a", 1.0), ("b", f64::NAN)], true);
+        assert_eq!(all.len(), 1);
+        assert_eq!(all[0].1["values"], json!({ "a": 1.0, "b": null }));
+        assert_eq!(all[0].1["units"], json!({ "a": "nm", "b": "nm" }));
+    }
+
+    #[test]
+    fn an_output_that_is_absent_is_null_in_a_log_and_no_command() {
+        let outputs = [("a", 1.0), ("b", f64::NAN)];
+        assert_eq!(
+            messages("dt/{output}", &outputs, true)[1].1["value"],
+            Value::Null
+        );
+        assert_eq!(messages("dt/{output}", &outputs, false).len(), 1);
+    }
+}

@@ -1,0 +1,186 @@
+//! Broker and service are killed at random instants: nothing is lost, and the outputs are those of an undisturbed run, to the bit.
+
+use std::fs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use athermal_core::prng::Prng;
+
+use crate::peer::publish_all;
+use crate::server::{Broker, Folder, SAFE};
+use crate::service::{Process, TOGETHER, both, history, machine};
+
+const PACE: Duration = Duration::from_millis(10);
+
+fn messages(count: u64) -> Vec<(String, String)> {
+    (0..count)
+        .map(|nth| ("plant/all".to_owned(), both(10 * nth)))
+        .collect()
+}
+
+/// Who is killed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Victim {
+    Broker,
+    Service,
+    Either,
+}
+
+struct Run {
+    history: Vec<String>,
+    events: String,
+}
+
+/// Publishes so many messages while somebody is killed so many times.
+fn run(
+    broker: &mut Broker,
+    source: &str,
+    count: u64,
+    kills: usize,
+    victim: Victim,
+    seed: u64,
+) -> Run {
+    let folder = Folder::new("kills");
+    // A backlog after an outage is in order: the last before it, again, and those behind.
+    let text = machine(broker.port, source, "").replace("wait = \"20 ms\"", "wait = \"0 ms\"");
+    fs::write(folder.0.join("machine.toml"), text).unwrap();
+    let mut service = Process::start(&folder);
+    // The first connection makes the session; what is published before it is nobody's.
+    let began = Instant::now();
+    while !folder
+        .0
+        .join("state/sources/line/subscriptions.json")
+        .exists()
+    {
+        assert!(
+            began.elapsed() < Duration::from_secs(30),
+            "it does not connect"
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    let (published, stop) = (
+        Arc::new(AtomicU64::new(0)),
+        Arc::new(AtomicBool::new(false)),
+    );
+    let publisher = {
+        let (published, stop, port) = (Arc::clone(&published), Arc::clone(&stop), broker.port);
+        std::thread::spawn(move || publish_all(port, &messages(count), PACE, &published, &stop))
+    };
+    let mut prng = Prng::stream(seed, "kills");
+    for nth in 0..kills {
+        std::thread::sleep(Duration::from_millis(
+            400 + (prng.uniform() * 1200.0) as u64,
+        ));
+        let is_broker = match victim {
+            Victim::Broker => true,
+            Victim::Service => false,
+            Victim::Either => nth % 2 == 0,
+        };
+        if is_broker {
+            broker.kill();
+            std::thread::sleep(Duration::from_millis((prng.uniform() * 300.0) as u64));
+            broker.start();
+        } else {
+            service.kill();
+            std::thread::sleep(Duration::from_millis((prng.uniform() * 300.0) as u64));
+            service = Process::start(&folder);
+        }
+    }
+    let began = Instant::now();
+    let expected = count as usize;
+    while history(&folder).len() < expected && began.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    stop.store(true, Ordering::Relaxed);
+    publisher.join().unwrap();
+    service.stop(&folder);
+    Run {
+        history: history(&folder),
+        events: crate::server::read(&folder.0.join("events")),
+    }
+}
+
+/// Compares a run with one that nobody disturbed.
+fn nothing_is_lost(mut broker: Broker, source: &str, count: u64, kills: usize, victim: Victim) {
+    let undisturbed = run(&mut broker, source, count, 0, victim, 0);
+    assert_eq!(
+        undisturbed.history.len() as u64,
+        count,
+        "{}",
+        undisturbed.events
+    );
+    broker.kill();
+    broker.forget();
+    broker.start();
+    let disturbed = run(&mut broker, source, count, kills, victim, 1);
+    let (found, expected) = (&disturbed.history, &undisturbed.history);
+    if let Some(place) = (0..expected.len()).find(|&nth| found.get(nth) != Some(&expected[nth])) {
+        panic!(
+            "row {place} of {}: {:?} is not {:?}; {} rows came\n{}",
+            expected.len(),
+            found.get(place),
+            expected[place],
+            found.len(),
+            disturbed.events
+        );
+    }
+    assert_eq!(found.len(), expected.len());
+}
+
+fn kills(short: usize, long: usize) -> (usize, u64) {
+    let kills = match std::env::var("ATHERMAL_LONG").is_ok_and(|of| of == "1") {
+        true => long,
+        false => short,
+    };
+    // As long as the kills take, at 100 messages a second.
+    (kills, 120 * kills as u64 + 300)
+}
+
+#[test]
+fn behaviour_13_a_service_that_is_killed_again_and_again_loses_nothing() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let (kills, count) = kills(15, 500);
+    nothing_is_lost(broker, TOGETHER, count, kills, Victim::Service);
+}
+
+#[test]
+fn behaviour_13_broker_and_service_are_killed_in_turn_and_nothing_is_lost() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let (kills, count) = kills(30, 1_000);
+    nothing_is_lost(broker, TOGETHER, count, kills, Victim::Either);
+}
+
+#[test]
+fn behaviour_13_acknowledged_after_a_sync_of_the_disk_nothing_is_lost_either() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let source = format!("ack = \"synced\"\nreceive_maximum = 5000\n{TOGETHER}");
+    let (kills, count) = kills(5, 200);
+    nothing_is_lost(broker, &source, count, kills, Victim::Service);
+}
+
+#[test]
+fn behaviour_13_with_mqtt_3_1_1_nothing_is_lost_either() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let source = format!("version = \"3.1.1\"\n{TOGETHER}");
+    let (kills, count) = kills(5, 200);
+    nothing_is_lost(broker, &source, count, kills, Victim::Either);
+}
+
+#[test]
+fn behaviour_13_a_nats_server_that_is_killed_loses_nothing() {
+    let Some(broker) = Broker::nats("2s") else {
+        return;
+    };
+    let (kills, count) = kills(5, 100);
+    nothing_is_lost(broker, TOGETHER, count, kills, Victim::Broker);
+}

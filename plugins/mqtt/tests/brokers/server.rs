@@ -1,0 +1,218 @@
+//! Real brokers, each on a free port of loopback and in a folder of its own, and what stands between them and a client.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// What is asked of Mosquitto in the guide.
+pub const SAFE: &str = "autosave_on_changes true\nautosave_interval 1\nmax_queued_messages 0\n";
+/// What Debian's configuration has.
+pub const DEBIAN: &str = "";
+
+/// A folder of its own, which goes with the test.
+pub struct Folder(pub PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = format!("athermal-mqtt-{name}-{}-{number}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port()
+}
+
+/// Whether a program is there. Without it the test is skipped, or fails where servers are required.
+pub fn has(program: &str) -> bool {
+    let found = Command::new(program)
+        .arg("-h")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    if found.is_ok() {
+        return true;
+    }
+    let is_required = std::env::var("ATHERMAL_REQUIRE_SERVERS").is_ok_and(|of| of == "1");
+    assert!(
+        !is_required,
+        "{program} is not installed, and ATHERMAL_REQUIRE_SERVERS=1 asks for it"
+    );
+    println!("skipped: {program} is not installed");
+    false
+}
+
+/// A broker that can be killed and started again.
+pub struct Broker {
+    pub port: u16,
+    pub folder: Folder,
+    program: &'static str,
+    child: Option<Child>,
+}
+
+impl Broker {
+    /// Mosquitto with persistence and these lines in its configuration; none where it is not installed.
+    pub fn mosquitto(lines: &str) -> Option<Self> {
+        let mut broker = Self::mosquitto_down(lines)?;
+        broker.start();
+        Some(broker)
+    }
+
+    pub fn mosquitto_down(lines: &str) -> Option<Self> {
+        if !has("mosquitto") {
+            return None;
+        }
+        let (folder, port) = (Folder::new("broker"), free_port());
+        let store = folder.0.display().to_string();
+        let text = format!(
+            "listener {port} 127.0.0.1\nallow_anonymous true\nuser root\npersistence true\npersistence_location {store}/\nlog_dest file {store}/log\n{lines}"
+        );
+        fs::write(folder.0.join("conf"), text).unwrap();
+        Some(Self {
+            port,
+            folder,
+            program: "mosquitto",
+            child: None,
+        })
+    }
+
+    /// The MQTT of a NATS server, which keeps sessions in JetStream.
+    pub fn nats(ack_wait: &str) -> Option<Self> {
+        if !has("nats-server") {
+            return None;
+        }
+        let (folder, port, client) = (Folder::new("nats"), free_port(), free_port());
+        let store = folder.0.display().to_string();
+        let text = format!(
+            "server_name: one\nlisten: 127.0.0.1:{client}\njetstream {{ store_dir: \"{store}\" }}\n\
+             mqtt {{ listen: \"127.0.0.1:{port}\", ack_wait: \"{ack_wait}\", max_ack_pending: 1000 }}\n"
+        );
+        fs::write(folder.0.join("conf"), text).unwrap();
+        let mut broker = Self {
+            port,
+            folder,
+            program: "nats-server",
+            child: None,
+        };
+        broker.start();
+        Some(broker)
+    }
+
+    pub fn start(&mut self) {
+        let mut command = Command::new(self.program);
+        command.arg("-c").arg(self.folder.0.join("conf"));
+        command.stdin(Stdio::null()).stdout(Stdio::null());
+        self.child = Some(command.stderr(Stdio::null()).spawn().unwrap());
+        let began = Instant::now();
+        while crate::peer::Peer::connect(self.port, "probe", true).is_err() {
+            assert!(
+                began.elapsed() < Duration::from_secs(20),
+                "the broker does not start"
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// As `kill -9`.
+    pub fn kill(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+    }
+
+    /// As systemd ends it.
+    pub fn terminate(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let id = child.id().to_string();
+            Command::new("kill").args(["-TERM", &id]).status().unwrap();
+            child.wait().unwrap();
+        }
+    }
+
+    /// Forgets all that it kept.
+    pub fn forget(&self) {
+        let _ = fs::remove_file(self.folder.0.join("mosquitto.db"));
+    }
+}
+
+impl Drop for Broker {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// A line that can be cut, so that nothing comes through and nobody is told.
+pub struct Line {
+    pub port: u16,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Line {
+    pub fn to(port: u16) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let is_cut = Arc::new(AtomicBool::new(false));
+        let own = listener.local_addr().unwrap().port();
+        let cut = Arc::clone(&is_cut);
+        std::thread::spawn(move || {
+            for client in listener.incoming().flatten() {
+                let Ok(server) = TcpStream::connect(("127.0.0.1", port)) else {
+                    let _ = client.shutdown(Shutdown::Both);
+                    continue;
+                };
+                pass(
+                    client.try_clone().unwrap(),
+                    server.try_clone().unwrap(),
+                    &cut,
+                );
+                pass(server, client, &cut);
+            }
+        });
+        Self { port: own, is_cut }
+    }
+
+    pub fn cut(&self, is: bool) {
+        self.is_cut.store(is, Ordering::Relaxed);
+    }
+}
+
+fn pass(mut from: TcpStream, mut to: TcpStream, cut: &Arc<AtomicBool>) {
+    let cut = Arc::clone(cut);
+    std::thread::spawn(move || {
+        let mut piece = [0; 4096];
+        loop {
+            let count = from.read(&mut piece).unwrap_or(0);
+            while cut.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            if count == 0 || to.write_all(&piece[..count]).is_err() {
+                let _ = to.shutdown(Shutdown::Both);
+                return;
+            }
+        }
+    });
+}
+
+pub fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_default()
+}
