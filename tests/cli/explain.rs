@@ -10,9 +10,9 @@ use athermal::core::document::{Memory, declare, load};
 use athermal::trial;
 use athermal_serve::deployment::{Deployment, SECTIONS};
 
-/// Two crates with a node type of the same name, a type whose code is at fault, what is wrong with a model beside the file, and a kind of
-/// source that needs addresses, which no built-in one does: no graph alone shows these.
-const WITHOUT_FILE: [&str; 6] = ["A041", "A180", "A190", "A191", "A192", "A204"];
+/// Two crates with a node type of the same name or the same kind of source, a type whose code is at fault, what is wrong with a model
+/// beside the file, and a kind of source that needs addresses, which no built-in one does: no graph alone shows these.
+const WITHOUT_FILE: [&str; 7] = ["A041", "A180", "A190", "A191", "A192", "A204", "A211"];
 
 fn check(text: &str) -> (Diagnostics, Sources) {
     let base = explain("A062").unwrap().right;

@@ -18,6 +18,7 @@ mod evaluation_modes;
 mod every_estimator;
 mod evidence;
 mod explain;
+mod failing_disks;
 mod faulty_logs;
 mod first_minutes;
 mod fit_json;

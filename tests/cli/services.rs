@@ -22,7 +22,7 @@ outputs.masses = "masses"
 outputs.drift = "drift"
 "#;
 
-const SERVICE: &str = r#"
+pub const SERVICE: &str = r#"
 [runtime]
 wait = "20 ms"
 settle = "0 s"
@@ -37,10 +37,10 @@ type = "csv"
 path = "history.csv"
 "#;
 
-const HEADER: &str = "time_s,plate,room,Z\n";
+pub const HEADER: &str = "time_s,plate,room,Z\n";
 
 /// Rows of a log, some with holes, from one number to before another.
-fn rows(from: usize, to: usize) -> String {
+pub fn rows(from: usize, to: usize) -> String {
     let mut text = String::new();
     for nth in from..to {
         let mut prng = Prng::stream(nth as u64, "services");
@@ -56,7 +56,7 @@ fn rows(from: usize, to: usize) -> String {
     text
 }
 
-fn desk(name: &str, service: &str) -> Scratch {
+pub fn desk(name: &str, service: &str) -> Scratch {
     let scratch = Scratch::new(&format!("service-{name}"));
     scratch.file("graph.toml", GRAPH);
     scratch.file(
@@ -66,7 +66,7 @@ fn desk(name: &str, service: &str) -> Scratch {
     scratch
 }
 
-fn serve(scratch: &Scratch, more: &[&str]) -> Child {
+pub fn serve(scratch: &Scratch, more: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_athermal"))
         .args(["serve"])
         .arg(scratch.path("line.toml"))
@@ -79,14 +79,14 @@ fn serve(scratch: &Scratch, more: &[&str]) -> Child {
 }
 
 /// How many whole rows stand in a file.
-fn lines(path: &Path) -> usize {
+pub fn lines(path: &Path) -> usize {
     let text = std::fs::read(path).unwrap_or_default();
     let ends = text.iter().filter(|byte| **byte == b'\n').count();
     ends.saturating_sub(1)
 }
 
 /// Waits until so many rows stand in a file.
-fn until_rows(path: &Path, rows: usize, child: &mut Child) {
+pub fn until_rows(path: &Path, rows: usize, child: &mut Child) {
     let began = Instant::now();
     while lines(path) < rows {
         let ended = child.try_wait().unwrap();
@@ -106,7 +106,7 @@ fn told(child: &mut Child) -> String {
 }
 
 /// Asks a service to end, and gives what it reported.
-fn end(mut child: Child) -> String {
+pub fn end(mut child: Child) -> String {
     let status = Command::new("kill")
         .args(["-s", "INT", &child.id().to_string()])
         .status();
@@ -117,7 +117,7 @@ fn end(mut child: Child) -> String {
 }
 
 /// What `run` gives of the same rows, with the column of revisions left out.
-fn by_run(scratch: &Scratch) -> String {
+pub fn by_run(scratch: &Scratch) -> String {
     let (graph, log) = (scratch.path("graph.toml"), scratch.path("log.csv"));
     plain(&athermal(&[&"run", &graph, &"--input", &log]).ended(0).out)
 }
@@ -135,7 +135,7 @@ fn plain(text: &str) -> String {
 }
 
 /// What a service wrote, without the column of revisions.
-fn history(scratch: &Scratch) -> String {
+pub fn history(scratch: &Scratch) -> String {
     let text = std::fs::read_to_string(scratch.path("history.csv")).unwrap();
     let line = |line: &str| line.rsplit_once(',').unwrap().0.to_owned() + "\n";
     plain(&text.lines().map(line).collect::<String>())

@@ -5,9 +5,13 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::{Control, Notice, StageError};
 
+use crate::aside::Aside;
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
 use crate::folder::FolderError;
 use crate::journal::Progress;
+
+/// How long a disk may take where somebody waits for it.
+const PATIENCE: Wait = Wait::from_secs(2);
 
 /// Takes checkpoints from the replica, so that the engine thread never serialises.
 #[derive(Debug)]
@@ -25,6 +29,8 @@ pub struct Keeper {
     taken: Clock,
     /// One that waits until the journal is synced up to it.
     waiting: Option<Checkpoint>,
+    /// One that is being saved, on a disk that may hang.
+    saving: Aside<Result<u64, CheckpointError>>,
     last: u64,
 }
 
@@ -48,6 +54,7 @@ impl Keeper {
             every,
             taken: Clock::now(),
             waiting: None,
+            saving: Aside::default(),
             last: before,
         }
     }
@@ -93,16 +100,14 @@ impl Keeper {
     ) -> Result<(), CommitError> {
         let happenings = self.before + self.control.events();
         if let Some(engine) = self.control.beside()[which] {
-            self.swaps.save(&Checkpoint::of(engine, happenings))?;
+            let (swaps, checkpoint) = (self.swaps.clone(), Checkpoint::of(engine, happenings));
+            let mut saving = Aside::default();
+            saving.start(move || swaps.save(&checkpoint));
+            saving.wait(PATIENCE).ok_or(CommitError::Hangs)??;
         }
         send(&mut self.control)?;
         self.is_committed = true;
         Ok(())
-    }
-
-    /// Forgets how graphs took over before so many ticks, beats, breaks and freezes: the journal does not go back to them.
-    pub fn forget(&self, happenings: u64) {
-        self.swaps.forget(happenings);
     }
 
     /// Takes a checkpoint now; it is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it
@@ -124,15 +129,26 @@ impl Keeper {
     /// When it cannot be written.
     pub fn finish(mut self) -> Result<Control, CheckpointError> {
         self.control.pump();
+        // One that is on its way is older.
+        if let Some(saved) = self.saving.wait(PATIENCE) {
+            self.last = saved?;
+        }
         self.take();
         self.save()?;
+        self.saving.wait(PATIENCE).transpose()?;
         Ok(self.control)
     }
 
-    /// After how many ticks, beats, breaks and freezes the oldest checkpoint was taken; none where there is none.
+    /// Whether a checkpoint is being saved.
+    #[cfg(test)]
+    pub(crate) fn is_saving(&self) -> bool {
+        self.saving.is_busy()
+    }
+
+    /// The checkpoints.
     #[must_use]
-    pub fn oldest(&self) -> Option<u64> {
-        self.checkpoints.oldest().ok().flatten()
+    pub fn checkpoints(&self) -> &Checkpoints {
+        &self.checkpoints
     }
 
     /// The control of the graph, to be looked at.
@@ -160,14 +176,21 @@ impl Keeper {
     }
 
     fn save(&mut self) -> Result<(), CheckpointError> {
+        if let Some(saved) = self.saving.take() {
+            self.last = saved?;
+        }
         let is_safe = |of: &Checkpoint| {
             self.progress.synced_happenings() >= of.happenings || self.progress.is_degraded()
         };
         let Some(checkpoint) = self.waiting.take_if(|of| is_safe(of)) else {
             return Ok(());
         };
-        self.checkpoints.save(&checkpoint)?;
-        self.last = checkpoint.happenings;
+        let checkpoints = self.checkpoints.clone();
+        // Where the one before is still being saved, the disk hangs, and this one is as good as none.
+        self.saving.start(move || {
+            let saved = checkpoints.save(&checkpoint);
+            saved.map(|()| checkpoint.happenings)
+        });
         Ok(())
     }
 }
@@ -177,6 +200,8 @@ impl Keeper {
 pub enum CommitError {
     /// It cannot be saved, so that no replay could let it take over.
     NotSaved(CheckpointError),
+    /// The disk hangs, so that it cannot be saved.
+    Hangs,
     /// Its model cannot be kept.
     NotKept(FolderError),
     /// It cannot take over.
@@ -192,6 +217,7 @@ impl std::fmt::Display for CommitError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::NotSaved(error) => error.fmt(f),
+            Self::Hangs => f.write_str("the disk of the state hangs: try again once it does not"),
             Self::NotKept(error) => error.fmt(f),
             Self::NotStaged(error) => error.fmt(f),
             Self::Worse { ratio: Some(ratio) } => write!(

@@ -25,6 +25,7 @@
 //! | [`service`] | all of it at work, with its threads |
 //! | [`companion`] | what runs beside it and asks it things |
 
+mod aside;
 pub mod checkpoint;
 pub mod companion;
 pub mod connector;

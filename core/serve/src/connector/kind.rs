@@ -49,16 +49,33 @@ impl<S: ?Sized> ConnectorKind<S> {
     }
 }
 
+/// The kinds of sources or of sinks in this program.
+#[derive(Debug)]
+pub(crate) struct Kinds<S: ?Sized + 'static> {
+    /// One of each name.
+    pub(crate) by_name: BTreeMap<&'static str, &'static ConnectorKind<S>>,
+    /// The crates that bring a name, where there are several.
+    pub(crate) ambiguous: BTreeMap<&'static str, Vec<&'static str>>,
+}
+
 /// All kinds of sources in this program, by name.
 pub fn source_kinds() -> &'static BTreeMap<&'static str, &'static SourceKind> {
-    static KINDS: OnceLock<BTreeMap<&'static str, &'static SourceKind>> = OnceLock::new();
-    KINDS.get_or_init(|| by_name(inventory::iter::<SourceKind>.into_iter()))
+    &all_sources().by_name
 }
 
 /// All kinds of sinks in this program, by name.
 pub fn sink_kinds() -> &'static BTreeMap<&'static str, &'static SinkKind> {
-    static KINDS: OnceLock<BTreeMap<&'static str, &'static SinkKind>> = OnceLock::new();
-    KINDS.get_or_init(|| by_name(inventory::iter::<SinkKind>.into_iter()))
+    &all_sinks().by_name
+}
+
+pub(crate) fn all_sources() -> &'static Kinds<dyn Source> {
+    static KINDS: OnceLock<Kinds<dyn Source>> = OnceLock::new();
+    KINDS.get_or_init(|| Kinds::of(inventory::iter::<SourceKind>.into_iter()))
+}
+
+pub(crate) fn all_sinks() -> &'static Kinds<dyn Sink> {
+    static KINDS: OnceLock<Kinds<dyn Sink>> = OnceLock::new();
+    KINDS.get_or_init(|| Kinds::of(inventory::iter::<SinkKind>.into_iter()))
 }
 
 /// The kind of source of a name, if there is one.
@@ -73,10 +90,20 @@ pub fn sink_kind(name: &str) -> Option<&'static SinkKind> {
     sink_kinds().get(name).copied()
 }
 
-fn by_name<S: ?Sized>(
-    kinds: impl Iterator<Item = &'static ConnectorKind<S>>,
-) -> BTreeMap<&'static str, &'static ConnectorKind<S>> {
-    kinds.map(|kind| (kind.name, kind)).collect()
+impl<S: ?Sized> Kinds<S> {
+    fn of(kinds: impl Iterator<Item = &'static ConnectorKind<S>>) -> Self {
+        let (mut by_name, mut packages) = (BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
+        for kind in kinds {
+            by_name.insert(kind.name, kind);
+            packages.entry(kind.name).or_default().push(kind.package);
+        }
+        packages.values_mut().for_each(|of| of.sort_unstable());
+        packages.retain(|_, of| of.len() > 1);
+        Self {
+            by_name,
+            ambiguous: packages,
+        }
+    }
 }
 
 fn read<T: DeserializeOwned + JsonSchema>(

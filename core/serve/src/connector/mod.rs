@@ -18,6 +18,7 @@ pub use inlet::{
 pub use kind::{
     ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,
 };
+pub(crate) use kind::{Kinds, all_sinks, all_sources};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
 pub use outlet::{Kept, OutRow, Outlet, Purpose, Sink, SinkWiring, WiredOutput};

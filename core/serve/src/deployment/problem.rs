@@ -202,6 +202,21 @@ problem! {
 }
 
 problem! {
+    /// Two crates bring the same kind.
+    A211 KindTwice {
+        /// `source` or `sink`.
+        role: &'static str,
+        kind: String,
+        packages: Vec<&'static str>,
+    }
+    error: "ambiguous kind of source or sink",
+    explanation: "Two crates in this program bring a source, or a sink, of the same kind, so that a file could mean either.",
+    message: format!("the kind of {role} `{kind}` is brought by several crates: {}", names(packages)),
+    label: "which of them?",
+    help: "leave one of the crates out when the program is built",
+}
+
+problem! {
     /// Parameters of a source or sink that cannot be used so.
     A212 UnfitParameter { words: String, advice: String }
     error: "parameters that do not fit",

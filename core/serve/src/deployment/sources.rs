@@ -8,10 +8,10 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::channels::{ChannelsForm, Claim, GraphChannels};
-use super::problem::{ChannelTwice, NoAddress, NoSource, UnknownKind};
+use super::problem::{ChannelTwice, KindTwice, NoAddress, NoSource, UnknownKind};
 use super::{DeclaredChannel, DeclaredSource, keys};
 use crate::compile::Plan;
-use crate::connector::{ConnectorKind, Source, SourceKind, source_kinds};
+use crate::connector::{ConnectorKind, Kinds, Source, SourceKind, all_sources};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::problem::MissingKey;
 use crate::document::{Entry, GraphFile, Table, Value};
@@ -93,7 +93,7 @@ pub(super) fn of_kind<S: ?Sized>(
     (role, name): (&'static str, &str),
     entry: &Entry,
     parameters: &Value,
-    kinds: &'static std::collections::BTreeMap<&'static str, &'static ConnectorKind<S>>,
+    kinds: &'static Kinds<S>,
     generic: &[&str],
     diagnostics: &mut Diagnostics,
 ) -> Option<(&'static ConnectorKind<S>, Box<S>)> {
@@ -113,15 +113,24 @@ pub(super) fn of_kind<S: ?Sized>(
         super::channels::wrong_type(written, "type", "a kind in quotes", diagnostics);
         return None;
     };
-    let Some(kind) = kinds.get(text) else {
+    let Some(kind) = kinds.by_name.get(text) else {
         let problem = UnknownKind {
             role,
             kind: text.to_owned(),
-            known: kinds.keys().copied().collect(),
+            known: kinds.by_name.keys().copied().collect(),
         };
         diagnostics.report(written.place, problem);
         return None;
     };
+    if let Some(packages) = kinds.ambiguous.get(text) {
+        let problem = KindTwice {
+            role,
+            kind: text.to_owned(),
+            packages: packages.clone(),
+        };
+        diagnostics.report(written.place, problem);
+        return None;
+    }
     let elsewhere = [&["type"], generic].concat();
     let read = (kind.read)(parameters, &what, &elsewhere, diagnostics)?;
     keys::is_in_range((kind.schema)(), parameters, diagnostics).then_some((*kind, read))
@@ -187,7 +196,7 @@ fn part<'a>(
     let what = format!("the source `{name}`");
     let named = named.as_table().and_then(|table| table.get("channels"));
     let role = ("source", name);
-    let kind = of_kind(role, entry, &parameters, source_kinds(), &KEYS, diagnostics);
+    let kind = of_kind(role, entry, &parameters, all_sources(), &KEYS, diagnostics);
     let mut claims = named.map(|value| channels.read(value, diagnostics));
     let remarks = kind.as_ref().map(|(_, source)| source.remarks());
     keys::report(remarks.unwrap_or_default(), &parameters, diagnostics);

@@ -46,12 +46,13 @@ pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
 pub use status::Snapshot;
 
+use crate::aside::Aside;
 use crate::checkpoint::Checkpoints;
 use crate::companion::Beside;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
-use crate::folder::StateFolder;
+use crate::folder::{StateFolder, StatePaths};
 use crate::host;
 use crate::journal::{
     FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
@@ -138,6 +139,7 @@ pub struct Service {
     folder: StateFolder,
     keep: Keep,
     retired: Clock,
+    retiring: Aside<()>,
     is_degraded: bool,
     /// How many nodes were given up and reported.
     given_up: usize,
@@ -323,6 +325,7 @@ impl Service {
             folder,
             keep: keep(&runtime),
             retired: Clock::now(),
+            retiring: Aside::default(),
             is_degraded: false,
             given_up: 0,
             has_failed: false,
@@ -384,12 +387,17 @@ impl Service {
         self.watches.iter_mut().for_each(|watch| watch.look(now));
         if self.retired.elapsed() >= RETIRE {
             self.retired = Clock::now();
-            let needed = self.keeper.oldest().unwrap_or_default();
-            // What stays does no harm.
-            let _ = retire(&self.folder.journal(), self.keep, needed);
-            if let Ok(Some(oldest)) = oldest(&self.folder.journal()) {
-                self.keeper.forget(oldest);
-            }
+            let (folder, keep) = (StatePaths::clone(&self.folder), self.keep);
+            let checkpoints = self.keeper.checkpoints().clone();
+            self.retiring.take();
+            self.retiring.start(move || {
+                // What stays does no harm.
+                let needed = checkpoints.oldest().ok().flatten().unwrap_or_default();
+                let _ = retire(&folder.journal(), keep, needed);
+                if let Ok(Some(oldest)) = oldest(&folder.journal()) {
+                    folder.commits().forget(oldest);
+                }
+            });
         }
         self.compare(&mut events);
         for event in &events {

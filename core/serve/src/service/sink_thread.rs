@@ -10,6 +10,7 @@ use super::ServiceEvent;
 use super::command::CommandGate;
 use super::frames::{FrameReceiver, SinkCounts, Ticket};
 use super::position::{Position, PositionFile};
+use crate::aside::Aside;
 use crate::connector::{ConnectorError, Outlet, Stop};
 use crate::diagnostic::panic_message;
 use crate::journal::Progress;
@@ -20,6 +21,9 @@ const PATIENCE: Wait = Wait::from_millis(50);
 const AGAIN: Wait = Wait::from_millis(500);
 /// How often the position of a log is kept, and that of a command, which goes on from there.
 const KEEP: (Wait, Wait) = (Wait::from_secs(5), Wait::from_secs(1));
+
+/// How long the end waits for a disk that hangs.
+const ENDS: Wait = Wait::from_secs(2);
 
 /// A sink at work.
 pub(super) struct SinkThread {
@@ -36,6 +40,8 @@ pub(super) struct SinkThread {
     pub(super) stop: Stop,
     pub(super) events: Sender<ServiceEvent>,
     pub(super) health: Health,
+    /// What keeps its position, on a disk that may hang.
+    pub(super) keeping: Aside<()>,
 }
 
 impl SinkThread {
@@ -64,9 +70,13 @@ impl SinkThread {
                 && let Some(happenings) = happenings.take()
             {
                 kept = Clock::now();
+                if is_over {
+                    self.keeping.wait(ENDS);
+                }
                 self.keep(happenings);
             }
             if is_over {
+                self.keeping.wait(ENDS);
                 return;
             }
             std::thread::park_timeout(Wait::from_millis(100));
@@ -140,11 +150,16 @@ impl SinkThread {
             None => return,
         };
         let Ok(end) = end else { return };
-        let _ = self.position.write(&Position {
-            end,
-            happenings,
-            applied,
-        });
+        let (file, position) = (
+            self.position.clone(),
+            Position {
+                end,
+                happenings,
+                applied,
+            },
+        );
+        self.keeping.take();
+        self.keeping.start(move || drop(file.write(&position)));
     }
 }
 

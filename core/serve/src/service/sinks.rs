@@ -10,6 +10,7 @@ use super::frames::{FrameReceiver, SinkCounts, frames};
 use super::position::{Position, PositionFile};
 use super::sink_thread::{Health, SinkThread};
 use super::{ServiceError, ServiceEvent, spawn};
+use crate::aside::Aside;
 use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
 use crate::deployment::DeclaredSink;
 use crate::engine::Engine;
@@ -212,6 +213,7 @@ impl OpenSink {
             stop: stop.clone(),
             events: events.clone(),
             health: Health::default(),
+            keeping: Aside::default(),
         }
     }
 }

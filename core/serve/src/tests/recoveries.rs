@@ -122,6 +122,9 @@ impl Service {
                 .progress()
                 .wait_written(recorder.event(), Wait::from_secs(20))
         );
+        while self.keeper.is_saving() {
+            std::thread::sleep(Wait::from_millis(1));
+        }
         let copy = Folder::new();
         copy_tree(path, &copy.0);
         (copy, self.outputs)

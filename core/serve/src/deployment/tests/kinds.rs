@@ -34,6 +34,9 @@ struct Stage {}
 crate::register_source!(Table, "test_table");
 crate::register_source!(Bus, "test_bus");
 crate::register_sink!(Log, "test_log");
+// Two of one name, as two plugin crates may bring them.
+crate::register_source!(Bus, "test_twice");
+crate::register_source!(Table, "test_twice");
 crate::register_sink!(Stage, "test_stage");
 
 fn never<T>() -> Result<T, ConnectorError> {

@@ -47,6 +47,16 @@ fn a_kind_or_key_that_there_is_not_is_reported_with_the_nearest() {
 }
 
 #[test]
+fn a_kind_that_two_crates_bring_is_reported_and_only_where_it_is_used() {
+    assert_wrong(
+        "[sources.a]\ntype = \"test_twice\"\n",
+        &[
+            "A211 at `\"test_twice\"`: the kind of source `test_twice` is brought by several crates: `athermal-serve`, `athermal-serve`; leave one",
+        ],
+    );
+}
+
+#[test]
 fn values_out_of_range_are_reported_at_their_place() {
     assert_wrong(
         &format!(
