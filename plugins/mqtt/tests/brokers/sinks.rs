@@ -65,7 +65,7 @@ fn each_output_has_a_topic_and_the_service_says_that_it_lives() {
     service.until("five ticks", |_| history(&folder).len() == 5);
     let all = receive(&mut listener, |all| {
         let alive = all.iter().filter(|of| of.topic.ends_with("/alive")).count();
-        alive >= 5 && all.iter().filter(|of| of.topic.starts_with("out/")).count() >= 10
+        alive >= 5 && all.iter().filter(|of| of.topic.starts_with("out/")).count() >= 20
     });
     let topics: BTreeSet<_> = all.iter().map(|of| of.topic.clone()).collect();
     assert_eq!(topics.len(), 5, "{topics:?}");
