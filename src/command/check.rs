@@ -144,7 +144,9 @@ impl Check {
             let mut facts = diagnostics.to_json(&sources);
             let graphs = fine.iter().map(|(path, plan)| Counts::of(path, plan));
             facts["graphs"] = json!(graphs.collect::<Vec<_>>());
-            facts["live"] = json!(looked);
+            if self.live {
+                facts["live"] = json!(looked);
+            }
             println!("{facts:#}");
         } else {
             terminal.diagnostics(&diagnostics, &sources);

@@ -19,7 +19,6 @@ mod init;
 mod model;
 mod new;
 mod nodes;
-mod numbers;
 mod refused;
 mod replay;
 mod report;
@@ -34,6 +33,7 @@ mod threads;
 mod unread;
 mod unscored;
 
+use athermal_command::numbers;
 use clap::Subcommand;
 
 use crate::terminal::{Answer, Failure, Terminal};

@@ -98,7 +98,7 @@ fn only_what_is_unused_or_doubtful_is_a_warning() {
     }
     assert_eq!(
         warnings,
-        BTreeSet::from(["A059", "A060", "A065", "A069", "A210"])
+        BTreeSet::from(["A059", "A060", "A065", "A069", "A210", "A213"])
     );
 }
 

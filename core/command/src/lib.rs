@@ -27,6 +27,7 @@
 //! ```
 
 pub mod message;
+pub mod numbers;
 #[macro_use]
 pub mod output;
 mod registry;

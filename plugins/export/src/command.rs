@@ -23,6 +23,10 @@ enum Target {
 
 /// Write a fitted graph for a controller
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal export c model.json -o c
+  athermal export c model.json -o c --rate 1s --rate position=10s --frozen
+  athermal export onnx model.json -o onnx")]
 pub(crate) struct Export {
     /// As what
     target: Target,

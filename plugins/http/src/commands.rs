@@ -3,7 +3,9 @@
 use std::io::BufRead as _;
 use std::path::{Path, PathBuf};
 
-use athermal_command::{Answer, Command, Failure, Format, Terminal, println, register_command};
+use athermal_command::{
+    Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
+};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -129,7 +131,7 @@ struct Tap {
     #[arg(long, value_name = "CHANNEL")]
     channel: Vec<String>,
     /// End after so many ticks
-    #[arg(long, value_name = "TICKS")]
+    #[arg(long, value_name = "TICKS", value_parser = numbers::read::<u64>("a whole number of ticks"))]
     count: Option<u64>,
 }
 
@@ -261,6 +263,7 @@ macro_rules! orders {
         $(
             $(#[$doc])*
             #[derive(Debug, Args)]
+            #[command(after_help = concat!("Example:\n  athermal ", $command, " die-tester"))]
             struct $name {
                 #[command(flatten)]
                 service: Service,

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal_command::{Answer, Command, Failure, Format, Terminal, println, register_command};
+use athermal_command::{
+    Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
+};
 use athermal_core::time::Duration;
 use athermal_http::client::{Address, ClientError, Reply};
 use athermal_run::model::Model;
@@ -37,7 +39,7 @@ struct Retrain {
     #[arg(long, value_name = "DURATION")]
     shadow: Option<Duration>,
     /// By how much its error may be larger: 0.05 for 5 %
-    #[arg(long, value_name = "PART", default_value_t = 0.0)]
+    #[arg(long, value_name = "PART", default_value_t = 0.0, value_parser = numbers::read::<f64>("a number, such as 0.05"))]
     margin: f64,
     /// Let it take over if it is no worse
     #[arg(long)]
