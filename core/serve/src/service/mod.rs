@@ -7,6 +7,7 @@
 //!                              └─ring─▶ control (the caller): replica, checkpoints, swaps, reports
 //! ```
 
+mod asked;
 mod command;
 mod engine_thread;
 mod error;
@@ -29,7 +30,6 @@ mod wiring;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
@@ -437,65 +437,11 @@ impl Service {
         self.observers.add(observer);
     }
 
-    /// How long it has been running.
-    #[must_use]
-    pub fn uptime(&self) -> Wait {
-        self.began.elapsed()
-    }
-
     /// Takes a checkpoint, which is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it is;
     /// none where none can be taken.
     pub fn checkpoint(&mut self, by: &str) -> Option<u64> {
         self.note(&format!("{by}: checkpoint"));
         self.keeper.take_now()
-    }
-
-    /// After how many ticks, beats, breaks and freezes the last checkpoint was saved.
-    #[must_use]
-    pub fn last_checkpoint(&self) -> u64 {
-        self.keeper.last()
-    }
-
-    /// The state folder.
-    #[must_use]
-    pub fn folder(&self) -> &StateFolder {
-        &self.folder
-    }
-
-    /// How often the engine thread has gone round: it lives for as long as this grows.
-    #[must_use]
-    pub fn beat(&self) -> u64 {
-        self.shared.beat.load(Ordering::Relaxed)
-    }
-
-    /// What the engine thread knew within the last second or two.
-    #[must_use]
-    pub fn snapshot(&self) -> Snapshot {
-        self.shared.read()
-    }
-
-    /// The channels, in the order of [`Snapshot::counts`].
-    #[must_use]
-    pub fn channels(&self) -> &[String] {
-        &self.channels
-    }
-
-    /// The sources, and what each counts.
-    #[must_use]
-    pub fn sources(&self) -> &[(String, Arc<SourceCounts>)] {
-        &self.sources
-    }
-
-    /// The sinks, and what each counts.
-    #[must_use]
-    pub fn sinks(&self) -> &[(String, Arc<SinkCounts>)] {
-        &self.sinks
-    }
-
-    /// How the journal is.
-    #[must_use]
-    pub fn journal(&self) -> JournalStatus {
-        self.progress.status()
     }
 
     /// Freezes learning, or lets it go on, before the next tick.
