@@ -58,12 +58,12 @@ fn run(arguments: &ArgMatches, terminal: &mut Terminal) -> Result<Answer, Failur
 pub fn whole() -> clap::Command {
     let whole = clap::Command::new("athermal")
         .version(env!("CARGO_PKG_VERSION"))
-        .about("Predicts and corrects the thermal drift of precision machines")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .max_term_width(80)
         .after_help(EXAMPLES);
-    let whole = Command::augment_subcommands(Options::augment_args(whole));
+    let whole = Command::augment_subcommands(Options::augment_args(whole))
+        .about("Predicts and corrects the thermal drift of precision machines");
     let brought = athermal_command::kinds().values();
     brought.fold(whole, |whole, kind| whole.subcommand((kind.declare)()))
 }
@@ -125,6 +125,10 @@ mod tests {
     fn a_command_that_a_crate_brings_stands_behind_those_of_the_program() {
         let help = whole().render_help().to_string();
         let (ours, brought) = (help.find("  build "), help.find("  say-for-a-test "));
+        assert!(
+            help.starts_with("Predicts and corrects the thermal drift"),
+            "{help}"
+        );
         assert!(ours.is_some() && ours < brought, "{help}");
         let words = ["athermal", "say-for-a-test", "7", "--format", "json"];
         let arguments = whole().get_matches_from(words);

@@ -1291,8 +1291,9 @@ static void at_raise(const at_vote *v, const at_ballot *b)
 static at_real at_weight_of(const at_vote *v, at_real mean, at_real best, at_real roots, at_real known)
 {
     at_real weight;
-    if (v->form == AT_INVERSE_POWER) {
-        weight = best / ((mean > AT_SMALLEST) ? mean : AT_SMALLEST);
+    if ((v->form == AT_INVERSE_POWER) || (v->form == AT_INVERSE_FOURTH_POWER)) {
+        const at_real ratio = best / ((mean > AT_SMALLEST) ? mean : AT_SMALLEST);
+        weight = (v->form == AT_INVERSE_POWER) ? ratio : (ratio * ratio);
     } else if (roots > AT_R(0.0)) {
         weight = mean / (roots * roots);
     } else {

@@ -144,6 +144,7 @@ typedef struct {
 #define AT_INVERSE_POWER 0
 #define AT_AS_PRINTED 1
 #define AT_AS_PRINTED_RAW 2
+#define AT_INVERSE_FOURTH_POWER 3
 
 typedef struct {
     int32_t rule;

@@ -30,15 +30,17 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
     match (node.kind.package, node.kind.name) {
         ("athermal-combiners", "auto_weighted") => {
             let spec: AutoWeighted = parameters(node)?;
-            if spec.power.is_some_and(|power| power != 2.0) {
+            let power = spec.power.unwrap_or(2.0);
+            if power != 2.0 && power != 4.0 {
                 return refuse(
-                    "a `power` other than 2 cannot be exported",
+                    "a `power` other than 2 and 4 cannot be exported",
                     "leave `power` out: 2 is what inverse variances have",
                 );
             }
             Ok(Rule {
                 memory: Some(spec.memory),
                 form: match spec.weights {
+                    Weighting::InversePower if power == 4.0 => 3,
                     Weighting::InversePower => 0,
                     Weighting::AsPrinted => 1,
                     Weighting::AsPrintedRaw => 2,

@@ -179,6 +179,10 @@ fn votes(random: &mut Prng, state: &str, text: &mut String) {
     let (weighted, best) = (memory(random), memory(random));
     let guard = 30 + random.between(0.0, 100.0) as u64;
     let weights = one_of(random, &["inverse_power", "as_printed", "as_printed_raw"]);
+    let power = match weights == "inverse_power" && chance(random, 0.5) {
+        true => "power = 4\n",
+        false => "",
+    };
     let kept_apart = if weights == "as_printed_raw" || chance(random, 0.4) {
         String::new()
     } else {
@@ -198,6 +202,7 @@ inputs.voters = {voters}
 inputs.truth = "drift.{{axis}}"
 memory = {weighted}
 weights = "{weights}"
+{power}
 {kept_apart}
 [nodes.mean]
 type = "mean"
