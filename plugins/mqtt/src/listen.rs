@@ -16,7 +16,7 @@ pub enum Heard {
     Refused(String, String),
 }
 
-/// Hands all that comes on, until it has been told enough, or so long. The other version of the protocol is tried where this one is
+/// Hands all that comes on, until that is enough, or for so long. The other version of the protocol is tried where this one is
 /// not spoken.
 ///
 /// # Errors

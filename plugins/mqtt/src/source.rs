@@ -28,7 +28,7 @@ use crate::topic::Topic;
 /// Messages of an MQTT broker. Each is acknowledged once its values are in the journal, so that none is lost that a publisher with QoS 1
 /// has sent, whatever ends in between.
 ///
-/// The broker keeps a session under a fixed client id, `athermal-` and the names of machine and source. What it sends again is told
+/// The broker keeps a session under a fixed client id, `athermal-` and the names of machine and source. What it sends again is known
 /// apart by the time of the value. A message that cannot be read is left out and counted.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub struct MqttSource {

@@ -174,6 +174,14 @@ impl Peer {
     }
 }
 
+impl Peer {
+    /// Takes leave, and waits until the broker has read all that was acknowledged.
+    pub fn leave(mut self) {
+        write(&mut self.stream, 0xe0, &[]).unwrap();
+        while self.packet(Duration::from_secs(5)).is_ok_and(|of| of.is_some()) {}
+    }
+}
+
 /// What a publisher sends again on a new connection although the broker had answered: a broker that saves after each message answers
 /// a moment before it has saved.
 const AGAIN: usize = 50;

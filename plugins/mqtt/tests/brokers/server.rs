@@ -162,7 +162,7 @@ impl Drop for Broker {
     }
 }
 
-/// A line that can be cut, so that nothing comes through and nobody is told.
+/// A line that can be cut, so that nothing comes through, and neither end notices.
 pub struct Line {
     pub port: u16,
     is_cut: Arc<AtomicBool>,
