@@ -98,6 +98,23 @@ fn each_output_has_a_topic_and_the_service_says_that_it_lives() {
 }
 
 #[test]
+fn a_source_and_a_sink_of_one_name_are_two_clients() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let folder = Folder::new("names");
+    let sink = sink(&broker, "topic = \"out/tick\"").replace("sinks.out", "sinks.line");
+    let mut listener = Peer::connect(broker.port, "listener", true).unwrap();
+    listener.subscribe("athermal-tester-line/alive");
+    let mut service = Running::start(&folder, &machine(broker.port, TOGETHER, &sink));
+    receive(&mut listener, |all| all.len() >= 3);
+    service.pump();
+    assert!(!service.heard("SourceFailed"), "{:?}", service.events);
+    assert!(!service.heard("SinkFailed"), "{:?}", service.events);
+    service.stop();
+}
+
+#[test]
 fn a_service_that_is_killed_has_a_last_will() {
     let Some(broker) = Broker::mosquitto(SAFE) else {
         return;
