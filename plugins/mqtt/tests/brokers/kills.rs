@@ -93,10 +93,14 @@ fn run(
             service = Process::start(&folder);
         }
     }
-    let began = Instant::now();
-    let expected = count as usize;
-    while history(&folder).len() < expected && began.elapsed() < Duration::from_secs(60) {
-        std::thread::sleep(Duration::from_millis(100));
+    // However long it takes, as long as it goes on.
+    let (mut rows, mut grown) = (0, Instant::now());
+    while rows < count as usize && grown.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(200));
+        let now = history(&folder).len();
+        if now > rows {
+            (rows, grown) = (now, Instant::now());
+        }
     }
     stop.store(true, Ordering::Relaxed);
     publisher.join().unwrap();
