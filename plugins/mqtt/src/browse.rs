@@ -79,7 +79,9 @@ impl Command for Browse {
                 match heard {
                     Heard::Answer(_, answer) => refused = answer.err(),
                     Heard::Message(message) => {
-                        topics.insert(message.topic, message.payload);
+                        let before = topics.remove(&message.topic);
+                        let payload = with_absent(before, message.payload);
+                        topics.insert(message.topic, payload);
                     }
                 }
                 refused.is_some()
@@ -107,6 +109,27 @@ impl Command for Browse {
         ));
         Ok(Answer::Fine)
     }
+}
+
+/// A message, with the values of one before it where its own are absent: not each has all of them.
+fn with_absent(before: Option<Vec<u8>>, payload: Vec<u8>) -> Vec<u8> {
+    fn fill(value: &mut Value, before: Value) {
+        match (value, before) {
+            (Value::Object(fields), Value::Object(before)) => {
+                for (key, of) in before {
+                    fill(fields.entry(key).or_insert(Value::Null), of);
+                }
+            }
+            (value @ Value::Null, before) => *value = before,
+            _ => {}
+        }
+    }
+    let read = |of: &[u8]| serde_json::from_slice::<Value>(of).ok();
+    let (Some(mut value), Some(before)) = (read(&payload), before.as_deref().and_then(read)) else {
+        return payload;
+    };
+    fill(&mut value, before);
+    value.to_string().into_bytes()
 }
 
 /// Names of times, and of qualities.
@@ -191,6 +214,9 @@ fn object(
     let Value::Object(fields) = value else {
         return Err("no object with values");
     };
+    if fields.get("alive").is_some_and(Value::is_boolean) {
+        return Err("whether a service lives");
+    }
     let mut leaves = Vec::new();
     collect(value, "", &mut leaves);
     if leaves.iter().any(|(at, _)| has_braces(at)) {
@@ -471,6 +497,16 @@ mod tests {
             lines[0].contains("\"value.T\"") && lines[1].contains("\"value.T2\""),
             "{lines:?}"
         );
+    }
+
+    #[test]
+    fn a_value_that_is_absent_at_times_is_found() {
+        let payload = |text: &str| text.as_bytes().to_vec();
+        let before = with_absent(None, payload(r#"{"v": {"a": 1.5, "b": 2.5}}"#));
+        let filled = with_absent(Some(before), payload(r#"{"v": {"a": null, "b": 3.5}}"#));
+        let value: Value = serde_json::from_slice(&filled).unwrap();
+        assert_eq!(value, serde_json::json!({ "v": { "a": 1.5, "b": 3.5 } }));
+        assert_eq!(with_absent(Some(filled), payload("on")), payload("on"));
     }
 
     #[test]
