@@ -60,26 +60,14 @@ impl fmt::Display for Message {
 /// Words without facts for programs.
 const REMARK: &str = "remark";
 
-impl From<fmt::Arguments<'_>> for Message {
-    fn from(words: fmt::Arguments<'_>) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
+macro_rules! words {
+    ($($of:ty),*) => {
+        $(impl From<$of> for Message {
+            fn from(words: $of) -> Self {
+                Self::new(REMARK, Value::Null, words)
+            }
+        })*
+    };
 }
 
-impl From<&str> for Message {
-    fn from(words: &str) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
-}
-
-impl From<&String> for Message {
-    fn from(words: &String) -> Self {
-        words.as_str().into()
-    }
-}
-
-impl From<String> for Message {
-    fn from(words: String) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
-}
+words!(fmt::Arguments<'_>, &str, &String, String);

@@ -14,6 +14,8 @@ const HALF_LIFE_S: f64 = 3_600.0;
 pub struct PredictionErrors {
     plan: Option<Arc<Plan>>,
     all: Vec<PredictionError>,
+    /// The last tick.
+    last: Option<Instant>,
 }
 
 /// The error of a prediction.
@@ -44,7 +46,13 @@ impl PredictionErrors {
             self.all = predictions(plan);
             self.plan = Some(Arc::clone(plan));
         }
+        // What lies before a new segment pairs with nothing in it.
+        let is_break = self.last.replace(now).is_some_and(|last| now <= last);
         for error in &mut self.all {
+            if is_break {
+                error.pairing.clear();
+                error.last = None;
+            }
             error.look(now, engine);
         }
     }
@@ -57,11 +65,6 @@ impl PredictionError {
     }
 
     fn look(&mut self, now: Instant, engine: &Engine) {
-        // What lies before a new segment pairs with nothing in it.
-        if self.last.is_some_and(|last| now <= last) {
-            self.pairing.clear();
-            self.last = None;
-        }
         if engine.ran(self.slot) {
             self.pairing.run(now, [&[engine.value(self.slot)][..]]);
         }
@@ -112,4 +115,35 @@ fn predictions(plan: &Plan) -> Vec<PredictionError> {
         .enumerate()
         .filter_map(prediction)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fitted;
+
+    #[test]
+    fn what_was_predicted_before_a_break_is_no_prediction_of_what_comes_after_it() {
+        let path = std::env::temp_dir().join(format!("athermal-break-{}.toml", std::process::id()));
+        std::fs::write(&path, crate::tests::GRAPH).unwrap();
+        let model = fitted(athermal_run::model::Model::load(&path).unwrap());
+        std::fs::remove_file(path).unwrap();
+        let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
+        let mut errors = PredictionErrors::default();
+        let mut step = |ms: i64, z: f64| {
+            let now = Instant::from_ns(ms * 1_000_000);
+            if engine.last().is_some_and(|last| now <= last) {
+                engine.segment();
+            }
+            engine.step(now, &[20.5, 21.5, z]).unwrap();
+            errors.look(now, &engine);
+            errors.iter().filter(|of| of.rmse().is_some()).count()
+        };
+        for tick in 0..30 {
+            assert_eq!(step(100 * tick, f64::NAN), 0);
+        }
+        // It goes back by less than the predictions reach, and no truth has been paired before.
+        assert_eq!(step(2_050, 50.0), 0);
+        assert_eq!(step(3_050, 50.0), 2);
+    }
 }

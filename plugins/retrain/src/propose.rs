@@ -63,18 +63,17 @@ pub enum NotProposed {
     },
 }
 
-/// Fits the graph of a model anew on the end of a recording. `running` is what runs.
+/// Fits the graph of what runs anew on the end of a recording.
 ///
 /// # Errors
 /// When that is not worth proposing, and why.
 pub fn propose(
-    graph: &Model,
     running: &Model,
     recording: &dyn Recording,
     terms: &Terms,
     created: Option<String>,
 ) -> Result<Proposal, NotProposed> {
-    let plan = &graph.plan;
+    let plan = &running.plan;
     let data = Table::read(recording, plan).map_err(NotProposed::Unreadable)?;
     let newest = newest(&data).ok_or(NotProposed::NoData)?;
     let data = between(&data, newest - terms.on, newest);
@@ -100,13 +99,13 @@ pub fn propose(
         |data: &Table| fit(plan, data, &options, &mut |_| {}).map_err(NotProposed::Unfit);
     let (judged, _) = fitted_on(&between(&data, oldest, cut))?;
     let new = errors(plan, &judged, &data, cut)?;
-    let old = errors(&running.plan, &running.fitted, &data, cut)?;
+    let old = errors(plan, &running.fitted, &data, cut)?;
     let ratio = ratio(&old, &new).ok_or(NotProposed::NothingToCompare)?;
     if ratio.is_nan() || ratio > 1.0 + terms.margin {
         return Err(NotProposed::Worse { ratio });
     }
     let (all, report) = fitted_on(&data)?;
-    let mut model = graph.clone();
+    let mut model = running.clone();
     model.fitted = all;
     let of = DataCard {
         path: "journal".to_owned(),

@@ -129,6 +129,19 @@ fn a_good_graph_is_staged_compared_committed_and_taken_back_and_every_tick_is_th
     );
 }
 
+#[test]
+fn a_service_that_was_started_by_a_relative_path_takes_its_file_again() {
+    let bench = Bench::start(GRAPH, "");
+    let noted = fs::read_to_string(bench.path("state/socket")).unwrap();
+    assert!(noted.starts_with('/'), "{noted}");
+    let machine = bench.path("machine.toml");
+    let text = fs::read_to_string(&machine).unwrap();
+    fs::write(&machine, text.replace("\"7s\"]", "\"9s\"]")).unwrap();
+    let answer = bench.raw(b"POST /v1/stage HTTP/1.0\r\nContent-Length: 0\r\n\r\n");
+    assert!(answer.starts_with("HTTP/1.0 200"), "{answer}");
+    bench.until("a staged graph", |of| of["staged"].is_object());
+}
+
 /// The remarks in a journal.
 fn notes(state: &std::path::Path) -> Vec<String> {
     use athermal_serve::folder::StatePaths;
