@@ -105,6 +105,18 @@ fn told(child: &mut Child) -> String {
     text
 }
 
+/// What a service reports, up to given words.
+fn until_reported(child: &mut Child, words: &str) -> String {
+    let stderr = child.stderr.as_mut().unwrap();
+    let (mut text, mut byte) = (Vec::new(), [0]);
+    while !String::from_utf8_lossy(&text).contains(words) {
+        let came = std::io::Read::read(stderr, &mut byte).unwrap();
+        assert!(came == 1, "{}", String::from_utf8_lossy(&text));
+        text.push(byte[0]);
+    }
+    String::from_utf8(text).unwrap()
+}
+
 /// Asks a service to end, and gives what it reported.
 pub fn end(mut child: Child) -> String {
     let status = Command::new("kill")
@@ -217,14 +229,13 @@ fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_tw
 fn bad_rows_are_counted_and_named_and_a_file_that_is_not_there_is_waited_for() {
     let scratch = desk("bad", SERVICE);
     let mut child = serve(&scratch, &[]);
-    std::thread::sleep(Duration::from_millis(100));
+    let before = until_reported(&mut child, "source `log`: cannot open");
     let mut text = HEADER.to_owned() + &rows(0, 20);
     text += "oops,1,2,3\n2.0,x,21,5\n";
     text += &rows(21, 40);
     scratch.file("log.csv", &text);
     until_rows(&scratch.path("history.csv"), 40, &mut child);
-    let text = end(child);
-    assert!(text.contains("source `log`: cannot open"), "{text}");
+    let text = before + &end(child);
     assert!(
         text.contains("oops") && text.contains("others like it are counted"),
         "{text}"
