@@ -33,10 +33,10 @@ impl Message {
         self.name
     }
 
-    /// What is known of it, as JSON.
+    /// What is known of it: an object.
     #[must_use]
-    pub fn facts(&self) -> String {
-        Value::Object(self.facts.clone()).to_string()
+    pub fn facts(&self) -> Value {
+        Value::Object(self.facts.clone())
     }
 
     /// For programs: an object on one line, with how grave it is.

@@ -12,6 +12,7 @@ use std::time::Duration as Wait;
 use athermal_core::engine::fnv_1a;
 use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::ConnectorError;
+use athermal_serve::service::Service;
 
 use crate::hub::{Hub, Looker};
 use crate::routes::Routes;
@@ -47,12 +48,13 @@ impl Companion for Control {
         );
         noted.map_err(failed("socket".to_owned()))?;
         let hub = Arc::new(Hub::default());
-        let looker = Looker::new(Arc::clone(&hub));
-        let handle = beside.handle.clone();
+        let (handle, seen) = (beside.handle.clone(), Arc::clone(&hub));
+        let look = move |service: &mut Service| {
+            let looker = Looker(seen, service.channels().to_vec());
+            service.observe(Box::new(looker));
+        };
         // The service answers once it is pumped, which is after this.
-        std::thread::spawn(move || {
-            handle.ask(PATIENCE, move |service| service.observe(Box::new(looker)))
-        });
+        std::thread::spawn(move || handle.ask(PATIENCE, look));
         let routes = Routes::new(beside.clone(), hub);
         let doors = Doors { unix, tcp, path };
         let server = Server::start(doors, routes).map_err(failed("thread".to_owned()))?;
@@ -68,7 +70,10 @@ impl Control {
         };
         let bound = bind(&path);
         let bound = bound.map_err(|error| {
-            ConnectorError::new(format_args!("[control] {}: {error}", path.display()))
+            let path = path.display();
+            ConnectorError::new(format_args!(
+                "[control] cannot listen on {path}: {error}; name another by `socket`"
+            ))
         });
         Ok((path, bound?))
     }
@@ -100,7 +105,7 @@ fn short(path: PathBuf) -> PathBuf {
 fn bind(path: &Path) -> io::Result<UnixListener> {
     if let Ok(of) = fs::symlink_metadata(path) {
         if !of.file_type().is_socket() {
-            return Err(io::Error::other("it is there, and no socket"));
+            return Err(io::Error::other("what is there is no socket"));
         }
         if UnixStream::connect(path).is_ok() {
             return Err(io::Error::other("another service listens there"));

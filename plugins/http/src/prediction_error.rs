@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use athermal_core::compile::{Plan, TruthLink};
-use athermal_core::engine::{Engine, Pairing};
+use athermal_core::compile::Plan;
+use athermal_core::engine::Engine;
 use athermal_core::time::Instant;
+use athermal_run::score::{PairedPrediction, link};
 
 /// After so many seconds an error counts half.
 const HALF_LIFE_S: f64 = 3_600.0;
@@ -25,9 +26,8 @@ pub struct PredictionError {
     pub name: String,
     /// The unit of its errors.
     pub unit: String,
-    slot: usize,
     truth: usize,
-    pairing: Pairing,
+    paired: PairedPrediction,
     squares: f64,
     weight: f64,
     last: Option<Instant>,
@@ -50,7 +50,7 @@ impl PredictionErrors {
         let is_break = self.last.replace(now).is_some_and(|last| now <= last);
         for error in &mut self.all {
             if is_break {
-                error.pairing.clear();
+                error.paired.clear();
                 error.last = None;
             }
             error.look(now, engine);
@@ -65,15 +65,8 @@ impl PredictionError {
     }
 
     fn look(&mut self, now: Instant, engine: &Engine) {
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
-        }
-        let truth = engine.value(self.truth);
-        if truth.is_nan() {
-            return;
-        }
-        let predicted = self.pairing.truth(now).map_or(f64::NAN, |pair| pair.row[0]);
-        if predicted.is_nan() {
+        let error = self.paired.error(engine, now, engine.value(self.truth));
+        if error.is_nan() {
             return;
         }
         let passed = self
@@ -81,30 +74,20 @@ impl PredictionError {
             .map_or(0.0, |last| (now - last).as_ns() as f64 / 1e9);
         self.last = Some(now);
         let kept = 0.5_f64.powf(passed / HALF_LIFE_S);
-        self.squares = self.squares * kept + (predicted - truth).powi(2);
+        self.squares = self.squares * kept + error.powi(2);
         self.weight = self.weight * kept + 1.0;
     }
 }
 
 fn predictions(plan: &Plan) -> Vec<PredictionError> {
     let prediction = |(slot, channel): (usize, &athermal_core::compile::PlannedChannel)| {
-        let truth_slot = channel.predicts?;
-        let truth = &plan.channels[truth_slot];
-        let own = plan.nodes[channel.node?].role.truth();
-        let link = TruthLink {
-            slot: truth_slot,
-            ahead: channel.channel.ahead,
-            span: truth.channel.span,
-            limit: own
-                .map(|link| link.limit)
-                .or(truth.channel.default_max_age())?,
-        };
+        let link = link(plan, slot)?;
+        let truth = &plan.channels[link.slot].channel;
         Some(PredictionError {
             name: channel.name.clone(),
-            unit: truth.channel.unit.difference().to_string(),
-            slot,
-            truth: truth_slot,
-            pairing: Pairing::new(&link, 1),
+            unit: truth.unit.difference().to_string(),
+            truth: link.slot,
+            paired: PairedPrediction::new(slot, &link),
             squares: 0.0,
             weight: 0.0,
             last: None,

@@ -117,7 +117,7 @@ fn line(level: &str, message: &Message) -> Line {
     Line {
         level: level.to_owned(),
         event: message.name().to_owned(),
-        facts: message.facts(),
+        facts: message.facts().to_string(),
         // An event is a line.
         words: message.to_string().replace('\n', "; "),
     }

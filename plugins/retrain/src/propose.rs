@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use athermal_core::compile::{Plan, TruthLink};
-use athermal_core::engine::{Engine, EngineError, Fitted, Pairing};
+use athermal_core::compile::Plan;
+use athermal_core::engine::{Engine, EngineError, Fitted};
 use athermal_core::time::{Duration, Instant};
 use athermal_run::fit::{FitError, FitOptions, fit};
 use athermal_run::model::{Card, DataCard, Model};
 use athermal_run::recording::{Event, Recording, SourceError, Table, pass};
+use athermal_run::score::{PairedPrediction, link};
 
 use crate::sensors::{Broken, broken};
 
@@ -166,7 +167,7 @@ fn errors(
         for pair in &mut pairs {
             match event {
                 Event::Row(at) => pair.look(engine, at, at > from),
-                Event::Segment => pair.pairing.clear(),
+                Event::Segment => pair.paired.clear(),
             }
         }
     });
@@ -180,46 +181,28 @@ fn errors(
 /// A prediction, and the truth that it is of.
 struct Pair {
     name: String,
-    slot: usize,
     truth: usize,
-    pairing: Pairing,
+    paired: PairedPrediction,
     squares: f64,
     count: u64,
 }
 
 impl Pair {
     fn new(plan: &Plan, name: &str, slot: usize) -> Option<Self> {
-        let channel = &plan.channels[slot];
-        let truth = channel.predicts?;
-        let of = &plan.channels[truth].channel;
-        let own = plan.nodes[channel.node?].role.truth();
-        let link = TruthLink {
-            slot: truth,
-            ahead: channel.channel.ahead,
-            span: of.span,
-            limit: own.map(|link| link.limit).or(of.default_max_age())?,
-        };
+        let link = link(plan, slot)?;
         Some(Self {
             name: name.to_owned(),
-            slot,
-            truth,
-            pairing: Pairing::new(&link, 1),
+            truth: link.slot,
+            paired: PairedPrediction::new(slot, &link),
             squares: 0.0,
             count: 0,
         })
     }
 
     fn look(&mut self, engine: &Engine, now: Instant, counts: bool) {
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
-        }
-        let truth = engine.value(self.truth);
-        if truth.is_nan() {
-            return;
-        }
-        let predicted = self.pairing.truth(now).map_or(f64::NAN, |pair| pair.row[0]);
-        if counts && !predicted.is_nan() {
-            self.squares += (predicted - truth).powi(2);
+        let error = self.paired.error(engine, now, engine.value(self.truth));
+        if counts && !error.is_nan() {
+            self.squares += error.powi(2);
             self.count += 1;
         }
     }

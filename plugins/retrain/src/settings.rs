@@ -42,6 +42,8 @@ pub struct Retrain {
 
 /// The usual values of keys that need not be given.
 pub const ON: Duration = Duration::from_ns(14 * 86_400_000_000_000);
+/// How long a fit may take.
+const LONGEST: Wait = Wait::from_secs(6 * 3_600);
 /// As of [`ON`].
 pub const SHADOW: Duration = Duration::from_ns(30 * 60_000_000_000);
 
@@ -90,7 +92,9 @@ impl Retrain {
             return note(&beside.handle, format!("retrain: {reason}"));
         }
         let began = Clock::now();
-        let ended = self.spawn(beside).and_then(|child| wait(child, stop));
+        let ended = self
+            .spawn(beside)
+            .and_then(|child| wait(child, stop, LONGEST));
         let words = match ended {
             Ok((status, answer)) => outcome(status, &answer),
             Err(error) => format!("the fit could not be made: {error}"),
@@ -140,8 +144,9 @@ fn reason_against(frozen: Result<Option<bool>, NoAnswer>) -> Option<String> {
     }
 }
 
-/// Waits for a process, which is ended with the service: its status, and what it answers.
-fn wait(mut child: Child, stop: &Stop) -> io::Result<(i32, String)> {
+/// Waits for a process, which is ended with the service, and where it takes too long: its status, and what it answers.
+fn wait(mut child: Child, stop: &Stop, longest: Wait) -> io::Result<(i32, String)> {
+    let began = Clock::now();
     // Read beside, so that the process never waits for its reader.
     let read = |out| std::thread::spawn(move || io::read_to_string(out).unwrap_or_default());
     let answer = child.stdout.take().map(read);
@@ -149,9 +154,14 @@ fn wait(mut child: Child, stop: &Stop) -> io::Result<(i32, String)> {
         if let Some(status) = child.try_wait()? {
             break status.code().unwrap_or(-1);
         }
-        if !stop.wait(Wait::from_millis(200)) {
+        let is_late = began.elapsed() > longest;
+        if is_late || !stop.wait(Wait::from_millis(200)) {
             child.kill()?;
             child.wait()?;
+            if is_late {
+                let words = format!("it took longer than {} s, and was ended", longest.as_secs());
+                return Err(io::Error::other(words));
+            }
             break -1;
         }
     };
@@ -184,7 +194,7 @@ mod tests {
         let mut command = modest(2_000);
         command.args(["sh", "-c", "printf %s \"$1\"; exit $2", "sh", answer]);
         let child = command.arg(status.to_string()).stdout(Stdio::piped());
-        let (status, answer) = wait(child.spawn().unwrap(), &Stop::default()).unwrap();
+        let (status, answer) = wait(child.spawn().unwrap(), &Stop::default(), LONGEST).unwrap();
         outcome(status, &answer)
     }
 
@@ -222,10 +232,30 @@ mod tests {
     }
 
     #[test]
-    fn the_system_ends_a_fit_before_the_service() {
-        let mut command = modest(2_000);
-        let out = command.args(["cat", "/proc/self/oom_score_adj"]).output();
-        assert_eq!(String::from_utf8_lossy(&out.unwrap().stdout), "1000\n");
+    fn a_fit_has_the_least_priority_bounded_memory_and_is_ended_by_the_system_before_others() {
+        let mut command = modest(300);
+        let script =
+            "nice; ulimit -v; cat /proc/self/oom_score_adj; ionice 2>/dev/null || echo idle";
+        let out = command.args(["sh", "-c", script]).output().unwrap();
+        let out = String::from_utf8_lossy(&out.stdout);
+        assert_eq!(out.trim_end(), "19\n300000\n1000\nidle");
+        // More than that it is not given.
+        let mut command = modest(300);
+        let out = command.args(["sh", "-c", "head -c 400m /dev/zero | tail | wc -c"]);
+        assert_eq!(
+            String::from_utf8_lossy(&out.output().unwrap().stdout),
+            "0\n"
+        );
+    }
+
+    #[test]
+    fn a_fit_that_takes_too_long_is_ended() {
+        let child = modest(300).args(["sleep", "60"]).spawn().unwrap();
+        let id = child.id();
+        let ended = wait(child, &Stop::default(), Wait::from_millis(300));
+        let words = ended.unwrap_err().to_string();
+        assert!(words.contains("longer than 0 s"), "{words}");
+        assert!(!std::path::Path::new(&format!("/proc/{id}")).exists());
     }
 
     #[test]
@@ -238,7 +268,7 @@ mod tests {
             let child = command.args(["sleep", "60"]).stdout(Stdio::piped()).spawn();
             let child = child.unwrap();
             let id = child.id();
-            let status = wait(child, &stopped).unwrap().0;
+            let status = wait(child, &stopped, LONGEST).unwrap().0;
             tell.send((id, status)).unwrap();
         });
         let thread = Some(thread);

@@ -191,25 +191,9 @@ pub fn not_read(failure: Failure, watched: Option<&WatchedGraph>) -> Failure {
 }
 
 /// What happened at a hand-over.
-pub fn notice(terminal: &Terminal, notice: Notice) {
-    match notice {
-        Notice::TookOver {
-            revision,
-            tick,
-            time,
-        } => {
-            let words = format!("revision {revision} took over before tick {}", count(tick));
-            let facts = json!({ "revision": revision, "tick": tick, "time_s": seconds(time) });
-            terminal.note(Message::new("took_over", facts, words));
-        }
-        Notice::SentBack => {
-            let words = "the new graph came too late and was sent back";
-            terminal.warning(Message::new("sent_back", Value::Null, words));
-        }
-        Notice::Missed { ticks } => {
-            let were = if ticks == 1 { "was" } else { "were" };
-            let words = format!("{} {were} missed", counted(ticks, "tick"));
-            terminal.warning(Message::new("missed", json!({ "ticks": ticks }), words));
-        }
+pub fn notice(terminal: &Terminal, notice: &Notice) {
+    match athermal_http::words::notice(notice) {
+        (true, message) => terminal.warning(message),
+        (false, message) => terminal.note(message),
     }
 }

@@ -235,7 +235,7 @@ const PLANNED: &str = r#"
 schema = 1
 signals.set_point = { unit = "Cel", channels = ["chuck"], known_ahead = "10min", max_age = "1h" }
 signals.temperature = { unit = "Cel", channels = ["plate", "room"], range = ["0 Cel", "60 Cel"], max_age = "5min" }
-nodes.held = { type = "sum", inputs.signal = ["set_point", "temperature.plate", "temperature.room"], weights = [1.0, 1.0, 1.0] }
+nodes.held = { type = "sum", inputs.signal = ["set_point", "temperature.plate", "temperature.room"], weights = [1.0, 1.0, -1.0] }
 outputs.held = "held"
 "#;
 
