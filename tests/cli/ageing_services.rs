@@ -77,7 +77,7 @@ impl Serving {
         let scratch = Scratch::new(&format!("ageing-{name}"));
         scratch.file("graph.toml", GRAPH);
         scratch.file("day.csv", HEADER.to_owned() + &rows[..DAY].concat());
-        scratch.file("log.csv", HEADER.to_owned() + &rows[..7 * DAY].concat());
+        scratch.file("log.csv", HEADER);
         scratch.file("line.toml", format!("{GRAPH}{sections}"));
         let [graph, data, model] =
             ["graph.toml", "day.csv", "first.json"].map(|of| scratch.path(of));
@@ -89,7 +89,21 @@ impl Serving {
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn();
-        Self(child.unwrap(), scratch)
+        let serving = Self(child.unwrap(), scratch);
+        // As many at once as a service takes in without missing any.
+        for (nth, rows) in rows[..7 * DAY].chunks(1_440).enumerate() {
+            serving.append(rows);
+            let last_s = (60 * (nth * 1_440 + rows.len() - 1)) as f64;
+            serving.until("its first week", |of| of["last_s"].as_f64() == Some(last_s));
+        }
+        serving
+    }
+
+    /// More rows of the machine.
+    fn append(&self, rows: &[String]) {
+        let mut options = std::fs::OpenOptions::new();
+        let mut log = options.append(true).open(self.1.path("log.csv")).unwrap();
+        log.write_all(rows.concat().as_bytes()).unwrap();
     }
 
     fn status(&self) -> Value {
@@ -118,14 +132,11 @@ impl Serving {
 fn a_service_beside_a_machine_that_ages_proposes_a_better_fit_and_takes_it_when_it_is_ordered_to() {
     let rows = machine(1, 9);
     let serving = Serving::start("better", &rows, SERVICE);
-    let first = serving.until("its first week", |of| {
-        of["ticks"].as_u64() >= Some(7 * DAY as u64)
-    });
+    let first = serving.status();
     // From then on a day takes 28 s, far more than a fit.
-    let log = std::fs::OpenOptions::new().append(true);
-    let mut log = log.open(serving.1.path("log.csv")).unwrap();
-    let later = rows[7 * DAY..].to_vec();
+    let (log, later) = (serving.1.path("log.csv"), rows[7 * DAY..].to_vec());
     std::thread::spawn(move || {
+        let mut log = std::fs::OpenOptions::new().append(true).open(log).unwrap();
         for rows in later.chunks(6) {
             if log.write_all(rows.concat().as_bytes()).is_err() {
                 return;
@@ -201,9 +212,7 @@ fn a_service_whose_sensor_broke_proposes_nothing_and_its_journal_has_the_reason(
         *row = cells.join(",");
     }
     let serving = Serving::start("broken", &rows, SERVICE);
-    let first = serving.until("its first week", |of| {
-        of["ticks"].as_u64() >= Some(7 * DAY as u64)
-    });
+    let first = serving.status();
     let machine = serving.1.path("line.toml");
     let asked = athermal(&[&"retrain", &machine, &"--on", &"1d", &"--format", &"json"]).ended(1);
     let answer: Value = serde_json::from_str(&asked.out).unwrap();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use athermal_command::{
     Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
 };
+use athermal_core::diagnostic::counted;
 use athermal_core::time::Duration;
 use athermal_http::client::Address;
 use athermal_run::model::Model;
@@ -77,6 +78,11 @@ impl Running {
 
     /// The model that runs.
     fn model(&self) -> Result<Model, Failure> {
+        if self.revision().is_empty() {
+            let words =
+                "the service does not know what runs, since ticks were missed: start it again";
+            return Err(Failure::Request(words.to_owned()));
+        }
         let paths = athermal_serve::folder::StatePaths::new(&self.state);
         Ok(paths.model(self.revision())?)
     }
@@ -198,12 +204,11 @@ fn line(of: &Value) -> String {
     } else {
         ""
     };
-    format!(
-        "{}  fitted {}  on {} ticks{proposed}{runs}",
-        text("revision"),
-        text("created"),
-        of["ticks"]
-    )
+    let fitted = match of["ticks"].as_u64() {
+        Some(ticks) => format!("fitted {} on {}", text("created"), counted(ticks, "tick")),
+        None => "not fitted by itself".to_owned(),
+    };
+    format!("{}  {fitted}{proposed}{runs}", text("revision"))
 }
 
 impl Command for Models {

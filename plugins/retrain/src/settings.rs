@@ -139,7 +139,7 @@ fn reason_against(frozen: Result<Option<bool>, NoAnswer>) -> Option<String> {
     match frozen {
         Ok(Some(false)) => None,
         Ok(Some(true)) => Some("not while learning is frozen".to_owned()),
-        Ok(None) => Some("nothing runs that could be fitted anew".to_owned()),
+        Ok(None) => Some("what runs is not known, since ticks were missed".to_owned()),
         Err(error) => Some(format!("nothing is fitted: {error}")),
     }
 }

@@ -7,11 +7,11 @@ use athermal::Duration;
 use athermal::core::engine::{Carry, NodeCarry};
 use athermal::run::live::session::{Refusal, WatchedGraph};
 use athermal::run::live::{Notice, StageError, Staged, Verdict};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
-use athermal_analysis::figures::{apart, count, counted, length, seconds};
+use athermal_analysis::figures::{apart, counted, length};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 const ANOTHER_RUN: &str =
@@ -118,8 +118,11 @@ pub fn shadow(verdict: &Verdict) -> Message {
             counted(output.n as u64, "instant")
         );
     }
-    if let Some(ratio) = verdict.ratio {
-        let _ = write!(text, "\n  new to running: {ratio:.3}");
+    match verdict.ratio {
+        Some(ratio) => {
+            let _ = write!(text, "\n  new to running: {ratio:.3}");
+        }
+        None => text += " there was nothing to compare",
     }
     let facts = json!({ "outputs": verdict.outputs, "ratio": verdict.ratio });
     Message::new("shadow", facts, text)

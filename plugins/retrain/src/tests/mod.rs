@@ -251,7 +251,7 @@ fn a_plan_may_rest_and_a_value_out_of_range_is_none() {
             "set_point.chuck",
             "temperature.plate",
             "temperature.room",
-            "set_point.chuck_applies_at"
+            "set_point:applies_at.chuck"
         ]
     );
     let mut data = Table::default();
