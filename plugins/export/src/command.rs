@@ -10,13 +10,15 @@ use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 
 use crate::lower::Rates;
-use crate::{ExportError, Exported, Options, c, export_c, lower, onnx, state};
+use crate::{ExportError, Exported, Options, c, export_c, fmu, lower, onnx, state};
 
 /// What a graph is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Target {
     /// C99 with a runtime, a self test and recipes
     C,
+    /// A functional mock-up unit for co-simulation (FMI 3.0), with its sources
+    Fmu,
     /// ONNX, of the linear parts alone
     Onnx,
 }
@@ -26,6 +28,7 @@ enum Target {
 #[command(after_help = "Examples:
   athermal export c model.json -o c
   athermal export c model.json -o c --rate 1s --rate position=10s --frozen
+  athermal export fmu model.json -o fmu
   athermal export onnx model.json -o onnx")]
 pub(crate) struct Export {
     /// As what
@@ -69,6 +72,9 @@ impl Command for Export {
             return self.onnx(&engine, &options);
         }
         let exported = export_c(&engine, &options, self.float).map_err(failure)?;
+        if self.target == Target::Fmu {
+            return self.fmu(terminal, &exported);
+        }
         c::write(&exported.files, &self.output).map_err(failure)?;
         self.carry(&mut engine, &exported)?;
         self.report(terminal, &exported);
@@ -115,6 +121,26 @@ impl Export {
         println!(
             "wrote {}: {count} linear estimators, whose rows the caller makes",
             self.output.join(path).display()
+        );
+        Ok(Answer::Fine)
+    }
+
+    /// Writes a unit for co-simulation.
+    fn fmu(&self, terminal: &Terminal, exported: &Exported) -> Result<Answer, Failure> {
+        let form = &exported.form;
+        let path = self.output.join(format!("{}.fmu", form.name));
+        let binary = fmu::write(exported, &path, "cc").map_err(failure)?;
+        let (inputs, outputs) = (form.sources.len(), form.outputs.len());
+        let with = match binary {
+            fmu::Binary::Built(platform) => format!("its sources and a binary for {platform}"),
+            fmu::Binary::Without(why) => {
+                terminal.note(format!("{why}: the unit has its sources alone, which a simulator can build"));
+                "its sources".to_owned()
+            }
+        };
+        println!(
+            "wrote {}: {inputs} inputs and {outputs} outputs, with {with}",
+            path.display()
         );
         Ok(Answer::Fine)
     }

@@ -30,6 +30,14 @@ pub enum ExportError {
         /// Those that there are.
         known: String,
     },
+    /// A C compiler refuses what was written.
+    #[error("`{compiler}` refuses the sources: {said}")]
+    Compiler {
+        /// The compiler.
+        compiler: String,
+        /// What it says.
+        said: String,
+    },
     /// The engine that works out the ticks of the self test.
     #[error(transparent)]
     Engine(#[from] EngineError),

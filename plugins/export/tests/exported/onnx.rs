@@ -8,20 +8,20 @@ use athermal_export::{Rates, onnx};
 use crate::shipped::{second, shipped};
 use crate::support::{Scratch, ran};
 
-/// The Python that has onnxruntime; `ATHERMAL_PYTHON` names another than that of the system.
-fn python() -> Option<String> {
+/// The Python that has a package; `ATHERMAL_PYTHON` names another than that of the system.
+pub fn python(package: &str) -> Option<String> {
     let python = std::env::var("ATHERMAL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let found = Command::new(&python)
-        .args(["-c", "import onnxruntime, onnx"])
+        .args(["-c", &format!("import {package}")])
         .output();
     if found.is_ok_and(|output| output.status.success()) {
         return Some(python);
     }
     assert!(
         std::env::var_os("ATHERMAL_REQUIRE_SERVERS").is_none(),
-        "onnxruntime is not installed, and ATHERMAL_REQUIRE_SERVERS is set"
+        "{package} is not installed, and ATHERMAL_REQUIRE_SERVERS is set"
     );
-    eprintln!("skipped: onnxruntime is not installed");
+    eprintln!("skipped: {package} is not installed");
     None
 }
 
@@ -41,7 +41,7 @@ for node, of in rows.items():
 
 #[test]
 fn onnxruntime_gives_every_linear_estimator_within_1e12th_of_the_sum_of_magnitudes() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("onnxruntime, onnx") else { return };
     let scratch = Scratch::new("onnx");
     let (engine, exported) = shipped("die-tester.toml", Rates::every(second(10.0)));
     let (model, rows) = (scratch.path("model.onnx"), scratch.path("rows.json"));
