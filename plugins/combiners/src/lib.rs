@@ -10,7 +10,7 @@ mod hedge;
 mod mean;
 mod median;
 mod memory;
-mod share;
+pub mod share;
 mod state_gate;
 mod watch;
 

@@ -1,10 +1,10 @@
-//! Decides how weights are kept away from extremes; not where they come from.
+//! Decides what a vote counts beside its weight, and how weights are kept away from extremes; not where they come from.
 
 use athermal_core::node::Votes;
 
 /// What a vote counts whose regressors are so far outside of those of its fit: 1 up to the edge, then by the inverse square, as
 /// `auto_weighted` weighs an error that is so many times as large.
-pub(crate) fn trust(novelty: f64) -> f64 {
+pub fn trust(novelty: f64) -> f64 {
     if novelty > 1.0 {
         1.0 / (novelty * novelty)
     } else {

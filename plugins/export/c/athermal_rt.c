@@ -1069,7 +1069,10 @@ static at_ballot at_ballot_of(const at_plan *p, const at_vote *v, at_memory m)
 
 static int32_t at_error_place(const at_vote *v, const at_ballot *b, int32_t voter, int64_t nth)
 {
-    const int64_t place = (b->rings[2 * voter] + nth) % (int64_t)v->errors;
+    int64_t place = b->rings[2 * voter] + nth;
+    if (place >= (int64_t)v->errors) {
+        place -= (int64_t)v->errors;
+    }
     return (voter * v->errors) + (int32_t)place;
 }
 

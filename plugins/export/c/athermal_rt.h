@@ -12,20 +12,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef ATHERMAL_FLOAT
-/* Single precision: for small processors, within the error that the self test prints. */
-typedef float at_real;
 #if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0)
 #error "numbers must be computed in their own precision: FLT_EVAL_METHOD must be 0 (gcc on x86: -msse2 -mfpmath=sse)"
 #endif
+#if defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ != 0)
+#error "absence is NaN: build without -ffast-math, -Ofast and -ffinite-math-only"
+#endif
+
+#ifdef ATHERMAL_FLOAT
+/* Single precision: for small processors, within the error that the self test prints. */
+typedef float at_real;
 #define AT_LIMIT 1.0e15f
 #define AT_SMALLEST FLT_MIN
 #define AT_LARGEST 1.0e35f
 #else
 typedef double at_real;
-#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0)
-#error "numbers must be computed in their own precision: FLT_EVAL_METHOD must be 0 (gcc on x86: -msse2 -mfpmath=sse)"
-#endif
 #define AT_LIMIT 1.0e100
 #define AT_SMALLEST DBL_MIN
 #define AT_LARGEST 1.0e290

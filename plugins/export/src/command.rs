@@ -1,6 +1,5 @@
 //! The command: which graph is exported, how often samples come, and what it takes.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use athermal_command::{Answer, Command, Failure, Format, Terminal, println};
@@ -62,6 +61,7 @@ athermal_command::register_command!(Export, "export");
 
 impl Command for Export {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        self.for_target()?;
         let mut engine = Model::load(&self.model)?.engine()?;
         let options = Options {
             rates: self.rates()?,
@@ -84,17 +84,14 @@ impl Command for Export {
 
 fn failure(error: ExportError) -> Failure {
     match error {
-        ExportError::Write { .. } => Failure::Outside(error.to_string()),
+        ExportError::Write { .. } | ExportError::Compiler { .. } => Failure::Outside(error.to_string()),
         _ => Failure::Request(error.to_string()),
     }
 }
 
 impl Export {
     fn rates(&self) -> Result<Rates, Failure> {
-        let mut rates = Rates {
-            signals: BTreeMap::new(),
-            ..Rates::default()
-        };
+        let mut rates = Rates::default();
         for rate in &self.rate {
             let (signal, time) = match rate.split_once('=') {
                 Some((signal, time)) => (Some(signal), time),
@@ -109,6 +106,26 @@ impl Export {
             }
         }
         Ok(rates)
+    }
+
+    /// Refuses what only C has a place for.
+    fn for_target(&self) -> Result<(), Failure> {
+        let given = [
+            ("--state", self.state.is_some()),
+            ("--state-back", self.state_back.is_some()),
+            ("--float", self.float),
+        ];
+        let refused = given.iter().find(|(_, is_given)| *is_given);
+        match (self.target, refused) {
+            (Target::C, _) | (_, None) => Ok(()),
+            (target, Some((option, _))) => Err(Failure::Request(format!(
+                "`{option}` is for `export c`, and {} have no place for it: leave it out, or export to C",
+                match target {
+                    Target::Onnx => "ONNX models",
+                    _ => "units for co-simulation",
+                }
+            ))),
+        }
     }
 
     /// Writes the linear parts.
@@ -179,17 +196,18 @@ impl Export {
         let form = &exported.form;
         let (double, single) = (form.layout.bytes(8), form.layout.bytes(4));
         let operations = c::operations(form);
-        let error = self
+        let single_precision = self
             .float
-            .then(|| c::single_precision_error(&self.output, form));
-        let error = error.flatten();
+            .then(|| c::single_precision_error("cc", &self.output, form));
         if terminal.format == Format::Json {
             let facts = serde_json::json!({
                 "name": form.name,
                 "revision": form.revision,
                 "state_bytes": if self.float { single } else { double },
                 "operations": operations,
-                "single_precision_error": error,
+                "single_precision_error": single_precision.as_ref().and_then(|of| of.as_ref().ok()),
+                "single_precision_problem":
+                    single_precision.as_ref().and_then(|of| Some(of.as_ref().err()?.to_string())),
             });
             println!("{facts:#}");
             return;
@@ -202,15 +220,16 @@ impl Export {
             form.outputs.len(),
             if self.float { single } else { double },
         );
-        match (self.float, error) {
-            (true, Some(error)) => println!(
-                "single precision is off by {error:.1e} of the largest size of an output at most, in {} ticks",
+        match single_precision {
+            Some(Ok(error)) => println!(
+                "single precision is off by less than {error:e} of the largest size of an output, in {} ticks",
                 crate::TICKS
             ),
-            (true, None) => terminal.note(
-                "without a C compiler (`cc`) the error of single precision is not known: the example prints it",
-            ),
-            (false, _) => {}
+            Some(Err(none @ c::SinglePrecisionError::NoCompiler(_))) => {
+                terminal.note(none.to_string());
+            }
+            Some(Err(problem)) => terminal.warning(problem.to_string()),
+            None => {}
         }
         terminal.note(format!("next: make -C {} test", self.output.display()));
     }

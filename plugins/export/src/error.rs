@@ -12,7 +12,7 @@ pub enum ExportError {
     /// Nodes that have no counterpart on a controller.
     #[error("{}", listed(.0))]
     Nodes(Vec<Refusal>),
-    /// Two samples come at the same time, or so slowly that nothing is left of a window.
+    /// The time between two samples is not above 0.
     #[error(
         "the rate of `{signal}` is {given}: give the time between two samples, above 0, such as --rate {signal}=1s"
     )]
@@ -30,6 +30,7 @@ pub enum ExportError {
         /// Those that there are.
         known: String,
     },
+<<<<<<< HEAD
     /// A C compiler refuses what was written.
     #[error("`{compiler}` refuses the sources: {said}")]
     Compiler {
@@ -37,6 +38,15 @@ pub enum ExportError {
         compiler: String,
         /// What it says.
         said: String,
+=======
+    /// More state than a runtime finds its way in, whose places have 32 bits.
+    #[error(
+        "its state would take {bytes} bytes, more than there are places for: give the time between two samples with `--rate`"
+    )]
+    TooLarge {
+        /// How many, as far as there are numbers for it.
+        bytes: usize,
+>>>>>>> trunk
     },
     /// The engine that works out the ticks of the self test.
     #[error(transparent)]

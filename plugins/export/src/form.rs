@@ -71,7 +71,23 @@ impl Layout {
     /// Bytes of the state, each number having so many.
     #[must_use]
     pub fn bytes(&self, of_number: usize) -> usize {
-        8 * self.ints + of_number * self.reals
+        let reals = self.reals.saturating_mul(of_number);
+        self.ints.saturating_mul(8).saturating_add(reals)
+    }
+}
+
+/// The rules of votes that differ in what they keep, by their numbers in the runtime: `AT_GUARD` and `AT_STATE_GATE`.
+pub const GUARD: i64 = 5;
+/// See [`GUARD`].
+pub const STATE_GATE: i64 = 6;
+
+impl Form {
+    /// How many votes a vote has, and of how many it keeps errors: a guard compares each with predicting zero.
+    #[must_use]
+    pub fn voters(&self, vote: &Record) -> (usize, usize) {
+        let voters = self.gathers[vote.place_of("voters")].entries.len();
+        let each = if vote.int_of("rule") == GUARD { 2 } else { 1 };
+        (voters, each * voters)
     }
 }
 

@@ -22,7 +22,7 @@ use athermal_core::engine::Engine;
 
 pub use error::{ExportError, Refusal};
 pub use form::{Bundle, Entry, Field, Form, History, Layout, Port, Record, Step};
-pub use lower::{Options, Rates, identifier};
+pub use lower::{Options, Rates, identifier, lower};
 pub use ticks::{TICKS, Ticks, self_test};
 
 /// A graph as files.
@@ -34,14 +34,6 @@ pub struct Exported {
     pub ticks: Ticks,
     /// The files.
     pub files: Vec<c::File>,
-}
-
-/// The plan of an engine with its fit, as a controller steps it.
-///
-/// # Errors
-/// Where a node has no counterpart on a controller: all such nodes are named.
-pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
-    Ok(lower::lower(engine, options)?.with_scratch())
 }
 
 /// A graph in C99. `float`: whether its recipes build it in single precision; the sources are the same.

@@ -7,7 +7,7 @@ mod image;
 mod nodes;
 mod snapshot;
 
-use athermal_core::engine::{Engine, EngineState, fnv_1a};
+use athermal_core::engine::{Engine, fnv_1a};
 use thiserror::Error;
 
 use crate::form::Form;
@@ -56,7 +56,7 @@ impl CarryError {
 /// # Errors
 /// When the state of a node has a form that this version does not know.
 pub fn to_c(engine: &Engine, form: &Form) -> Result<Vec<u8>, CarryError> {
-    let state = Snapshot::read(&engine.snapshot())?;
+    let state = Snapshot::read(&engine.state())?;
     let mut image = Image::new(form);
     image.ints[0] = state.tick as i64;
     if state.last > i64::MIN {
@@ -106,7 +106,7 @@ pub fn from_c(engine: &mut Engine, form: &Form, saved: &[u8]) -> Result<(), Carr
     // Of a cold engine the names, units and limits stay.
     let cold = Engine::new(engine.plan().clone(), engine.fitted());
     let cold = cold.map_err(|error| CarryError::of(&form.title, error))?;
-    let mut state = Snapshot::read(&cold.snapshot())?;
+    let mut state = Snapshot::read(&cold.state())?;
     state.tick = image.ints[0] as u64;
     state.last = if image.ints[2] == 0 {
         i64::MIN
@@ -139,9 +139,6 @@ pub fn from_c(engine: &mut Engine, form: &Form, saved: &[u8]) -> Result<(), Carr
             nodes::take(&image, form, node, known)?;
         }
     }
-    let bytes = state.write(&form.title)?;
-    // What is not a snapshot says so here and not within the engine.
-    EngineState::from_bytes(&bytes)?;
-    engine.restore(&bytes)?;
-    Ok(())
+    let state = state.write(&form.title)?;
+    Ok(engine.restore(&state.to_bytes())?)
 }

@@ -4,8 +4,12 @@ mod example;
 mod tables;
 
 use std::fmt::Write as _;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
+
+use athermal_features::slope::kernel::FEWEST_ROWS;
+use thiserror::Error;
 
 use crate::error::ExportError;
 use crate::form::{Form, Port, Record};
@@ -64,12 +68,45 @@ pub(crate) fn write_bytes(folder: &Path, path: &str, bytes: &[u8]) -> Result<(),
     written.map_err(|source| ExportError::Write { path, source })
 }
 
-/// The largest error of single precision in the self test of an exported folder, in units of the largest size of the output; none
-/// without a C compiler.
-#[must_use]
-pub fn single_precision_error(folder: &Path, form: &Form) -> Option<f64> {
+/// Why the error of single precision is not known, or is no small one.
+#[derive(Debug, Error)]
+pub enum SinglePrecisionError {
+    /// There is no compiler.
+    #[error(
+        "there is no C compiler (`{0}`), so the error of single precision is not known: the example prints it"
+    )]
+    NoCompiler(String),
+    /// The compiler does not compile it.
+    #[error("`{0}` does not compile it in single precision:\n{1}")]
+    Compiler(String, String),
+    /// The example does not end as it should.
+    #[error("the self test of single precision did not run to its end: {0}")]
+    Example(String),
+    /// Some output is not what it should be.
+    #[error(
+        "in single precision the self test fails at tick {tick}: an output is absent where it should not be, or off by more than 0.01 of \
+         its largest size; the largest error is at least {error:e}"
+    )]
+    SelfTest {
+        /// The first tick that differs, from 1.
+        tick: u64,
+        /// The largest error, at least.
+        error: f64,
+    },
+}
+
+/// What the error of single precision is less than in the self test of an exported folder, in units of the largest size of the output;
+/// the example counts whole millionths.
+///
+/// # Errors
+/// Without the compiler, where it compiles nothing, and where the self test fails.
+pub fn single_precision_error(
+    compiler: &str,
+    folder: &Path,
+    form: &Form,
+) -> Result<f64, SinglePrecisionError> {
     let program = folder.join("single_precision_error");
-    let built = Command::new("cc")
+    let built = Command::new(compiler)
         .args(["-std=c99", "-O2", "-ffp-contract=off", "-DATHERMAL_FLOAT"])
         .arg("-I")
         .arg(folder)
@@ -82,28 +119,49 @@ pub fn single_precision_error(folder: &Path, form: &Form) -> Option<f64> {
         .arg("-o")
         .arg(&program)
         .output();
-    let ran = built
-        .ok()
-        .filter(|built| built.status.success())
-        .and_then(|_| {
-            Command::new(std::path::absolute(&program).ok()?)
-                .output()
-                .ok()
-        });
+    let complaint = match built {
+        Ok(built) if built.status.success() => None,
+        Ok(built) => Some(String::from_utf8_lossy(&built.stderr).trim().to_owned()),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            return Err(SinglePrecisionError::NoCompiler(compiler.to_owned()));
+        }
+        Err(error) => Some(error.to_string()),
+    };
+    if let Some(complaint) = complaint {
+        let compiler = compiler.to_owned();
+        return Err(SinglePrecisionError::Compiler(compiler, complaint));
+    }
+    let ran = std::path::absolute(&program).and_then(|program| Command::new(program).output());
     let _ = std::fs::remove_file(&program);
-    let said = String::from_utf8(ran?.stdout).ok()?;
-    let millionths = said.split("error ").nth(1)?.split(' ').next()?;
-    millionths.parse::<f64>().ok().map(|error| error / 1e6)
+    let ran = ran.map_err(|error| SinglePrecisionError::Example(error.to_string()))?;
+    let said = String::from_utf8_lossy(&ran.stdout);
+    let number = |after: &str| {
+        let rest = said.split_once(after)?.1;
+        let end = rest.find(|c: char| !c.is_ascii_digit());
+        rest[..end.unwrap_or(rest.len())].parse::<u64>().ok()
+    };
+    match (number("self test "), number(", error ")) {
+        (Some(0), Some(millionths)) if ran.status.success() => Ok((millionths + 1) as f64 / 1e6),
+        (Some(tick), Some(millionths)) if tick > 0 => Err(SinglePrecisionError::SelfTest {
+            tick,
+            error: millionths as f64 / 1e6,
+        }),
+        _ => Err(SinglePrecisionError::Example(ran.status.to_string())),
+    }
 }
 
-/// What a tick takes, in operations on numbers: additions, products and the like.
+/// What a tick takes at worst, in operations on numbers, additions, products and the like: with full windows in which every channel
+/// lacks a sample, and votes of which each lets errors go. What lines take is left out whose samples all but coincide: these are taken
+/// over the samples once more.
 #[must_use]
 pub fn operations(form: &Form) -> usize {
     let of_node = |node: &Record| match node.kind {
         "slope" => {
             let (rows, channels) = (node.place_of("room"), node.place_of("channels"));
-            let windows = node.place_of("windows");
-            rows * (4 + 4 * channels) + windows * channels * 25
+            let (blocks, windows) = (node.place_of("blocks"), node.place_of("windows"));
+            // A window that begins within the current block is summed by itself, over as many rows as the smallest blocks have.
+            let rows = rows + windows * FEWEST_ROWS as usize;
+            rows * (4 + 7 * channels) + blocks * (12 + 14 * channels) + windows * channels * 50
         }
         "linear" => {
             let width = node.place_of("width");
@@ -113,6 +171,8 @@ pub fn operations(form: &Form) -> usize {
             });
             2 * width + novelty.map_or(0, |directions| width * (4 + 2 * directions))
         }
+        // The memory of every voter is summed anew.
+        "vote" => 2 * form.voters(node).1 * node.place_of("errors") + 40,
         _ => 40,
     };
     form.nodes.iter().map(of_node).sum()
@@ -172,7 +232,7 @@ fn header(form: &Form) -> String {
          #ifndef {upper}_H\n#define {upper}_H\n\n#include \"athermal_rt.h\"\n\n\
          #define {upper}_REVISION \"{}\"\n\
          #define {upper}_INPUTS {}\n#define {upper}_OUTPUTS {}\n\
-         /* Bytes of the state. A tick takes about {} operations on numbers. */\n\
+         /* Bytes of the state. A tick takes about {} operations on numbers at worst. */\n\
          #define {upper}_STATE_BYTES ({}u + ({}u * sizeof(at_real)))\n\
          #define {upper}_SAVED_BYTES {}u\n\
          #define {upper}_TICKS {}\n\

@@ -11,15 +11,14 @@ use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use athermal_features::slope::Cold;
+use athermal_features::slope::kernel::{FEWEST_ROWS, MOST_ROWS};
 use athermal_features::{FirstOrder, FirstOrderOutput, Lag, Slope};
 use serde::de::DeserializeOwned;
 
 use super::{Lowering, Refused, SPARE, first, refuse, samples, unread};
 use crate::form::{Field, Record};
 
-/// Rows of a block of the kernel of slopes at most and at least, and sums over a run of rows of each channel.
-const MOST_ROWS: usize = 64;
-const FEWEST_ROWS: usize = 8;
+/// Sums over a run of rows of each channel.
 const SUMS: usize = 5;
 
 /// A feature as it is planned.
@@ -147,11 +146,11 @@ impl Lowering<'_> {
         }
         let longest = windows.iter().copied().max().unwrap_or_default();
         let period = self.periods.of_gather(self.plan, gather);
-        let room = samples(longest, period) + MOST_ROWS;
-        let blocks = room / FEWEST_ROWS + 4;
+        let room = samples(longest, period, MOST_ROWS as usize);
+        let blocks = room / FEWEST_ROWS as usize + 4;
         let count = channels.len();
-        let ints = self.ints(5 + blocks + widths.len() + 3 * count + room);
-        let reals = self.reals(count + room * count);
+        let ints = self.ints((5 + blocks + widths.len() + 3 * count).saturating_add(room));
+        let reals = self.reals(room.saturating_add(1).saturating_mul(count));
         self.scratch(4 * SUMS * count);
         Ok(of
             .record("slope")

@@ -32,13 +32,13 @@ pub struct Options {
     pub name: Option<String>,
 }
 
-/// Why a node is not exported.
-type Refused = Vec<(String, String)>;
+/// Why a node is not exported, and what to do.
+type Refused = (String, String);
 
-/// The plan of an engine with its fit, lowered.
+/// The plan of an engine with its fit, as a controller steps it.
 ///
 /// # Errors
-/// Where there is a node without a counterpart on a controller: all of them are named.
+/// Where a node has no counterpart on a controller: all such nodes are named. Where samples come so often that the past has no room.
 pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
     let plan = engine.plan();
     let periods = Periods::new(plan, &options.rates)?;
@@ -50,11 +50,11 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
         places.push(nodes.len());
         match lowering.node(engine, node, options) {
             Ok(record) => nodes.push(record),
-            Err(refused) => refusals.extend(refused.into_iter().map(|(why, way)| Refusal {
+            Err((why, way)) => refusals.push(Refusal {
                 node: node.instance(),
                 why,
                 way,
-            })),
+            }),
         }
     }
     let planned = plan.sources.iter().filter(|of| of.planned.is_some());
@@ -65,6 +65,14 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
     }));
     if !refusals.is_empty() {
         return Err(ExportError::Nodes(refusals));
+    }
+    // What is needed within a step lies behind all else.
+    let scratch = lowering.layout.scratch;
+    lowering.layout.scratch = lowering.reals(scratch);
+    let layout = lowering.layout;
+    if layout.ints.max(layout.reals) > i32::MAX as usize {
+        let bytes = layout.bytes(8);
+        return Err(ExportError::TooLarge { bytes });
     }
     let steps = plan.steps.iter().filter_map(|step| match *step {
         PlannedStep::Gather(gather) => Some(Step::Gather(gather)),
@@ -99,7 +107,7 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
         warm_up_ns: plan.warm_up.as_ns(),
         gathers: lowering.gathers,
         histories: lowering.histories,
-        layout: lowering.layout,
+        layout,
     })
 }
 
@@ -182,14 +190,14 @@ impl<'a> Lowering<'a> {
     /// Where so many integers lie.
     fn ints(&mut self, count: usize) -> usize {
         let first = self.layout.ints;
-        self.layout.ints += count;
+        self.layout.ints = first.saturating_add(count);
         first
     }
 
     /// Where so many numbers lie.
     fn reals(&mut self, count: usize) -> usize {
         let first = self.layout.reals;
-        self.layout.reals += count;
+        self.layout.reals = first.saturating_add(count);
         first
     }
 
@@ -199,8 +207,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn history(&mut self, slot: Option<usize>, depth: Duration, period: i64, stamped: bool) {
-        let room = samples(depth, period) + SPARE;
-        let ints = self.ints(2 + if stamped { 2 * room } else { room });
+        let room = samples(depth, period, SPARE);
+        let times = room.saturating_mul(1 + usize::from(stamped));
+        let ints = self.ints(times.saturating_add(2));
         let reals = self.reals(room);
         self.histories.push(History {
             slot,
@@ -233,35 +242,24 @@ impl<'a> Lowering<'a> {
         node: &PlannedNode,
         options: &Options,
     ) -> Result<Record, Refused> {
-        let record = match &node.role {
+        match &node.role {
             PlannedRole::Feature { .. } => self.feature(node),
             PlannedRole::Estimator { .. } => self.estimator(engine, node, options),
             PlannedRole::Combiner { .. } => self.combiner(node),
-        }?;
-        // What is needed within a step lies behind all else.
-        Ok(record)
+        }
     }
 }
 
-impl Form {
-    /// Puts the room that is needed within a step behind all else.
-    pub(crate) fn with_scratch(mut self) -> Self {
-        let needed = self.layout.scratch;
-        self.layout.scratch = self.layout.reals;
-        self.layout.reals += needed;
-        self
-    }
-}
-
-/// How many samples there are within a time.
-fn samples(time: Duration, period: i64) -> usize {
-    let count = (time.as_ns().max(0) + period - 1) / period.max(1);
-    usize::try_from(count).unwrap_or(usize::MAX / 64)
+/// How many samples there are within a time, and some to spare.
+fn samples(time: Duration, period: i64, spare: usize) -> usize {
+    let (time, period) = (time.as_ns().max(0), period.max(1));
+    let count = time.unsigned_abs().div_ceil(period.unsigned_abs());
+    usize::try_from(count).map_or(usize::MAX, |count| count.saturating_add(spare))
 }
 
 /// A refusal of one kind.
 fn refuse<T>(why: impl Into<String>, way: impl Into<String>) -> Result<T, Refused> {
-    Err(vec![(why.into(), way.into())])
+    Err((why.into(), way.into()))
 }
 
 /// Refuses an output port that somebody reads.

@@ -1,17 +1,18 @@
 //! Combiners: which rule a vote follows, and how many runs, truths and errors it remembers.
 
+use athermal_combiners::share::trust;
 use athermal_combiners::{AutoWeighted, Best, Guard, Memory, StateGate, Trimmed, Weighting};
 use athermal_core::compile::{PlannedNode, PlannedRole, TruthLink};
 use athermal_core::time::Duration;
 
 use super::features::parameters;
 use super::{Lowering, Refused, SPARE, first, refuse, samples, unread};
-use crate::form::{Field, Record};
+use crate::form::{Field, GUARD, Record, STATE_GATE};
 
 /// What a vote follows, beside what it reads.
 #[derive(Default)]
 struct Rule {
-    number: usize,
+    number: i64,
     memory: Option<Memory>,
     form: usize,
     shrinkage: f64,
@@ -20,6 +21,22 @@ struct Rule {
     min_truths: f64,
     least_trust: f64,
     dwell: Duration,
+}
+
+/// What no vote of the runtime does, and what to write instead.
+const POWER: (&str, &str) = (
+    "a `power` other than 2 and 4",
+    "use 2, which is the default, or 4",
+);
+const HALF_LIFE: (&str, &str) = (
+    "a memory with a `half_life`",
+    "use a time, such as `memory = \"15min\"`, or `{ truths = 12 }`",
+);
+
+fn cannot<T>(reasons: &[(&str, &str)]) -> Result<T, Refused> {
+    let (what, ways): (Vec<&str>, Vec<&str>) = reasons.iter().copied().unzip();
+    let what = what.join(" and ");
+    refuse(format!("{what} cannot be exported"), ways.join("; "))
 }
 
 fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
@@ -31,11 +48,9 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
         ("athermal-combiners", "auto_weighted") => {
             let spec: AutoWeighted = parameters(node)?;
             let power = spec.power.unwrap_or(2.0);
+            let fades = matches!(spec.memory, Memory::HalfLife(_));
             if power != 2.0 && power != 4.0 {
-                return refuse(
-                    "a `power` other than 2 and 4 cannot be exported",
-                    "leave `power` out: 2 is what inverse variances have",
-                );
+                return cannot(&[POWER, HALF_LIFE][..1 + usize::from(fades)]);
             }
             Ok(Rule {
                 memory: Some(spec.memory),
@@ -66,18 +81,17 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
         ("athermal-combiners", "fallback") => Ok(plain(4)),
         ("athermal-combiners", "guard") => {
             let spec: Guard = parameters(node)?;
-            let most = spec.most_novel;
             Ok(Rule {
                 memory: Some(spec.memory),
                 min_truths: spec.min_truths as f64,
                 // As a vote at the most novelty counts.
-                least_trust: if most > 1.0 { 1.0 / (most * most) } else { 1.0 },
-                ..plain(5)
+                least_trust: trust(spec.most_novel),
+                ..plain(GUARD)
             })
         }
         ("athermal-combiners", "state_gate") => Ok(Rule {
             dwell: parameters::<StateGate>(node)?.dwell,
-            ..plain(6)
+            ..plain(STATE_GATE)
         }),
         (package, kind) => refuse(
             format!("the kind `{kind}` of {package} cannot be exported"),
@@ -115,11 +129,17 @@ impl Lowering<'_> {
         let period = self.periods.of_votes(self.plan, *voters, *state);
         let rooms = self.rooms(&rule, truth.as_ref(), period)?;
         let count = self.gathers[*voters].entries.len();
-        let judged = if rule.number == 5 { 2 * count } else { count };
-        let ints =
-            self.ints(7 + rooms.runs + 2 * rooms.waiting + 2 * judged + judged * rooms.errors);
-        let reals = self
-            .reals(rooms.runs * count + rooms.waiting + judged * rooms.errors + 2 * judged + count);
+        let judged = if rule.number == GUARD {
+            2 * count
+        } else {
+            count
+        };
+        let errors = judged.saturating_mul(rooms.errors);
+        let (runs, waiting) = (rooms.runs, rooms.waiting);
+        let sum = |of: &[usize]| of.iter().fold(0, |sum: usize, of| sum.saturating_add(*of));
+        let ints = self.ints(sum(&[7, runs, waiting, waiting, 2 * judged, errors]));
+        let rows = runs.saturating_mul(count);
+        let reals = self.reals(sum(&[rows, waiting, errors, 2 * judged, count]));
         self.scratch(4 * count);
         let heeded = beside.novelties.and(novelties.as_ref());
         let which = heeded.map_or(&[][..], |(_, which)| which);
@@ -128,7 +148,7 @@ impl Lowering<'_> {
             Field::Int(truth.as_ref().map_or(0, |link| of(link).as_ns()))
         };
         Ok(Record::new("vote", node.instance())
-            .int("rule", rule.number)
+            .with("rule", Field::Int(rule.number))
             .int("voters", *voters)
             .maybe("state", *state)
             .maybe("novelties", heeded.map(|(gather, _)| *gather))
@@ -171,18 +191,13 @@ impl Lowering<'_> {
         let of_truth = self.periods.slots[link.slot];
         let (errors, by_count, longest) = match rule.memory {
             None => (1, false, 0),
-            Some(Memory::Time(time)) => (samples(time, of_truth) + SPARE, false, time.as_ns()),
+            Some(Memory::Time(time)) => (samples(time, of_truth, SPARE), false, time.as_ns()),
             Some(Memory::Truths(last)) => (last.truths, true, last.truths as i64),
-            Some(Memory::HalfLife(_)) => {
-                return refuse(
-                    "a memory with a `half_life` cannot be exported",
-                    "use a time, such as `memory = \"15min\"`, or `{ truths = 12 }`",
-                );
-            }
+            Some(Memory::HalfLife(_)) => return cannot(&[HALF_LIFE]),
         };
         Ok(Rooms {
-            runs: samples(link.ahead + link.embargo(), period) + SPARE,
-            waiting: samples(link.embargo(), of_truth) + SPARE,
+            runs: samples(link.ahead + link.embargo(), period, SPARE),
+            waiting: samples(link.embargo(), of_truth, SPARE),
             errors,
             by_count,
             longest,

@@ -1,5 +1,7 @@
 //! The state of an exported graph as it lies in memory, and as `NAME_save` writes it.
 
+use athermal_core::engine::fnv_1a;
+
 use super::snapshot::{Past, PastEntry};
 use crate::c::bits;
 use crate::form::{Form, History};
@@ -12,14 +14,6 @@ const HEADER: usize = 5;
 pub(super) struct Image {
     pub(super) ints: Vec<i64>,
     pub(super) reals: Vec<f64>,
-}
-
-/// FNV-1a over words, as the runtime has it.
-fn checksum(words: &[u64]) -> u64 {
-    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
 }
 
 impl Image {
@@ -36,8 +30,10 @@ impl Image {
         let mut words = vec![NAME, revision, ints, reals, 8];
         words.extend(self.ints.iter().map(|&value| value as u64));
         words.extend(self.reals.iter().map(|&value| bits(value)));
-        words.push(checksum(&words));
-        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+        let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let checksum = fnv_1a(&bytes);
+        bytes.extend_from_slice(&checksum.to_le_bytes());
+        bytes
     }
 
     pub(super) fn from_bytes(
@@ -52,7 +48,7 @@ impl Image {
             return Err("another length than its states have");
         }
         let (last, body) = words.split_last().ok_or("there are none")?;
-        if checksum(body) != *last {
+        if fnv_1a(&bytes[..8 * body.len()]) != *last {
             return Err("the checksum does not fit");
         }
         let (ints, reals) = (layout.ints as u64, layout.reals as u64);

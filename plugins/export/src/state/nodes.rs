@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::CarryError;
 use super::image::Image;
 use super::snapshot::{Node, Past, Withheld};
-use crate::form::{Form, Record};
+use crate::form::{Form, Record, STATE_GATE};
 
 #[derive(Serialize, Deserialize)]
 struct Slope {
@@ -196,13 +196,22 @@ impl Image {
         }
     }
 
-    fn take_slope(&self, node: &Record, kernel: &mut Kernel) {
+    fn take_slope(
+        &self,
+        form: &Form,
+        node: &Record,
+        kernel: &mut Kernel,
+    ) -> Result<(), CarryError> {
         let (ints, reals) = places(node);
         let (room, blocks) = (node.place_of("room"), node.place_of("blocks"));
         let (windows, count) = (node.longs_of("width").len(), node.place_of("channels"));
         let rows = self.ints[ints] as usize;
         let starts = &self.ints[ints + 5..][..self.ints[ints + 4] as usize];
-        let oldest = (starts[0] as usize).max(rows.saturating_sub(room));
+        let Some(&oldest) = starts.first() else {
+            let reason = format!("it was saved before `{}_init` was called", form.name);
+            return Err(CarryError::of(&node.node, reason));
+        };
+        let oldest = (oldest as usize).max(rows.saturating_sub(room));
         let channels = ints + 5 + blocks + windows;
         let time = |row: usize| self.ints[channels + 3 * count + row % room];
         let sample = |row: usize, channel: usize| {
@@ -226,6 +235,7 @@ impl Image {
         kernel.newest_ns = (0..count)
             .map(|nth| of(channels + 2 * count, nth))
             .collect();
+        Ok(())
     }
 }
 
@@ -250,13 +260,8 @@ struct Ballot {
 
 impl Ballot {
     fn new(form: &Form, node: &Record) -> Self {
-        let voters = form.gathers[node.place_of("voters")].entries.len();
+        let (voters, judged) = form.voters(node);
         let (ints, rows) = places(node);
-        let judged = if node.int_of("rule") == 5 {
-            2 * voters
-        } else {
-            voters
-        };
         let (runs, waiting) = (node.place_of("runs"), node.place_of("waiting"));
         let errors = node.place_of("errors");
         let run_times = ints + 7;
@@ -418,7 +423,7 @@ pub(super) fn put(
         "vote" => {
             if let Some(ballot) = &ballot {
                 match node.int_of("rule") {
-                    6 => {
+                    STATE_GATE => {
                         let state: Gate = read(node, own)?;
                         image.ints[ints + 4] = state.followed.map_or(-1, |of| of as i64);
                         if let Some((other, since)) = state.other {
@@ -495,7 +500,7 @@ pub(super) fn take(
     known.own = match node.kind {
         "slope" => {
             let mut state: Slope = read(node, own)?;
-            image.take_slope(node, &mut state.kernel);
+            image.take_slope(form, node, &mut state.kernel)?;
             written(node, &state)?
         }
         "lag" => {
@@ -518,7 +523,7 @@ pub(super) fn take(
             state.values = image.reals[reals + count..][..width].to_vec();
             written(node, &state)?
         }
-        "vote" if node.int_of("rule") == 6 => {
+        "vote" if node.int_of("rule") == STATE_GATE => {
             let mut state: Gate = read(node, own)?;
             state.followed = u64::try_from(image.ints[ints + 4]).ok();
             let other = u64::try_from(image.ints[ints + 5]).ok();

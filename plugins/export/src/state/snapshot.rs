@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use athermal_core::engine::{EngineState, RestoreError, fnv_1a};
+use athermal_core::engine::EngineState;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::CarryError;
-
-const MAGIC: &[u8; 16] = b"athermal state 1";
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Snapshot {
@@ -87,20 +86,17 @@ pub(super) struct Withheld {
 }
 
 impl Snapshot {
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, CarryError> {
-        // The engine looks at the name and the checksum.
-        EngineState::from_bytes(bytes)?;
-        let payload = bytes.get(MAGIC.len() + 8..);
-        let payload = payload.ok_or(RestoreError::NotASnapshot)?;
-        rmp_serde::from_slice(payload).map_err(|error| CarryError::of("the engine", error))
+    pub(super) fn read(state: &EngineState) -> Result<Self, CarryError> {
+        translated(state).map_err(|reason| CarryError::of("the engine", reason))
     }
 
-    pub(super) fn write(&self, of: &str) -> Result<Vec<u8>, CarryError> {
-        let payload = rmp_serde::to_vec_named(self);
-        let payload = payload.map_err(|error| CarryError::of(of, error))?;
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend_from_slice(&fnv_1a(&payload).to_le_bytes());
-        bytes.extend_from_slice(&payload);
-        Ok(bytes)
+    pub(super) fn write(&self, of: &str) -> Result<EngineState, CarryError> {
+        translated(self).map_err(|reason| CarryError::of(of, reason))
     }
+}
+
+/// The same under other types, by the names of its fields.
+fn translated<T: DeserializeOwned>(of: &impl Serialize) -> Result<T, String> {
+    let written = rmp_serde::to_vec_named(of).map_err(|error| error.to_string())?;
+    rmp_serde::from_slice(&written).map_err(|error| error.to_string())
 }

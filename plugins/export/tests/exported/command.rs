@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use athermal_command::terminal::Options;
 use athermal_command::{Failure, Terminal};
-use athermal_core::engine::Engine;
+use athermal_core::engine::{Engine, fnv_1a};
 use athermal_core::prng::Prng;
 use athermal_run::model::Model;
 
@@ -75,13 +75,7 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
     );
 
     let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
-    let names: Vec<String> = model
-        .plan
-        .sources
-        .iter()
-        .map(|of| of.name.clone())
-        .collect();
-    let events = events(&mut Prng::stream(12, "events"), &names, 2_000);
+    let events = events(&mut Prng::stream(12, "events"), &model.plan, 2_000);
     stepped(&mut engine, &events[..1_500]);
     let state = scratch.path("machine.state");
     std::fs::write(&state, engine.snapshot()).unwrap();
@@ -97,6 +91,24 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
         stepped(&mut engine, &events[1_500..])
     );
 
+    // What NAME_save writes before NAME_init: zeros.
+    let saved = std::fs::read(&of_c).unwrap();
+    let mut zeros = saved[..saved.len() - 8].to_vec();
+    zeros[40..].fill(0);
+    let checksum = fnv_1a(&zeros);
+    zeros.extend(checksum.to_le_bytes());
+    let of_nothing = scratch.path("zeros.state");
+    std::fs::write(&of_nothing, zeros).unwrap();
+    let error = run(&[
+        "--rate",
+        "240ms",
+        "--state-back",
+        of_nothing.to_str().unwrap(),
+    ])
+    .unwrap_err();
+    let expected = "it was saved before `random_graph_init` was called";
+    assert!(error.contains(expected), "{error}");
+
     let error = run(&["--rate", "fast"]).unwrap_err();
     assert!(error.contains("--rate fast"), "{error}");
     let error = run(&["--rate", "nothing=1s"]).unwrap_err();
@@ -104,4 +116,24 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
     // Room for another rate is another state.
     let error = run(&["--rate", "1s", "--state-back", of_c.to_str().unwrap()]).unwrap_err();
     assert!(error.contains("another length"), "{error}");
+}
+
+#[test]
+fn onnx_and_units_for_co_simulation_take_no_state_and_no_single_precision() {
+    let scratch = Scratch::new("command-targets");
+    let path = scratch.path("model.json");
+    model(&path);
+    for (target, written) in [("onnx", "random_graph.onnx"), ("fmu", "random_graph.fmu")] {
+        let folder = scratch.path(target);
+        let first = [target, path.to_str().unwrap(), "-o"];
+        let first = [&first[..], &[folder.to_str().unwrap()]].concat();
+        for words in [&["--state", "a"][..], &["--state-back", "a"], &["--float"]] {
+            let error = export(&[&first[..], words].concat()).unwrap_err();
+            let begun = format!("`{}` is for `export c`", words[0]);
+            assert!(error.contains(&begun), "{error}");
+            assert!(!folder.exists());
+        }
+        export(&first).unwrap();
+        assert!(folder.join(written).exists());
+    }
 }

@@ -19,11 +19,9 @@ use crate::support::{Scratch, has, ran};
 const SCRIPT: &str = r#"
 import ctypes, json, re, struct, sys, os
 import fmpy, fmpy.fmi3, fmpy.validation
-from fmpy.util import compile_platform_binary
+from fmpy.build import build_platform_binary
 unit, asked = sys.argv[1], json.load(open(sys.argv[2]))
 answer = {"problems": fmpy.validation.validate_fmu(unit)}
-if asked.get("compile"):
-    compile_platform_binary(unit)
 description = fmpy.read_model_description(unit)
 variables = {of.name: of for of in description.modelVariables}
 answer["units"] = sorted({of.unit for of in description.modelVariables if of.unit})
@@ -31,6 +29,8 @@ answer["described"] = all(of.description for of in description.modelVariables)
 answer["definitions"] = {of.name: [of.baseUnit.m, of.baseUnit.s, of.baseUnit.K, of.baseUnit.factor, of.baseUnit.offset]
                          for of in description.unitDefinitions if of.baseUnit}
 folder = fmpy.extract(unit)
+if asked["compile"]:
+    build_platform_binary(folder)
 said = []
 def begun(token=None):
     instance = fmpy.fmi3.FMU3Slave(guid=token or description.guid, unzipDirectory=folder,
@@ -215,10 +215,13 @@ fn a_simulation_of_fmpy_is_the_engine_stepped_at_the_same_instants() {
         ports.iter().map(|port| port.name.clone()).collect()
     };
     let outputs = names(&form.outputs);
-    let question = json!({"inputs": names(&form.sources), "outputs": outputs, "rows": rows, "step": 10.0});
+    let question =
+        json!({"inputs": names(&form.sources), "outputs": outputs, "rows": rows, "step": 10.0});
     let path = scratch.path("asked.json");
     std::fs::write(&path, question.to_string()).unwrap();
-    let said = ran(Command::new(python).args(["-c", SIMULATED]).args([&unit, &path]));
+    let said = ran(Command::new(python)
+        .args(["-c", SIMULATED])
+        .args([&unit, &path]));
     let found: Vec<Vec<String>> = serde_json::from_str(said.lines().last().unwrap()).unwrap();
     let mut engine = Engine::new(Arc::clone(engine.plan()), engine.fitted()).unwrap();
     let mut given = 0;

@@ -6,20 +6,7 @@ use std::process::Command;
 use athermal_export::Rates;
 
 use crate::shipped::{second, shipped};
-use crate::support::{Exhibit, Scratch, has, project, ran};
-
-/// What a program says of the self test: its number and the hash over all outputs.
-fn self_test(said: &str) -> (i32, &str) {
-    let number = said
-        .split("self test ")
-        .nth(1)
-        .and_then(|rest| rest.split(',').next());
-    let hash = said
-        .split("hash ")
-        .nth(1)
-        .and_then(|rest| rest.split(',').next());
-    (number.unwrap().parse().unwrap(), hash.unwrap())
-}
+use crate::support::{Exhibit, Scratch, SelfTest, has, project, ran};
 
 fn on_cortex(exhibit: &Exhibit, cpu: &str, variables: &[&str]) -> Command {
     let mut make = Command::new("make");
@@ -56,7 +43,7 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
         for cpu in ["m3", "m4", "m7"] {
             let said = ran(&mut on_cortex(&exhibit, cpu, &[]));
             println!("{name}, cortex-{cpu}\n{said}");
-            assert_eq!(self_test(&said), self_test(&host), "{name}, {cpu}");
+            assert_eq!(SelfTest::of(&said), SelfTest::of(&host), "{name}, {cpu}");
             // The runtime comes first of the two.
             let code = said
                 .lines()
@@ -70,7 +57,10 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&fused.stdout).into_owned();
-        assert!(!fused.status.success() && self_test(&said).0 > 0, "{said}");
+        assert!(
+            !fused.status.success() && SelfTest::of(&said).differs > 0,
+            "{said}"
+        );
     }
 }
 
@@ -101,9 +91,9 @@ fn aarch64_gives_the_hash_of_the_host_and_fused_products_are_seen() {
             "example/main.c",
         );
         let said = emulated(&program);
-        assert_eq!(self_test(&said), self_test(&host), "{level}");
+        assert_eq!(SelfTest::of(&said), SelfTest::of(&host), "{level}");
     }
     let flags = ["-O2", "-static", "-ffp-contract=fast"];
     let said = emulated(&exhibit.built("aarch64-linux-gnu-gcc", &flags, "example/main.c"));
-    assert!(self_test(&said).0 > 0, "{said}");
+    assert!(SelfTest::of(&said).differs > 0, "{said}");
 }

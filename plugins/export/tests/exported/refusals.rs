@@ -19,6 +19,11 @@ max_age = "20s"
 unit = "nm"
 channels = ["Z"]
 max_age = "20s"
+[signals.planned]
+unit = "Cel"
+channels = ["p"]
+max_age = "20s"
+known_ahead = "60s"
 [nodes.drift]
 type = "slope"
 inputs.signal = "position"
@@ -50,6 +55,22 @@ type = "auto_weighted"
 inputs.voters = ["thermal", "nothing"]
 inputs.truth = "drift"
 memory = { half_life = "5min" }
+[nodes.steep]
+type = "auto_weighted"
+inputs.voters = ["thermal", "nothing"]
+inputs.truth = "drift"
+memory = "5min"
+power = 6
+[nodes.as_begun]
+type = "auto_weighted"
+inputs.voters = ["thermal", "nothing"]
+inputs.truth = "drift"
+memory = { half_life = "5min" }
+power = 6
+[nodes.ahead]
+type = "slope"
+inputs.signal = "planned"
+windows = ["60s"]
 [nodes.learner]
 type = "rls"
 inputs.features = "warm"
@@ -61,6 +82,9 @@ error = "warm:stderr"
 thermal = "thermal"
 hedge = "hedge"
 vote = "vote"
+steep = "steep"
+as_begun = "as_begun"
+ahead = "ahead"
 learner = "learner"
 "#;
 
@@ -74,7 +98,17 @@ fn all_nodes_that_cannot_be_exported_are_named_each_with_a_way() {
     let nodes: Vec<&str> = refusals.iter().map(|of| &*of.node).collect();
     assert_eq!(
         nodes,
-        ["smooth", "warm", "thermal", "hedge", "vote", "learner"]
+        [
+            "smooth",
+            "warm",
+            "thermal",
+            "hedge",
+            "vote",
+            "steep",
+            "as_begun",
+            "learner",
+            "planned.p"
+        ]
     );
     let text = error.to_string();
     for part in [
@@ -83,6 +117,10 @@ fn all_nodes_that_cannot_be_exported_are_named_each_with_a_way() {
         "`thermal`: it has not been fitted; fit the graph first",
         "`hedge`: the kind `hedge` of athermal-combiners cannot be exported; use `auto_weighted`",
         "`vote`: a memory with a `half_life` cannot be exported; use a time",
+        "`steep`: a `power` other than 2 and 4 cannot be exported; use 2, which is the default, or 4\n",
+        "`as_begun`: a `power` other than 2 and 4 and a memory with a `half_life` cannot be exported; use 2, which is the default, or 4; \
+         use a time",
+        "`planned.p`: a signal that is known ahead cannot be exported; leave out `known_ahead`",
         "`learner`: it goes on learning while it runs; `--frozen` exports it as it was fitted",
     ] {
         assert!(text.contains(part), "{part}\n{text}");
@@ -114,6 +152,14 @@ fn a_rate_of_no_signal_and_one_of_nothing_are_refused() {
     let slow = with(Rates::every(second)).unwrap();
     let fast = with(Rates::every(Duration::from_ns(100_000_000))).unwrap();
     assert!(fast > 5 * slow, "{fast} {slow}");
+    // Places have 32 bits: a microsecond has no room for minutes, and a nanosecond none for what no number counts.
+    for period in [1_000, 1] {
+        let error = with(Rates::every(Duration::from_ns(period))).unwrap_err();
+        assert!(
+            error.contains("bytes, more than there are places for: give the time between two samples with `--rate`"),
+            "{error}"
+        );
+    }
 }
 
 #[test]

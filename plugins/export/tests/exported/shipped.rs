@@ -5,11 +5,12 @@ use std::process::Command;
 use athermal_core::engine::Engine;
 use athermal_core::prng::Prng;
 use athermal_core::time::Duration;
+use athermal_export::c::{SinglePrecisionError, single_precision_error};
 use athermal_export::{Exported, Options, Rates, export_c};
 
 use crate::random::events;
 use crate::support::{
-    Exhibit, Scratch, compilers, difference, has, made_up, plan, project, ran, stepped,
+    Exhibit, Scratch, SelfTest, compilers, difference, has, made_up, plan, project, ran, stepped,
 };
 
 pub fn second(seconds: f64) -> Duration {
@@ -44,13 +45,7 @@ fn the_graphs_of_the_die_tester_give_the_bits_of_the_engine() {
         for name in GRAPHS {
             let (mut engine, exported) = shipped(name, Rates::every(second(0.2)));
             let exhibit = Exhibit::new(&exported, &scratch.path(name));
-            let sources: Vec<String> = exported
-                .form
-                .sources
-                .iter()
-                .map(|of| of.name.clone())
-                .collect();
-            let events = events(&mut Prng::stream(5, name), &sources, 6_000);
+            let events = events(&mut Prng::stream(5, name), engine.plan(), 6_000);
             let expected = stepped(&mut engine, &events);
             let program = exhibit.built(compiler, &["-O2"], "driver.c");
             let (found, said) = exhibit.stepped(&program, &events);
@@ -80,22 +75,16 @@ fn the_self_test_passes_sees_fused_products_and_measures_single_precision() {
         let exhibit = Exhibit::new(&exported, &scratch.path(compiler));
         let example = |flags: &[&str]| exhibit.built(compiler, flags, "example/main.c");
         let said = ran(&mut Command::new(example(&["-O2"])));
-        assert!(
-            said.contains("self test 0, hash ") && said.contains("error 0 millionths"),
-            "{said}"
-        );
+        let test = SelfTest::of(&said);
+        assert_eq!((test.differs, test.millionths), (0, 0), "{said}");
         // Most outputs have values at most ticks, or the self test would test nothing.
         let all = exported.ticks.outputs.iter().flatten();
         let given = all.clone().filter(|value| !value.is_nan()).count();
         assert!(2 * given > all.count(), "{given}");
         let said = ran(&mut Command::new(example(&["-O2", "-DATHERMAL_FLOAT"])));
-        let error = said
-            .split("error ")
-            .nth(1)
-            .and_then(|rest| rest.split(' ').next());
-        let error: f64 = error.unwrap().parse().unwrap();
+        let test = SelfTest::of(&said);
         assert!(
-            said.contains("self test 0") && error > 0.0 && error < 10_000.0,
+            test.differs == 0 && test.millionths > 0 && test.millionths < 10_000,
             "{said}"
         );
         let fuses =
@@ -113,6 +102,64 @@ fn the_self_test_passes_sees_fused_products_and_measures_single_precision() {
 }
 
 #[test]
+fn the_error_of_single_precision_is_known_or_it_is_said_why_not() {
+    if !has("gcc") {
+        return;
+    }
+    let scratch = Scratch::new("single");
+    let (_, exported) = shipped("die-tester.toml", Rates::every(second(10.0)));
+    let Exhibit { folder, form } = Exhibit::new(&exported, &scratch.path("exported"));
+    let error = || single_precision_error("gcc", &folder, &form);
+    let least = error().unwrap();
+    assert!(least > 0.0 && least < 0.01, "{least}");
+    let none = single_precision_error("a compiler that there is not", &folder, &form);
+    assert!(
+        matches!(none, Err(SinglePrecisionError::NoCompiler(_))),
+        "{none:?}"
+    );
+    let tables = folder.join(format!("{}.c", form.name));
+    let text = std::fs::read_to_string(&tables).unwrap();
+    // A self test that lets no error pass, one that ends early, and one that is no C.
+    std::fs::write(&tables, text.replace("off <= 0.01", "off < 0.0")).unwrap();
+    let failed = error().unwrap_err();
+    assert!(failed.to_string().contains("fails at tick "), "{failed}");
+    let early = text.replace("int tick;", "int tick = *(volatile int *)0;");
+    std::fs::write(&tables, early).unwrap();
+    let failed = error().unwrap_err();
+    assert!(
+        matches!(failed, SinglePrecisionError::Example(_)),
+        "{failed}"
+    );
+    std::fs::write(&tables, text + "\n#error no C\n").unwrap();
+    let failed = error().unwrap_err();
+    assert!(
+        matches!(failed, SinglePrecisionError::Compiler(..)) && failed.to_string().contains("no C"),
+        "{failed}"
+    );
+}
+
+#[test]
+fn a_compiler_that_takes_no_number_for_absent_is_refused() {
+    let scratch = Scratch::new("finite");
+    let (_, exported) = shipped("die-tester.toml", Rates::every(second(10.0)));
+    let exhibit = Exhibit::new(&exported, &scratch.path("exported"));
+    for compiler in compilers() {
+        for flag in ["-ffast-math", "-Ofast", "-ffinite-math-only"] {
+            let output = Command::new(compiler)
+                .current_dir(&exhibit.folder)
+                .args(["-std=c99", "-fsyntax-only", flag, "athermal_rt.c"])
+                .output()
+                .unwrap();
+            let complaint = String::from_utf8_lossy(&output.stderr);
+            assert!(
+                !output.status.success() && complaint.contains("absence is NaN"),
+                "{compiler} {flag}: {complaint}"
+            );
+        }
+    }
+}
+
+#[test]
 fn the_recipes_build_and_run_the_self_test() {
     if !has("make") || compilers().is_empty() {
         return;
@@ -123,7 +170,7 @@ fn the_recipes_build_and_run_the_self_test() {
     let said = ran(Command::new("make")
         .arg("test")
         .current_dir(&exhibit.folder));
-    assert!(said.contains("self test 0"), "{said}");
+    assert_eq!(SelfTest::of(&said).differs, 0, "{said}");
     if has("cmake") {
         ran(Command::new("cmake")
             .args(["-S", ".", "-B", "build"])

@@ -123,18 +123,53 @@ impl Drop for Scratch {
     }
 }
 
-/// Whether a program is there; a test that needs it says that it was skipped, or fails where it must not be.
-pub fn has(program: &str) -> bool {
-    let there = Command::new(program).arg("--version").output();
-    let there = there.is_ok_and(|output| output.status.success());
+/// Whether something is installed, as a command that ends well shows; a test that needs it says that it was skipped, or fails where it
+/// must not be.
+pub fn installed(what: &str, shown_by: &mut Command) -> bool {
+    let there = shown_by
+        .output()
+        .is_ok_and(|output| output.status.success());
     if !there {
         assert!(
-            std::env::var_os("ATHERMAL_REQUIRE_SERVERS").is_none(),
-            "`{program}` is not installed, and ATHERMAL_REQUIRE_SERVERS is set"
+            std::env::var("ATHERMAL_REQUIRE_SERVERS").as_deref() != Ok("1"),
+            "{what} is not installed, and ATHERMAL_REQUIRE_SERVERS is set"
         );
-        eprintln!("skipped: `{program}` is not installed");
+        eprintln!("skipped: {what} is not installed");
     }
     there
+}
+
+/// Whether a program is there.
+pub fn has(program: &str) -> bool {
+    installed(
+        &format!("`{program}`"),
+        Command::new(program).arg("--version"),
+    )
+}
+
+/// What an example says of its self test.
+#[derive(Debug, PartialEq)]
+pub struct SelfTest {
+    /// The first tick that differs; 0 where none does.
+    pub differs: u64,
+    /// The hash over all outputs.
+    pub hash: String,
+    /// The largest error.
+    pub millionths: u64,
+}
+
+impl SelfTest {
+    pub fn of(said: &str) -> Self {
+        let word = |after: &str| {
+            let rest = said.split_once(after).unwrap_or_else(|| panic!("{said}")).1;
+            rest.split([',', ' ']).next().unwrap()
+        };
+        Self {
+            differs: word("self test ").parse().unwrap(),
+            hash: word("hash ").to_owned(),
+            millionths: word("error ").parse().unwrap(),
+        }
+    }
 }
 
 /// The C compilers that there are.

@@ -34,6 +34,12 @@ use sums::Values;
 use vectors::Vectors;
 use window::{Kind, Window};
 
+/// Rows of a block at most. Fewer cost more when a block closes, as all blocks are added up then; more make that step longer.
+pub const MOST_ROWS: u64 = 64;
+
+/// Rows of a block at least, where windows are shorter than the longest block.
+pub const FEWEST_ROWS: u64 = 8;
+
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
 pub(crate) const LIMIT: f64 = 1e100;
 

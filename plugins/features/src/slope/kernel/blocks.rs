@@ -4,17 +4,11 @@
 use std::array::from_fn;
 
 use super::lanes::{LANES, Lanes, group_count};
-use super::rows::Rows;
 use super::sums::{Common, Group, Table};
+use super::{FEWEST_ROWS, MOST_ROWS, rows::Rows};
 
 /// Blocks that restored ones have room for, beside as many again.
 const SPARE_BLOCKS: usize = 16;
-
-/// Rows of a block at most. Fewer cost more when a block closes, as all blocks are added up then; more make that step longer.
-const MOST_ROWS: u64 = 64;
-
-/// Rows of a block at least, where windows are shorter than the longest block.
-const FEWEST_ROWS: u64 = 8;
 
 /// Rows between two choices of the channels' origins, at least; and how often the kept rows fit between them.
 const REBASE_ROWS: u64 = 8192;
