@@ -84,7 +84,9 @@ impl Command for Export {
 
 fn failure(error: ExportError) -> Failure {
     match error {
-        ExportError::Write { .. } | ExportError::Compiler { .. } => Failure::Outside(error.to_string()),
+        ExportError::Write { .. } | ExportError::Compiler { .. } => {
+            Failure::Outside(error.to_string())
+        }
         _ => Failure::Request(error.to_string()),
     }
 }
@@ -151,7 +153,9 @@ impl Export {
         let with = match binary {
             fmu::Binary::Built(platform) => format!("its sources and a binary for {platform}"),
             fmu::Binary::Without(why) => {
-                terminal.note(format!("{why}: the unit has its sources alone, which a simulator can build"));
+                terminal.note(format!(
+                    "{why}: the unit has its sources alone, which a simulator can build"
+                ));
                 "its sources".to_owned()
             }
         };

@@ -30,7 +30,6 @@ pub enum ExportError {
         /// Those that there are.
         known: String,
     },
-<<<<<<< HEAD
     /// A C compiler refuses what was written.
     #[error("`{compiler}` refuses the sources: {said}")]
     Compiler {
@@ -38,7 +37,7 @@ pub enum ExportError {
         compiler: String,
         /// What it says.
         said: String,
-=======
+    },
     /// More state than a runtime finds its way in, whose places have 32 bits.
     #[error(
         "its state would take {bytes} bytes, more than there are places for: give the time between two samples with `--rate`"
@@ -46,7 +45,6 @@ pub enum ExportError {
     TooLarge {
         /// How many, as far as there are numbers for it.
         bytes: usize,
->>>>>>> trunk
     },
     /// The engine that works out the ticks of the self test.
     #[error(transparent)]

@@ -77,11 +77,7 @@ fn sources(exported: &Exported) -> Vec<(String, String)> {
 /// What a binary and a description of the same export share: the revision, and a hash of the tables, in which rates show too.
 fn token(exported: &Exported, files: &[(String, String)]) -> String {
     let all: String = files.iter().map(|(_, text)| &**text).collect();
-    format!(
-        "{}-{:016x}",
-        exported.form.revision,
-        fnv_1a(all.as_bytes())
-    )
+    format!("{}-{:016x}", exported.form.revision, fnv_1a(all.as_bytes()))
 }
 
 fn unit(form: &Form, token: &str) -> String {
@@ -280,7 +276,14 @@ fn build(
     let built = Command::new(compiler)
         .current_dir(&folder.0)
         .args(FLAGS.split(' '))
-        .args(["-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-s", "-I."])
+        .args([
+            "-O2",
+            "-fPIC",
+            "-shared",
+            "-fvisibility=hidden",
+            "-s",
+            "-I.",
+        ])
         .args(compiled.map(|(name, _)| name))
         .args(["-lm", "-o", "unit.so"])
         .output();
