@@ -236,3 +236,37 @@ fn a_simulation_of_fmpy_is_the_engine_stepped_at_the_same_instants() {
     }
     assert!(given > 200, "{given}");
 }
+
+const BEGUN: &str = r#"
+import sys, fmpy, fmpy.fmi3
+unit = sys.argv[1]
+description = fmpy.read_model_description(unit)
+one = fmpy.fmi3.FMU3Slave(guid=description.guid, unzipDirectory=fmpy.extract(unit),
+    modelIdentifier=description.coSimulation.modelIdentifier, instanceName="one")
+try:
+    one.instantiate(logMessage=lambda env, status, category, text: print(text.decode()))
+    print("begun")
+except Exception: print("refused")
+"#;
+
+#[test]
+fn a_unit_that_computes_otherwise_than_the_engine_is_not_instantiated_and_says_so() {
+    let scratch = Scratch::new("fmu-otherwise");
+    let Some(python) = python("fmpy") else { return };
+    let (_, mut exported) = shipped("die-tester-sensor.toml", Rates::every(second(10.0)));
+    let file = (exported.files.iter_mut()).find(|file| file.path.ends_with("sensor.c"));
+    let file = file.unwrap();
+    let (before, after) = file.text.split_once("test_out[").unwrap();
+    // The last of what is expected is made another.
+    let (bits, last) = after.rsplit_once("UINT64_C(0x").unwrap();
+    let (_, end) = last.split_once(')').unwrap();
+    file.text = format!("{before}test_out[{bits}UINT64_C(1){end}");
+    let unit = scratch.path("machine.fmu");
+    write(&exported, &unit, "cc").unwrap();
+    let said = ran(Command::new(python).args(["-c", BEGUN]).arg(&unit));
+    assert!(
+        said.contains("tick 200 of the self test is not that of the engine"),
+        "{said}"
+    );
+    assert!(said.ends_with("refused\n"), "{said}");
+}
