@@ -23,13 +23,13 @@ const PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 
 /// Look for mistakes in a graph file
 ///
-/// Reports all mistakes at once, each with its place and a way out. Nothing is fitted and no data are read.
+/// Reports all mistakes at once, each with its place and a way out. Nothing is fitted, and no data are read but with `--live`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml\n  athermal check --live machine.toml"
 )]
 pub struct Check {
-    /// Graph files
+    /// Graph files and machine files
     #[arg(required = true, value_name = "GRAPH")]
     graphs: Vec<PathBuf>,
     /// Fail on warnings too (exit status 1)

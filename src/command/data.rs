@@ -320,7 +320,7 @@ pub fn check_ending(output: &Path) -> Result<(), Failure> {
     match output.extension() {
         Some(ending) if Format::from_path(output).is_none() => Err(Failure::Request(format!(
             "{}: the ending `.{}` names no format; `.csv`, `.tsv` and `.txt` are CSV, `.jsonl`, `.ndjson` and `.json` are \
-             JSON lines",
+             JSON lines, and `.parquet` is Parquet of a program built with `--features parquet`",
             output.display(),
             ending.display()
         ))),

@@ -105,6 +105,12 @@ impl Simulate {
         if let Some(path) = &self.set_points {
             let others = read().map(|path| &**path).chain([output]);
             check_apart("--set-points", path, others)?;
+            if path.extension().is_some() && FileFormat::from_path(path) != Some(FileFormat::Csv) {
+                return Err(Failure::Request(format!(
+                    "--set-points {}: what is planned is written as CSV; name a file that ends on `.csv`",
+                    path.display()
+                )));
+            }
             let plan = write_set_points(known.machine, &self.setup(known.machine)?);
             write_aside(path, plan)?;
         }

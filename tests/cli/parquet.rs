@@ -70,7 +70,7 @@ fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
 fn files_of_a_folder_are_one_recording_with_what_their_paths_say() {
     let scratch = Scratch::new("hive");
     for (date, seed) in [("2026-03-01", "1"), ("2026-03-02", "2")] {
-        let log = scratch.path(&format!("logs/machine=dt07/date={date}/log.parquet"));
+        let log = scratch.path(&format!("logs/line=4/machine=dt07/date={date}/log.parquet"));
         std::fs::create_dir_all(log.parent().unwrap()).unwrap();
         let words: [&dyn AsRef<std::ffi::OsStr>; 8] = [
             &"simulate",
@@ -86,10 +86,49 @@ fn files_of_a_folder_are_one_recording_with_what_their_paths_say() {
     }
     let logs = scratch.path("logs");
     std::fs::write(logs.join("_SUCCESS"), "").unwrap();
+    // A graph that measures what the folders say.
+    let with = |key: &str| {
+        let path = scratch.path(&format!("{key}.toml"));
+        let extends = graph("linear-axis-sensor");
+        let text = format!(
+            "schema = 1\nname = \"keyed\"\nextends = {extends:?}\n\
+             [signals.of_folder]\nunit = \"1\"\nchannels = [\"{key}\"]\nmax_age = \"1min\"\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        path
+    };
     let model = scratch.path("model.json");
-    athermal_on("fit", &graph("linear-axis-sensor"), &logs, &[&"-o", &model]).ended(0);
+    athermal_on("fit", &with("line"), &logs, &[&"-o", &model]).ended(0);
     let model = std::fs::read_to_string(&model).unwrap();
     for date in ["2026-03-01", "2026-03-02"] {
-        assert!(model.contains(&format!("machine=dt07/date={date}/log.parquet")));
+        assert!(model.contains(&format!("line=4/machine=dt07/date={date}/log.parquet")));
     }
+    let refused = |key, words| {
+        let ended = athermal_on("fit", &with(key), &logs, &[&"-o", &scratch.path("none")]);
+        ended.ended(2).tells(&[words]);
+    };
+    refused("machine", "the folder says `dt07`, which is no number");
+    refused("no_key", "no_key");
+}
+
+#[test]
+fn a_run_that_keeps_a_state_writes_no_parquet() {
+    let scratch = Scratch::new("parquet-state");
+    let of = |name: &str| scratch.path(name);
+    let (graph, log) = (graph("linear-axis-sensor"), of("log.csv"));
+    athermal(&[&"simulate", &"linear-axis", &"--days", &"0.2", &"-o", &log]).ended(0);
+    let (model, state) = (of("model.json"), of("a.state"));
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let run = |output| {
+        athermal(&[
+            &"run", &model, &"-i", &log, &"-o", &output, &"--state", &state,
+        ])
+    };
+    let words = "out.parquet: nothing can be added to a file of Parquet";
+    run(of("out.parquet")).ended(2).tells(&[words]);
+    assert!(!of("out.parquet").exists());
+    // The way out that is named loses no row.
+    run(of("out.csv")).ended(0);
+    let lines = |name| std::fs::read_to_string(of(name)).unwrap().lines().count();
+    assert_eq!(lines("out.csv"), lines("log.csv"));
 }

@@ -53,11 +53,19 @@ impl Machine for MyNode {
         const { &[CHUCK] }
     }
 
+    /// Another level of the chuck every two hours.
+    fn schedule(&self, seed: u64) -> Option<Schedule> {
+        let mut prng = Prng::stream(seed, "levels");
+        let levels: [f64; 84] = std::array::from_fn(|_| prng.between(20.0, 40.0));
+        Some(Schedule::cycle(CHUCK.name, &levels, 7200))
+    }
+
     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
         let period_ns = PERIOD_S * SECOND_NS;
         let rows = rows_of(self.name(), self.set_points(), setup, period_ns)?;
-        let schedule = setup.schedule.clone();
-        let chuck = schedule.unwrap_or_else(|| own(setup.seed)).track(&CHUCK);
+        let own = || self.schedule(setup.seed);
+        let schedule = setup.schedule.clone().or_else(own).unwrap_or_default();
+        let chuck = schedule.track(&CHUCK);
         Ok(Box::new(Warming {
             // Settled: it has stood there for long.
             body: chuck.at(0),
@@ -73,13 +81,6 @@ impl Machine for MyNode {
 }
 
 athermal_trial::register_machine!(MyNode);
-
-/// What the chuck does where nobody says it: another level every two hours.
-fn own(seed: u64) -> Schedule {
-    let mut prng = Prng::stream(seed, "levels");
-    let levels: [f64; 84] = std::array::from_fn(|_| prng.between(20.0, 40.0));
-    Schedule::cycle(CHUCK.name, &levels, 7200)
-}
 
 /// The machine as it runs.
 struct Warming {
@@ -138,16 +139,21 @@ impl Warming {
 
 #[cfg(test)]
 mod tests {
+    use athermal_core::time::Duration;
+    use athermal_trial::machine::Announcements;
+
     use super::*;
 
-    fn rows(seed: u64, schedule: Option<&str>) -> Vec<Row> {
-        let schedule = schedule.map(|text| Schedule::parse(text, &[CHUCK]).unwrap());
-        let setup = Setup {
+    fn setup(seed: u64, schedule: Option<&str>) -> Setup {
+        Setup {
             days: 0.1,
             seed,
-            schedule,
-        };
-        let mut simulation = MyNode.start(&setup).unwrap();
+            schedule: schedule.map(|text| Schedule::parse(text, &[CHUCK]).unwrap()),
+        }
+    }
+
+    fn rows(seed: u64, schedule: Option<&str>) -> Vec<Row> {
+        let mut simulation = MyNode.start(&setup(seed, schedule)).unwrap();
         let (mut row, mut rows) = (Row::empty(&CHANNELS), Vec::new());
         while simulation.next(&mut row) {
             rows.push(row.clone());
@@ -165,6 +171,18 @@ mod tests {
         };
         assert_eq!(bytes(1), bytes(1));
         assert_ne!(bytes(1), bytes(2));
+    }
+
+    #[test]
+    fn the_chuck_does_what_is_announced_of_the_seed() {
+        let (setup, at_once) = (setup(2, None), Duration::from_ns(0));
+        let mut plan = Announcements::ahead(&MyNode, &setup, CHUCK.name, at_once).unwrap();
+        let mut levels = Vec::new();
+        for row in rows(2, None) {
+            levels.extend(plan.next(row.time_ns).map(|(level, _)| level));
+            assert!((row.values[0] - levels[levels.len() - 1]).abs() < 0.01);
+        }
+        assert_eq!(levels.len(), 2);
     }
 
     #[test]

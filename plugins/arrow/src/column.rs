@@ -1,5 +1,6 @@
 //! Columns of Arrow as numbers, instants and texts.
 
+use std::fmt::Display;
 use std::io::Write;
 
 use arrow_array::cast::AsArray;
@@ -14,8 +15,9 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, ArrayRef, PrimitiveArray};
 use arrow_schema::{DataType, TimeUnit};
-use athermal_files::number;
-use jiff::Timestamp;
+use athermal_files::{number, text_of};
+
+use crate::stamp::Stamp;
 
 /// The powers of ten that a double holds exactly.
 const POWERS: [f64; 23] = [
@@ -229,29 +231,18 @@ fn scaled<T: ArrowPrimitiveType>(
 }
 
 /// Writes a cell as a text, as a log would have it; nothing where there is none.
-pub(crate) fn write(array: &ArrayRef, row: usize, cell: &mut Vec<u8>) {
+pub(crate) fn write(array: &ArrayRef, row: usize, stamp: &mut Stamp, cell: &mut Vec<u8>) {
     if array.is_null(row) {
         return;
     }
-    if let Some(instants) = Instants::of(&array.slice(row, 1)) {
-        let at = instants.at(0).map(i128::from);
-        let at = at.and_then(|ns| Timestamp::from_nanosecond(ns).ok());
-        let text = at.map_or_else(String::new, |at| at.to_string());
-        let is_date = *array.data_type() == DataType::Date32;
-        let text = if is_date {
-            text.get(..10).map_or(text.clone(), str::to_owned)
-        } else {
-            text
-        };
-        let text = if instants.is_utc {
-            &*text
-        } else {
-            text.trim_end_matches('Z')
-        };
-        cell.extend_from_slice(text.as_bytes());
-        return;
-    }
     match array.data_type() {
+        of @ (DataType::Timestamp(..) | DataType::Date32 | DataType::Date64) => {
+            let instants = Instants::of(&array.slice(row, 1));
+            let at = instants.and_then(|of| Some((of.at(0)?, of.is_utc)));
+            let text = at.map_or("", |(ns, is_utc)| stamp.write(ns, is_utc));
+            let date = text.get(..10).filter(|_| *of == DataType::Date32);
+            cell.extend_from_slice(date.unwrap_or(text).as_bytes());
+        }
         DataType::Utf8 => cell.extend_from_slice(array.as_string::<i32>().value(row).as_bytes()),
         DataType::LargeUtf8 => {
             cell.extend_from_slice(array.as_string::<i64>().value(row).as_bytes());
@@ -260,17 +251,14 @@ pub(crate) fn write(array: &ArrayRef, row: usize, cell: &mut Vec<u8>) {
             cell.extend_from_slice(array.as_string_view().value(row).as_bytes());
         }
         DataType::Boolean => {
-            let flag: &[u8] = if array.as_boolean().value(row) {
-                b"true"
-            } else {
-                b"false"
-            };
-            cell.extend_from_slice(flag);
+            whole(array.as_boolean().value(row), cell);
         }
         DataType::Dictionary(..) => {
-            let dictionary = array.as_any_dictionary();
-            if let Some(at) = dictionary.normalized_keys().get(row) {
-                write(dictionary.values(), *at, cell);
+            let one = array.slice(row, 1);
+            let dictionary = one.as_any_dictionary();
+            // Keys are whole numbers of any width, put in order all at once.
+            for at in dictionary.normalized_keys() {
+                write(dictionary.values(), at, stamp, cell);
             }
         }
         DataType::Decimal128(..) => {
@@ -323,16 +311,14 @@ pub(crate) fn write(array: &ArrayRef, row: usize, cell: &mut Vec<u8>) {
                 &mut |_, of| value = of,
                 &mut |_, _| {},
             );
-            if value.is_finite() {
-                cell.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes());
-            }
+            cell.extend_from_slice(text_of(value, &mut zmij::Buffer::new()).as_bytes());
         }
     }
 }
 
 // Writing to a `Vec` cannot fail.
 
-fn whole(value: impl std::fmt::Display, cell: &mut Vec<u8>) {
+fn whole(value: impl Display, cell: &mut Vec<u8>) {
     let _ = write!(cell, "{value}");
 }
 

@@ -106,22 +106,28 @@ pub(crate) fn parquet(path: &Path) -> Result<Box<dyn TypedFile>, String> {
 }
 
 pub(crate) fn arrow(path: &Path) -> Result<Box<dyn TypedFile>, String> {
-    let reader = FileReader::try_new_buffered(opened(path)?, None).map_err(words)?;
+    let file = opened(path)?;
+    let again = file.try_clone().map_err(words)?;
+    let reader = FileReader::try_new_buffered(again, None).map_err(words)?;
     let schema = reader.schema();
-    Ok(of_all_columns(path, schema, Box::new(reader)))
+    Ok(Box::new(Batched {
+        keys: keys(path, &schema),
+        schema,
+        read: Box::new(move |columns| {
+            let reader = FileReader::try_new_buffered(file, Some(columns.to_vec()));
+            let batches: Batches = Box::new(reader.map_err(words)?);
+            Ok((batches, columns.to_vec()))
+        }),
+    }))
 }
 
 pub(crate) fn arrow_stream(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     let reader = StreamReader::try_new_buffered(opened(path)?, None).map_err(words)?;
     let schema = reader.schema();
-    Ok(of_all_columns(path, schema, Box::new(reader)))
-}
-
-fn of_all_columns(path: &Path, schema: SchemaRef, batches: Batches) -> Box<dyn TypedFile> {
     let places = (0..schema.fields().len()).collect();
-    Box::new(Batched {
+    Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |_| Ok((batches, places))),
-    })
+        read: Box::new(move |_| Ok((Box::new(reader), places))),
+    }))
 }

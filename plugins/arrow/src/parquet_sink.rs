@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, TimestampNanosecondArray};
 use arrow_schema::{DataType, Field, Schema, TimeUnit};
-use athermal_files::TypedSink;
+use athermal_files::{DATED_NS, TypedSink};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
@@ -14,9 +14,6 @@ use parquet::file::properties::WriterProperties;
 /// So many rows are handed on at a time, and so many are a group that can be read by itself.
 const BATCH: usize = 4096;
 const GROUP: usize = 32 * BATCH;
-
-/// From here on, in ns since 1970, a number is taken for a date, as where it is read.
-const DATED_NS: i64 = 1_000_000_000_000_000_000;
 
 /// A file of Parquet that is being written: a column of the time, of 64-bit floats, and of texts where the last column is one. What
 /// is dated has instants of UTC; other times are seconds.

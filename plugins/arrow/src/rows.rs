@@ -55,9 +55,10 @@ pub(crate) struct Rows {
     batch: Option<RecordBatch>,
     /// The cells of the current row that are texts: those of the time, then the others.
     cells: Vec<Vec<u8>>,
-    /// The instant of the current row as a text, of a recording that has one.
+    /// Of a recording that has instants that of the current row, as a text.
     stamp: Stamp,
-    text: String,
+    /// The same of cells beside the time.
+    cell_stamp: Stamp,
 }
 
 impl Rows {
@@ -86,7 +87,7 @@ impl Rows {
             batch: None,
             cells: vec![Vec::new(); cells],
             stamp: Stamp::default(),
-            text: String::new(),
+            cell_stamp: Stamp::default(),
         })
     }
 
@@ -139,18 +140,16 @@ impl Rows {
 
     /// Writes the cells of the current row that are texts.
     fn write_cells(&mut self, row: usize) {
-        let is_text = |of: &&Time| matches!(of, Time::Text);
-        if self.wanted.texts.is_empty() && self.times.iter().filter(is_text).count() == 0 {
-            return;
-        }
-        let times = self.wanted.time.iter().map(Some);
+        // A time that is an instant has its own text.
+        let times = self.wanted.time.iter().zip(&self.times);
+        let times = times.map(|(column, of)| matches!(of, Time::Text).then_some(column));
         let all = times.chain(self.wanted.texts.iter().map(Option::as_ref));
         for (cell, column) in self.cells.iter_mut().zip(all) {
             cell.clear();
             match (column, &self.batch) {
                 (Some(Column::Constant(text)), _) => cell.extend_from_slice(text.as_bytes()),
                 (Some(Column::At { place, .. }), Some(batch)) => {
-                    column::write(batch.column(*place), row, cell);
+                    column::write(batch.column(*place), row, &mut self.cell_stamp, cell);
                 }
                 _ => {}
             }
@@ -176,7 +175,7 @@ impl TypedRows for Rows {
         if let [Time::At(instants)] = &*self.times
             && let Some(ns) = instants.at(self.next - 1)
         {
-            self.stamp.write(ns, instants.is_utc, &mut self.text);
+            self.stamp.write(ns, instants.is_utc);
         }
         Ok(true)
     }
@@ -188,7 +187,7 @@ impl TypedRows for Rows {
                 Some(ns) => TypedTime::At {
                     ns,
                     is_utc: instants.is_utc,
-                    text: &self.text,
+                    text: self.stamp.text(),
                 },
                 None => TypedTime::Text(&[]),
             },

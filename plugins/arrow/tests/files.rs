@@ -287,8 +287,21 @@ fn a_text_that_is_no_number_is_refused_by_its_row_and_counted_where_that_is_aske
         lenient: true,
         ..Options::default()
     };
-    let rows = rows_of(&path, seconds(&["a"]), lenient).unwrap();
+    let rows = rows_of(&path, seconds(&["a"]), lenient.clone()).unwrap();
     assert!(rows[1].values[0].is_nan() && rows[2].values[0] == 3.0);
+    // Of a row that is left out for its time no cell is counted.
+    let columns: Vec<(&str, ArrayRef)> = vec![
+        (
+            "time_s",
+            Arc::new(StringArray::from(vec!["0", "soon", "2"])),
+        ),
+        ("a", Arc::new(StringArray::from(vec!["1", "off", "off"]))),
+    ];
+    write_parquet(&path, &batch(&columns));
+    let mut reader = Reader::open(&path, seconds(&["a"]), lenient).unwrap();
+    while reader.next_into(&mut Row::default()).unwrap() {}
+    let report = reader.report();
+    assert_eq!((report.bad_cells.count, report.refused_rows.count), (1, 1));
 }
 
 #[test]
@@ -314,6 +327,14 @@ fn a_column_without_numbers_or_one_that_is_missing_is_named() {
             text.contains("of.parquet: ") && text.contains(words),
             "{text}"
         );
+        // The request is wrong, and not the file or its disk.
+        let is_of_request = |of: &FileError| {
+            matches!(
+                of,
+                FileError::Unfit { .. } | FileError::MissingColumns { .. }
+            )
+        };
+        assert!(is_of_request(&error), "{error:?}");
     }
 }
 
@@ -374,15 +395,57 @@ fn files_and_streams_of_arrow_are_read_too() {
             [(0, vec![0]), (1_000_000_000, vec![1.0_f64.to_bits()])]
         );
     }
-    let output = folder.file("out.arrow");
-    let refused = Writer::create(output, "time_s", &["a".to_owned()], Flush::Buffered);
-    assert!(
-        refused
-            .err()
-            .unwrap()
-            .to_string()
-            .contains("Arrow is read, but not written")
-    );
+}
+
+#[test]
+fn a_kind_that_is_only_read_and_a_file_that_cannot_be_added_to_are_refused_and_left_as_they_are() {
+    let folder = Folder::of("refused");
+    let columns = ["a".to_owned()];
+    let time = seconds(&["a"]).time;
+    let create = |path: &Path| Writer::create(path, "time_s", &columns, Flush::Buffered).err();
+    let resume = |path: &Path| Writer::resume(path, &time, &columns, None, Flush::Buffered).err();
+    let refused = |error: Option<FileError>, words: &str| {
+        let error = error.unwrap();
+        assert!(matches!(error, FileError::Unfit { .. }), "{error:?}");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let [arrow, parquet] = ["of.arrow", "of.parquet"].map(|name| folder.file(name));
+    for there in [false, true] {
+        if there {
+            std::fs::write(&arrow, "what stands there").unwrap();
+            std::fs::write(&parquet, "what stands there").unwrap();
+        }
+        refused(create(&arrow), "Arrow is read, but not written");
+        refused(
+            resume(&parquet),
+            "nothing can be added to a file of Parquet",
+        );
+        refused(resume(&parquet), "leave out `--state`");
+        for path in [&arrow, &parquet] {
+            assert_eq!(path.exists(), there);
+            assert!(!there || std::fs::read(path).unwrap() == b"what stands there");
+        }
+    }
+}
+
+#[test]
+fn of_a_file_of_arrow_columns_may_be_read_in_any_order_and_beside_those_of_other_types() {
+    let folder = Folder::of("projected");
+    let lists = ListArray::from_iter_primitive::<Int32Type, _, _>([Some([Some(1)]), None]);
+    let column = |first: f64| Arc::new(Float64Array::from(vec![first, first + 1.0])) as ArrayRef;
+    let batch = batch(&[
+        ("list", Arc::new(lists)),
+        ("b", column(10.0)),
+        ("time_s", column(0.0)),
+        ("a", column(20.0)),
+    ]);
+    let path = folder.file("of.arrow");
+    let mut writer = FileWriter::try_new(File::create(&path).unwrap(), &batch.schema()).unwrap();
+    writer.write(&batch).unwrap();
+    writer.finish().unwrap();
+    let rows = read(&path, seconds(&["a", "b"]));
+    assert_eq!(rows[1].values, [21.0, 11.0]);
+    assert_eq!(rows[1].time_ns, 1_000_000_000);
 }
 
 #[test]
@@ -392,7 +455,10 @@ fn a_table_with_a_row_for_each_value_is_read_by_its_names() {
     let columns: Vec<(&str, ArrayRef)> = vec![
         ("time_s", Arc::new(Float64Array::from(vec![0.0, 0.0, 1.0]))),
         ("id", Arc::new(StringArray::from(vec!["a", "b", "a"]))),
-        ("value", Arc::new(Float64Array::from(vec![0.1, 0.2, 0.3]))),
+        (
+            "value",
+            Arc::new(Float64Array::from(vec![0.1, f64::INFINITY, 0.3])),
+        ),
     ];
     write_parquet(&path, &batch(&columns));
     let mut layout = seconds(&["a", "b"]);
@@ -400,6 +466,6 @@ fn a_table_with_a_row_for_each_value_is_read_by_its_names() {
     layout.table.base.name = Some("id".to_owned());
     layout.table.base.value = Some("value".to_owned());
     let rows = read(&path, layout);
-    assert_eq!(rows[0].values, [0.1, 0.2]);
+    assert_eq!(rows[0].values, [0.1, f64::INFINITY]);
     assert!(rows[1].values[0] == 0.3 && rows[1].values[1].is_nan());
 }

@@ -120,8 +120,9 @@ pub(crate) fn trim(cell: &[u8]) -> &[u8] {
     }
 }
 
-/// The text of a number; empty for no value.
-pub(crate) fn text_of(value: f64, number: &mut zmij::Buffer) -> &str {
+/// The text of a number, as the cell of a table has it; empty for no value.
+#[must_use]
+pub fn text_of(value: f64, number: &mut zmij::Buffer) -> &str {
     if value.is_finite() {
         number.format_finite(value)
     } else if value.is_nan() {

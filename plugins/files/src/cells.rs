@@ -16,8 +16,8 @@ pub(crate) trait Cells {
     fn instant(&self) -> Option<(i64, bool, &str)> {
         None
     }
-    /// The values of the channels, where the format has numbers.
-    fn numbers(&self) -> Option<&[f64]> {
+    /// The values of the channels, where the format has numbers, and the texts that are none, by their channels.
+    fn numbers(&self) -> Option<(&[f64], &[(usize, String)])> {
         None
     }
     /// Takes the columns from here on as the current row names them, if that is what it does.

@@ -67,7 +67,7 @@ pub fn layout(plan: &Plan) -> Layout {
 }
 
 /// The recordings in a folder and in the folders inside it, in the order of their paths: what has a name that promises a format, and
-/// begins neither with a dot nor with `_`. None where there is no such folder.
+/// begins neither with a dot nor with `_`. Links to folders are not followed. None where there is no such folder.
 #[must_use]
 pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else {
@@ -79,7 +79,7 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         name.starts_with(['.', '_'])
     };
-    paths.retain(|path| !is_hidden(path));
+    paths.retain(|path| !is_hidden(path) && !(path.is_symlink() && path.is_dir()));
     let found = paths.into_iter().flat_map(|path| match path.is_dir() {
         true => recordings_in(&path),
         false => Format::of_file(&path).map(|_| path).into_iter().collect(),
@@ -226,5 +226,30 @@ impl Source for Reading<'_> {
             *self.reports.borrow_mut() = self.recording.reports();
         }
         Ok(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_is_searched_without_following_links_to_folders() {
+        let name = format!("athermal-files-{}-links", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(folder.join("logs/inner")).unwrap();
+        let log = folder.join("logs/inner/a.csv");
+        std::fs::write(&log, "t,x\n0,1\n").unwrap();
+        let linked = folder.join("logs/b.csv");
+        std::os::unix::fs::symlink(&log, &linked).unwrap();
+        // Followed, these would give each log twice, or without end.
+        std::os::unix::fs::symlink("inner", folder.join("logs/again")).unwrap();
+        std::os::unix::fs::symlink("..", folder.join("logs/inner/up")).unwrap();
+        std::os::unix::fs::symlink("logs", folder.join("given")).unwrap();
+        assert_eq!(recordings_in(&folder.join("logs")), [linked, log.clone()]);
+        assert_eq!(recordings_in(&folder.join("given")).len(), 2);
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -71,6 +71,8 @@ pub enum CellFault {
         /// What the cell should look like.
         expected: String,
     },
+    /// An instant in a cell beside the time of the row, of which this is wrong.
+    NoInstant(Box<Self>),
     /// A time that no clock of the stated zone has shown, since it was set forward over it.
     TimeSkipped {
         /// The zone, as it is stated.
@@ -81,10 +83,13 @@ pub enum CellFault {
 }
 
 impl CellFault {
-    /// Whether it is one of a value, or of a number, and not of a time alone.
+    /// Whether it is one of a value, or of a number, and not of the time of a row alone.
     #[must_use]
     pub fn is_of_value(&self) -> bool {
-        matches!(self, Self::NoNumber | Self::OtherMark { .. })
+        matches!(
+            self,
+            Self::NoNumber | Self::OtherMark { .. } | Self::NoInstant(_)
+        )
     }
 }
 
@@ -265,12 +270,12 @@ pub enum FileError {
         /// The text.
         found: String,
     },
-    /// The file is of a kind that is no table of text.
-    NoTable {
+    /// The file, or one of its columns, is of a kind that cannot be what is wanted of it.
+    Unfit {
         /// The name of the file.
         file: Arc<str>,
         /// What it is, and what to do.
-        what: &'static str,
+        reason: String,
     },
     /// A table whose cells are parted by spaces.
     CellsOfSpaces {
@@ -316,6 +321,12 @@ impl FileError {
         }
     }
 
+    /// That a file, or one of its columns, cannot be what is wanted of it.
+    pub(crate) fn unfit(path: &Path, reason: String) -> Self {
+        let file = path.display().to_string().into();
+        Self::Unfit { file, reason }
+    }
+
     /// The line that it is about, where it is about one.
     #[must_use]
     pub fn place(&self) -> Option<&Place> {
@@ -326,7 +337,7 @@ impl FileError {
             | Self::Merge(_)
             | Self::Empty { .. }
             | Self::NotBegun { .. }
-            | Self::NoTable { .. }
+            | Self::Unfit { .. }
             | Self::ValueCount { .. } => None,
             Self::StillRefused { newest, .. } => newest.place(),
             Self::Read { place, .. }

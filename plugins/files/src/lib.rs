@@ -51,7 +51,7 @@ mod unpacked;
 mod writer;
 
 pub use begun::begun_columns;
-pub use cell::{number, with_decimal_point};
+pub use cell::{number, text_of, with_decimal_point};
 pub use dataset::{Dataset, layout, recordings_in};
 pub use detect::{
     Description, Format, LongFormat, NumberForm, apart, other_time, zone_in_name, zone_of,
@@ -63,7 +63,7 @@ pub use ledger::{Count, Report};
 pub use lines::STANDARD_INPUT;
 pub use merge::{Joint, MergeError};
 pub use reader::{Options, Reader, Row};
-pub use recording::{Event, Recording};
+pub use recording::{DATED_NS, Event, Recording};
 pub use stream::WithRevision;
 pub use typed::{FileKind, Selection, TypedFile, TypedRows, TypedSink, TypedTime};
 pub use writer::{Flush, Writer};

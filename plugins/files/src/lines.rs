@@ -127,15 +127,13 @@ impl Lines {
         self.pass_over_rest()?;
         self.line.clear();
         let limit = LONGEST_ROW as u64 + 1;
-        let read = (&mut self.input)
-            .take(limit)
-            .read_until(b'\n', &mut self.line);
-        if let Err(source) = read {
+        let mut input = (&mut self.input).take(limit);
+        if let Err(source) = input.read_until(b'\n', &mut self.line) {
             let inner = source.get_ref().and_then(|inner| inner.downcast_ref());
             if let Some(NoText(what)) = inner {
-                return Err(FileError::NoTable {
+                return Err(FileError::Unfit {
                     file: self.file.clone(),
-                    what,
+                    reason: (*what).to_owned(),
                 });
             }
             return Err(FileError::Read {

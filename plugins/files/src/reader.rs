@@ -200,6 +200,7 @@ impl Reader {
                 ledger,
                 commas: Commas::of(table, separator),
                 time: Vec::new(),
+                text: String::new(),
                 segment_cell,
                 segment: Vec::new(),
                 long,

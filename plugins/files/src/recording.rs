@@ -3,6 +3,8 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use athermal_core::time::Duration;
+
 use crate::{FileError, Layout, Options, Reader, Report, Row, TimeForm};
 
 /// What comes next in a recording.
@@ -45,7 +47,7 @@ pub struct Recording {
 }
 
 /// From here on, in nanoseconds since 1970, a number is taken for a date: it is of 2001, or a machine that has counted for 31 years.
-const DATED_NS: i64 = 1_000_000_000_000_000_000;
+pub const DATED_NS: i64 = 1_000_000_000_000_000_000;
 
 impl Recording {
     /// Opens each file once to check its columns and to see its first row, and puts them in order. Rows of one time are put
@@ -99,7 +101,7 @@ impl Recording {
             if let Some((_, reader)) = &mut self.current {
                 let first = reader.report().rows == 0;
                 if reader.next_into(row)? {
-                    row.time_ns = row.time_ns.saturating_add(self.offset_ns);
+                    self.shift(row);
                     let apart = |last| self.options.segments || row.time_ns <= last;
                     let of_file = first && self.last_ns.is_some_and(apart);
                     if of_file || row.begins_segment {
@@ -116,6 +118,19 @@ impl Recording {
             self.offset_ns = offset_of(&path, &self.options);
             let reader = Reader::open(&path, self.layout.clone(), self.options.clone())?;
             self.current = Some((path.display().to_string(), reader));
+        }
+    }
+
+    /// Adds the offset of the file to all instants of a row.
+    fn shift(&self, row: &mut Row) {
+        if self.offset_ns == 0 {
+            return;
+        }
+        row.time_ns = row.time_ns.saturating_add(self.offset_ns);
+        for (value, of) in row.values.iter_mut().zip(&self.layout.channels) {
+            if of.is_instant {
+                *value += Duration::from_ns(self.offset_ns).secs();
+            }
         }
     }
 

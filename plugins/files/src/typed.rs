@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
-use crate::{CellFault, FileError, Layout, Place};
+use crate::{FileError, Layout, Place};
 
 /// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
 #[derive(Debug)]
@@ -119,16 +119,10 @@ pub(crate) fn kind_of(path: &Path) -> Option<&'static FileKind> {
     }
     kind_by_name(path).or_else(|| {
         let mut kinds = inventory::iter::<FileKind>.into_iter().peekable();
-        kinds.peek()?;
-        if !path.is_file() {
-            return None;
-        }
+        kinds.peek().filter(|_| path.is_file())?;
         let mut first = Vec::new();
-        File::open(path)
-            .ok()?
-            .take(16)
-            .read_to_end(&mut first)
-            .ok()?;
+        let file = File::open(path).ok()?;
+        file.take(16).read_to_end(&mut first).ok()?;
         kinds.find(|kind| first.starts_with(kind.mark))
     })
 }
@@ -152,12 +146,10 @@ pub(crate) struct TypedCells {
     file: Arc<str>,
     names: Vec<String>,
     columns: Columns,
-    /// The names of the columns of numbers.
-    channels: Vec<String>,
+    /// How many channels are numbers; those behind them are texts.
+    numbers: usize,
     rows: Box<dyn TypedRows>,
     row: u64,
-    /// Whether there are numbers, and not texts alone.
-    has_numbers: bool,
 }
 
 impl TypedCells {
@@ -168,9 +160,8 @@ impl TypedCells {
         layout: &Layout,
         numbers: usize,
     ) -> Result<Self, FileError> {
-        let name: Arc<str> = path.display().to_string().into();
         let place = Place {
-            file: name.clone(),
+            file: path.display().to_string().into(),
             line: 0,
         };
         let names = columns::numbered(file.names());
@@ -180,18 +171,15 @@ impl TypedCells {
             let ambiguous = columns::ambiguous(place.clone(), &lacking, &names);
             return Err(ambiguous.unwrap_or_else(|| columns::missing(place, lacking, &names, "")));
         }
-        let planned = layout.channels.iter().zip(&columns.channels);
-        let planned = planned.filter(|(of, at)| of.is_instant && at.is_some());
-        if let Some((of, _)) = planned.into_iter().next() {
+        let mut channels = layout.channels.iter().zip(&columns.channels);
+        if let Some((of, _)) = channels.find(|(of, at)| of.is_instant && at.is_some()) {
             let reason = format!(
                 "`{}`: when a plan applies is read from CSV and JSON lines alone",
                 of.column
             );
-            return Err(failed(name, 0, reason));
+            return Err(FileError::unfit(path, reason));
         }
-        let channels = layout.channels[..numbers].iter();
-        let channels = channels.map(|of| of.column.clone()).collect();
-        Self::of(name, file, names, columns, channels)
+        Self::of(path, file, names, columns, numbers)
     }
 
     /// All columns as texts.
@@ -201,36 +189,29 @@ impl TypedCells {
             time: Vec::new(),
             channels: (0..names.len()).map(Some).collect(),
         };
-        Self::of(
-            path.display().to_string().into(),
-            file,
-            names,
-            columns,
-            Vec::new(),
-        )
+        Self::of(path, file, names, columns, 0)
     }
 
     fn of(
-        name: Arc<str>,
+        path: &Path,
         file: Box<dyn TypedFile>,
         names: Vec<String>,
         columns: Columns,
-        channels: Vec<String>,
+        numbers: usize,
     ) -> Result<Self, FileError> {
+        let (values, texts) = columns.channels.split_at(numbers);
         let wanted = Selection {
             time: columns.time.iter().flatten().copied().collect(),
-            values: columns.channels[..channels.len()].to_vec(),
-            texts: columns.channels[channels.len()..].to_vec(),
+            values: values.to_vec(),
+            texts: texts.to_vec(),
         };
         let rows = file.select(wanted);
-        let rows = rows.map_err(|reason| failed(name.clone(), 0, reason))?;
         Ok(Self {
-            file: name,
+            file: path.display().to_string().into(),
             names,
             columns,
-            has_numbers: !channels.is_empty(),
-            channels,
-            rows,
+            numbers,
+            rows: rows.map_err(|reason| FileError::unfit(path, reason))?,
             row: 0,
         })
     }
@@ -248,18 +229,10 @@ impl TypedCells {
 }
 
 impl Cells for TypedCells {
-    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
+    fn advance(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {
         let is_there = self.rows.advance();
         let is_there = is_there.map_err(|reason| failed(self.file.clone(), self.row, reason))?;
         self.row += u64::from(is_there);
-        for (index, found) in self.rows.no_numbers() {
-            ledger.bad_cell(*index, || FileError::BadCell {
-                place: self.place(),
-                column: self.channels[*index].clone(),
-                found: crate::error::excerpt(found.as_bytes()),
-                fault: CellFault::NoNumber,
-            })?;
-        }
         Ok(is_there)
     }
 
@@ -271,7 +244,7 @@ impl Cells for TypedCells {
     }
 
     fn channel(&self, index: usize) -> &[u8] {
-        match index.checked_sub(self.channels.len()) {
+        match index.checked_sub(self.numbers) {
             Some(index) => self.rows.text(index),
             None => &[],
         }
@@ -293,7 +266,7 @@ impl Cells for TypedCells {
         }
     }
 
-    fn numbers(&self) -> Option<&[f64]> {
-        self.has_numbers.then(|| self.rows.values())
+    fn numbers(&self) -> Option<(&[f64], &[(usize, String)])> {
+        (self.numbers > 0).then(|| (self.rows.values(), self.rows.no_numbers()))
     }
 }

@@ -19,7 +19,7 @@ const KINDS: [(&[u8], &str); 10] = [
     ),
     (
         b"PAR1\x15",
-        "is Parquet, which is not read without the feature `parquet`; export it as CSV, in pandas by `read_parquet(…).to_csv(…)`",
+        "is Parquet, which is not read as text; build with `--features parquet`, which reads it from a file, or export it as CSV, in pandas by `read_parquet(…).to_csv(…)`",
     ),
     (
         &[0x50, 0x4b, 3, 4],

@@ -52,7 +52,7 @@ impl Writer {
     /// The format is what the name says, CSV if it says nothing.
     ///
     /// # Errors
-    /// The file cannot be created or written.
+    /// The file cannot be created or written, or is of a kind that is only read; that one is left as it is.
     pub fn create(
         path: impl AsRef<Path>,
         time_column: &str,
@@ -61,19 +61,13 @@ impl Writer {
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
         if path == Path::new("-") {
-            return Self::to_write(
-                "standard output",
-                io::stdout(),
-                Format::Csv,
-                time_column,
-                columns,
-                flush,
-            );
+            let (name, csv) = ("standard output", Format::Csv);
+            return Self::to_write(name, io::stdout(), csv, time_column, columns, flush);
+        }
+        if let Some(kind) = kind_by_name(path) {
+            return Self::of_kind(kind, path, time_column, columns);
         }
         let output = create(path).map_err(|source| FileError::cannot_open(path, source))?;
-        if let Some(kind) = kind_by_name(path) {
-            return Self::of_kind(kind, path, output, time_column, columns);
-        }
         let mut writer = Self::to_file(path, output, time_column, columns, flush)?;
         writer.write_header(time_column, columns)?;
         writer.keep_header(time_column, columns)?;
@@ -85,7 +79,7 @@ impl Writer {
     /// where the rows that it was written from were read, if that is known: it may decide which instant a time means that comes twice.
     ///
     /// # Errors
-    /// The file cannot be read or written, or was written with other columns; nothing is then changed.
+    /// The file cannot be read or written, was written with other columns, or is of a kind that is no text; nothing is then changed.
     pub fn resume(
         path: impl AsRef<Path>,
         time: &TimeColumn,
@@ -95,14 +89,12 @@ impl Writer {
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
         let format = format_of(path);
-        let stands = path.metadata().is_ok_and(|of| of.is_file() && of.len() > 0);
-        if let Some(kind) = kind_by_name(path)
-            && stands
-        {
-            return Err(FileError::NotBegun {
-                file: path.display().to_string().into(),
-                reason: format!("a file of {} ends where it was ended once", kind.name),
-            });
+        if let Some(kind) = kind_by_name(path) {
+            let reason = format!(
+                "nothing can be added to a file of {}, as a run with a state does; write CSV or JSON lines, or leave out `--state`",
+                kind.name
+            );
+            return Err(FileError::unfit(path, reason));
         }
         let Some(begun) = Begun::of(path, format, time, columns, seen)? else {
             return Self::create(path, &time.columns.title(), columns, flush);
@@ -127,25 +119,18 @@ impl Writer {
     fn of_kind(
         kind: &FileKind,
         path: &Path,
-        output: File,
         time_column: &str,
         columns: &[String],
     ) -> Result<Self, FileError> {
         let name = path.display().to_string();
-        let Some(create) = kind.create else {
+        let Some(begin) = kind.create else {
             let reason = format!("{} is read, but not written", kind.name);
-            return Err(FileError::cannot_open(path, io::Error::other(reason)));
+            return Err(FileError::unfit(path, reason));
         };
-        let nothing = io::sink();
-        let mut writer = Self::headless(
-            &name,
-            nothing,
-            Format::Csv,
-            time_column,
-            columns,
-            Flush::Buffered,
-        );
-        writer.rows = Rows::Typed(create(output, time_column, columns));
+        let output = create(path).map_err(|source| FileError::cannot_open(path, source))?;
+        let (csv, flush) = (Format::Csv, Flush::Buffered);
+        let mut writer = Self::headless(&name, io::sink(), csv, time_column, columns, flush);
+        writer.rows = Rows::Typed(begin(output, time_column, columns));
         Ok(writer)
     }
 

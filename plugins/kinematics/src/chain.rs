@@ -2,7 +2,7 @@
 
 /// How a link moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Freedom {
+pub(crate) enum Freedom {
     /// It grows along this unit vector.
     Grows([f64; 3]),
     /// It turns at its beginning about this unit vector, with all that stands on it.
@@ -11,7 +11,7 @@ pub enum Freedom {
 
 /// Links, each standing on the end of the one before; the first stands at the origin.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chain {
+pub(crate) struct Chain {
     /// Where each link begins, in m.
     begins: Vec<[f64; 3]>,
     freedoms: Vec<Freedom>,
@@ -21,8 +21,7 @@ pub struct Chain {
 
 impl Chain {
     /// A chain of links, each with the vector from its beginning to its end in m, and a point that lies so far from the end of the last.
-    #[must_use]
-    pub fn new(links: &[([f64; 3], Freedom)], point: [f64; 3]) -> Self {
+    pub(crate) fn new(links: &[([f64; 3], Freedom)], point: [f64; 3]) -> Self {
         let mut end = [0.0; 3];
         let mut begins = Vec::with_capacity(links.len());
         for (vector, _) in links {
@@ -40,8 +39,7 @@ impl Chain {
     /// link by 1 m or 1 rad. It holds for motions that are small against the lengths, as thermal ones are. (Siciliano, Sciavicco,
     /// Villani and Oriolo, "Robotics", 2009, equations 3.26 to 3.30: of a prismatic joint `z` and 0, of a revolute one `z × (p − p_i)`
     /// and `z`.)
-    #[must_use]
-    pub fn jacobian(&self) -> Vec<[f64; 6]> {
+    pub(crate) fn jacobian(&self) -> Vec<[f64; 6]> {
         let columns = self.begins.iter().zip(&self.freedoms);
         let column = |(begin, freedom): (&[f64; 3], &Freedom)| match *freedom {
             Freedom::Grows([x, y, z]) => [x, y, z, 0.0, 0.0, 0.0],

@@ -3,5 +3,4 @@
 mod chain;
 mod kinematics;
 
-pub use chain::{Chain, Freedom};
 pub use kinematics::{Kinematics, Link};

@@ -69,14 +69,14 @@ impl Machine for DieTester {
         &SET_POINTS
     }
 
-    fn schedule(&self) -> Option<Schedule> {
+    fn schedule(&self, _seed: u64) -> Option<Schedule> {
         Some(Schedule::cycle(CHUCK.name, &LEVELS, HOLD_S))
     }
 
     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
-        let schedule = setup.schedule.clone().or_else(|| self.schedule());
-        let schedule = schedule.unwrap_or_default();
+        let own = || self.schedule(setup.seed);
+        let schedule = setup.schedule.clone().or_else(own).unwrap_or_default();
         let bodies = Bodies::settled(&schedule, setup.seed);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
     }

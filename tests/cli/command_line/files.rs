@@ -79,6 +79,13 @@ fn an_ending_that_names_no_format_is_refused_before_anything_is_written() {
         .tells(&["`.xyz` names no format", "`.csv`", "`.jsonl`"]);
     athermal(&[&"simulate", &"linear-axis", &"-o", &unknown]).ended(2);
     assert!(!unknown.exists());
+    let (log, plan) = (scratch.path("log.csv"), scratch.path("plan.jsonl"));
+    let simulate: [&dyn AsRef<std::ffi::OsStr>; 4] = [&"simulate", &"die-tester", &"-o", &log];
+    let planned = athermal(&[&simulate[..], &[&"--set-points", &plan]].concat());
+    planned
+        .ended(2)
+        .tells(&["plan.jsonl: what is planned is written as CSV", "`.csv`"]);
+    assert!(!plan.exists() && !log.exists());
     let without = scratch.path("out");
     run(&without).ended(0);
     let text = std::fs::read_to_string(without).unwrap();

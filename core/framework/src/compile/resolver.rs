@@ -156,17 +156,24 @@ impl<'g> Resolver<'g> {
     }
 
     fn take_signals(&mut self) {
+        let channels = self.graph.signals.iter().map(|of| of.channels.len());
+        let mut behind = channels.sum();
         for signal in &self.graph.signals {
             for (channel, _) in &signal.channels {
+                let planned = signal.known_ahead.map(|known_ahead| {
+                    let applies_at = behind;
+                    behind += 1;
+                    Planned {
+                        known_ahead,
+                        applies_at,
+                    }
+                });
                 let source = SourceChannel {
                     name: format!("{}.{channel}", signal.name),
                     column: signal.column.replace("{channel}", channel),
                     optional: signal.optional.contains(channel),
                     range: signal.range.unwrap_or((f64::NEG_INFINITY, f64::INFINITY)),
-                    planned: signal.known_ahead.map(|known_ahead| Planned {
-                        known_ahead,
-                        applies_at: usize::MAX,
-                    }),
+                    planned,
                     is_instant: false,
                 };
                 let slot = self.source(source, channel, &signal.unit, signal.max_age);
@@ -179,17 +186,9 @@ impl<'g> Resolver<'g> {
             }
         }
         // From when planned values apply stands behind all that graphs refer to, since none refers to it.
-        for signal in &self.graph.signals {
-            for (channel, _) in signal
-                .channels
-                .iter()
-                .filter(|_| signal.known_ahead.is_some())
-            {
-                let name = format!("{}.{channel}", signal.name);
-                let (applies_at, of) = (self.sources.len(), self.sources.iter_mut());
-                let of = of.filter(|source| source.name == name);
-                let planned = of.filter_map(|source| source.planned.as_mut());
-                planned.for_each(|planned| planned.applies_at = applies_at);
+        let signals = self.graph.signals.iter();
+        for signal in signals.filter(|of| of.known_ahead.is_some()) {
+            for (channel, _) in &signal.channels {
                 let source = SourceChannel {
                     name: format!("{}:applies_at.{channel}", signal.name),
                     column: signal.applies_at.replace("{channel}", channel),

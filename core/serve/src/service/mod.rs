@@ -230,6 +230,7 @@ impl Service {
         }
         let live = LiveOptions {
             isolates: true,
+            retain: runtime.retain,
             channels: given.clone(),
             ..LiveOptions::default()
         };

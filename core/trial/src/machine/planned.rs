@@ -44,7 +44,7 @@ impl Announcements {
         ahead: Duration,
     ) -> Option<Self> {
         let set_point = machine.set_points().iter().find(|of| of.name == name)?;
-        let own = machine.schedule();
+        let own = machine.schedule(setup.seed);
         let schedule = setup.schedule.as_ref().or(own.as_ref());
         let constant = || Track::constant(set_point.default);
         Some(Self {

@@ -73,8 +73,8 @@ pub trait Machine: Sync {
     /// What a schedule can set.
     fn set_points(&self) -> &[SetPoint];
 
-    /// Its set points over time where a setup says nothing else; none where each keeps its default.
-    fn schedule(&self) -> Option<Schedule> {
+    /// Its set points over time where a setup with this seed says nothing else; none where each keeps its default.
+    fn schedule(&self, _seed: u64) -> Option<Schedule> {
         None
     }
 

@@ -76,16 +76,13 @@ impl FileError {
             write!(f, "{place}: ")?;
         }
         match self {
-            Self::Open { file, source } => {
-                write!(
-                    f,
-                    "{file}: cannot be opened: {source}; check the path and the rights"
-                )
-            }
+            Self::Open { file, source } => write!(
+                f,
+                "{file}: cannot be opened: {source}; check the path and the rights"
+            ),
             Self::Read { source, .. } => write!(f, "cannot be read further: {source}"),
             Self::Write { file, source } => write!(f, "{file}: cannot be written: {source}"),
-            Self::StandardInputInList => write!(
-                f,
+            Self::StandardInputInList => f.write_str(
                 "standard input cannot be joined with other files, whose order is found by opening them twice; save it to a file first"
             ),
             Self::Merge(error) => write!(f, "{error}"),
@@ -93,12 +90,9 @@ impl FileError {
                 f,
                 "{file}: is empty; a recording starts with a line of column names (CSV) or an object (JSON lines)"
             ),
-            Self::NotText { .. } => {
-                write!(
-                    f,
-                    "is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
-                )
-            }
+            Self::NotText { .. } => f.write_str(
+                "is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\"",
+            ),
             Self::TooLong { limit, .. } => {
                 write!(
                     f,
@@ -107,8 +101,7 @@ impl FileError {
                 or_leniently(f, strict, "leave it out")
             }
             Self::UnclosedQuote { .. } => {
-                write!(
-                    f,
+                f.write_str(
                     "a quoted cell starts here that does not end; close the quote or remove it"
                 )?;
                 or_leniently(f, strict, "leave the row out")
@@ -117,13 +110,11 @@ impl FileError {
                 column,
                 positions: [first, second],
                 ..
-            } => {
-                write!(
-                    f,
-                    "the name `{column}` stands at columns {first} and {second}; write `{column}[1]` or `{column}[2]` for one of \
-                     them, by its place among these"
-                )
-            }
+            } => write!(
+                f,
+                "the name `{column}` stands at columns {first} and {second}; write `{column}[1]` or `{column}[2]` for one of \
+                 them, by its place among these"
+            ),
             Self::MissingColumns {
                 missing,
                 found,
@@ -142,12 +133,11 @@ impl FileError {
             Self::TimeAgain { time, why, .. } => {
                 write!(f, "the time `{time}` is that of the row before")?;
                 match why {
-                    Again::Live => write!(
-                        f,
+                    Again::Live => f.write_str(
                         "; the row was left out: where rows are taken as they come, what belongs to one time must stand in one"
                     ),
                     Again::Nothing => {
-                        write!(f, ", which has all that it has; the row was left out")
+                        f.write_str(", which has all that it has; the row was left out")
                     }
                     Again::Other(column) => write!(
                         f,
@@ -231,9 +221,8 @@ impl FileError {
                 f,
                 "`{found}` stands behind the last column that has a name; it is passed over"
             ),
-            Self::NoTable { file, what } => write!(f, "{file}: {what}"),
-            Self::CellsOfSpaces { .. } => write!(
-                f,
+            Self::Unfit { file, reason } => write!(f, "{file}: {reason}"),
+            Self::CellsOfSpaces { .. } => f.write_str(
                 "the cells are parted by spaces, which is not read; write commas between them, as `tr -s ' ' ',' < LOG` does"
             ),
             Self::BadObject { reason, .. } => {
@@ -243,8 +232,7 @@ impl FileError {
                 )?;
                 or_leniently(f, strict, "leave the line out")
             }
-            Self::JsonArray { .. } => write!(
-                f,
+            Self::JsonArray { .. } => f.write_str(
                 "a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
             ),
             Self::NotBegun { file, reason } => write!(
@@ -282,6 +270,10 @@ impl CellFault {
                      one mark"
                 )?;
                 "leave out those with another"
+            }
+            Self::NoInstant(fault) => {
+                fault.write(f, found, false)?;
+                "take it as absent"
             }
             Self::TimeBeyond => {
                 write!(

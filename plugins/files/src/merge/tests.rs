@@ -141,6 +141,29 @@ fn what_is_added_to_the_times_of_a_file_moves_its_rows() {
 }
 
 #[test]
+fn what_is_added_to_the_times_of_a_recipe_moves_the_instants_that_it_plans_too() {
+    let mut layout = layout();
+    layout.channels[1].is_instant = true;
+    let log = ("z.csv", "t,z\n1700000000,1\n1700000010,2\n1700000020,3\n");
+    let recipe = |from: u32| {
+        let row = |at: u32| format!("{},{at},{}\n", from + at, from + at + 5);
+        format!("t,a,b\n{}{}", row(0), row(10))
+    };
+    let rows = |test: &str, recipe: &str, by_s: i64| {
+        let options = Options {
+            offsets: vec![("recipe.csv".into(), by_s * 1_000_000_000)],
+            ..Options::default()
+        };
+        let files = [log, ("recipe.csv", recipe)];
+        read(test, &files, layout.clone(), &options).unwrap()
+    };
+    let expected = "0:0,1700000005,1 10:10,1700000015,2 20:-,-,3";
+    assert_eq!(rows("recipe", &recipe(1_700_000_000), 0), expected);
+    let behind = recipe(1_699_996_400);
+    assert_eq!(rows("recipe-behind", &behind, 3600), expected);
+}
+
+#[test]
 fn times_that_are_no_dates_are_merged_where_that_is_asked_for_alone() {
     let files = [
         ("a.csv", "t,a,b\n0,1,2\n10,3,4\n"),

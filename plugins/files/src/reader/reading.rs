@@ -19,6 +19,8 @@ pub(super) struct Reading {
     pub(super) commas: Commas,
     /// The text of the time of the row that was read last.
     pub(super) time: Vec<u8>,
+    /// The text of an instant beside it.
+    pub(super) text: String,
     /// Which cell says the segment of a row, after those of the channels.
     pub(super) segment_cell: Option<usize>,
     /// The segment of the row that was read last.
@@ -229,24 +231,13 @@ impl Reading {
         time.columns
             .join(&mut self.time, |column| cell::trim(rows.time(column)));
         let cell = self.time.as_slice();
-        let read = std::str::from_utf8(cell).ok().and_then(|cell| {
-            text.push_str(cell);
-            if self.commas.times
-                && let Some(comma) = cell::comma_of_time(cell.as_bytes())
-            {
-                text.replace_range(comma..=comma, ".");
-            }
-            time.read(text.as_bytes(), ledger.last())
-        });
+        let read = read_instant(time, self.commas, cell, text, ledger.last());
         let Some(Civil::At(at)) = read else {
             if read.is_none() && rows.take_header(ledger)? {
                 return Ok(None);
             }
-            ledger.refuse_row(|| {
-                let column = time.columns.to_string();
-                bad_cell(rows.place(), &column, cell, no_instant(time, read))
-            })?;
-            return Ok(None);
+            let fault = no_instant(time, read);
+            return self.refuse_time(rows, fault);
         };
         if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
             let report = &mut ledger.report;
@@ -256,11 +247,7 @@ impl Reading {
         } else if self.commas.times
             && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
         {
-            ledger.refuse_row(|| {
-                let column = time.columns.to_string();
-                bad_cell(rows.place(), &column, cell, other_mark(mark))
-            })?;
-            return Ok(None);
+            return self.refuse_time(rows, other_mark(mark));
         }
         Ok(Some(at.as_ns()))
     }
@@ -280,30 +267,36 @@ impl Reading {
             _ => Civil::At(Instant::from_ns(ns)),
         };
         if !is_utc && time.zone.is_none() {
-            ledger
-                .report
-                .without_zone
-                .get_or_insert_with(|| rows.place());
+            let report = &mut ledger.report;
+            report.without_zone.get_or_insert_with(|| rows.place());
         }
         if let Civil::At(at) = at {
             return Ok(Some(at.as_ns()));
         }
-        ledger.refuse_row(|| {
-            let column = time.columns.to_string();
-            bad_cell(
-                rows.place(),
-                &column,
-                &self.time,
-                no_instant(time, Some(at)),
-            )
-        })?;
+        let fault = no_instant(time, Some(at));
+        self.refuse_time(rows, fault)
+    }
+
+    /// Leaves the current row out for its time, where that is how it is read.
+    #[cold]
+    fn refuse_time<C: Cells>(
+        &mut self,
+        rows: &C,
+        fault: CellFault,
+    ) -> Result<Option<i64>, FileError> {
+        let (cell, column) = (&self.time, self.layout.time.columns.to_string());
+        let error = || bad_cell(rows.place(), &column, cell, fault);
+        self.ledger.refuse_row(error)?;
         Ok(None)
     }
 
     fn read_values<C: Cells>(&mut self, rows: &C, values: &mut Vec<f64>) -> Result<(), FileError> {
         values.clear();
-        if let Some(numbers) = rows.numbers() {
+        if let Some((numbers, no_numbers)) = rows.numbers() {
             values.extend_from_slice(numbers);
+            for (index, found) in no_numbers {
+                self.refuse_cell(rows, *index, found.as_bytes(), CellFault::NoNumber)?;
+            }
             return Ok(());
         }
         let channels = self.layout.channels.len();
@@ -329,37 +322,80 @@ impl Reading {
         index: usize,
         cell: &[u8],
     ) -> Result<f64, FileError> {
-        let (column, ledger) = (&self.layout.channels[index].column, &mut self.ledger);
-        let value = match self.layout.channels[index].is_instant {
-            true => instant(&self.layout.time, cell),
-            false => cell::value(cell, self.commas.values),
-        };
-        match value {
+        if self.layout.channels[index].is_instant {
+            return self.read_applies_at(rows, index, cell::trim(cell));
+        }
+        let fault = match cell::value(cell, self.commas.values) {
             Some(_)
                 if self.commas.values
-                    && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
+                    && let Some(mark) =
+                        self.ledger.other_value_mark(cell, || rows.place().line) =>
             {
-                ledger.bad_cell(index, || {
-                    bad_cell(rows.place(), column, cell::trim(cell), other_mark(mark))
-                })?;
+                other_mark(mark)
             }
             Some(value) => return Ok(value),
-            None => ledger.bad_cell(index, || {
-                bad_cell(rows.place(), column, cell::trim(cell), CellFault::NoNumber)
-            })?,
+            None => CellFault::NoNumber,
+        };
+        self.refuse_cell(rows, index, cell::trim(cell), fault)
+    }
+
+    /// The instant in s that a cell beside the time says, which is written as the time is.
+    fn read_applies_at<C: Cells>(
+        &mut self,
+        rows: &C,
+        index: usize,
+        cell: &[u8],
+    ) -> Result<f64, FileError> {
+        if cell::value(cell, false).is_some_and(f64::is_nan) {
+            return Ok(f64::NAN);
         }
+        let (time, text) = (&self.layout.time, &mut self.text);
+        text.clear();
+        let fault = match read_instant(time, self.commas, cell, text, None) {
+            Some(Civil::At(_))
+                if self.commas.times
+                    && time.form.is_zoned(text.as_bytes()).is_none()
+                    && let Some(mark) = self.ledger.other_time_mark(cell, || rows.place().line) =>
+            {
+                other_mark(mark)
+            }
+            Some(Civil::At(at)) => return Ok((at - Instant::from_ns(0)).secs()),
+            read => CellFault::NoInstant(Box::new(no_instant(time, read))),
+        };
+        self.refuse_cell(rows, index, cell, fault)
+    }
+
+    /// Takes the cell of a channel as absent, where that is how it is read.
+    #[cold]
+    fn refuse_cell<C: Cells>(
+        &mut self,
+        rows: &C,
+        index: usize,
+        cell: &[u8],
+        fault: CellFault,
+    ) -> Result<f64, FileError> {
+        let column = &self.layout.channels[index].column;
+        let error = || bad_cell(rows.place(), column, cell, fault.clone());
+        self.ledger.bad_cell(index, error)?;
         Ok(f64::NAN)
     }
 }
 
-/// The instant that a cell beside the time says in its form, in s; none where it says none.
-#[cold]
-fn instant(time: &TimeColumn, cell: &[u8]) -> Option<f64> {
-    match time.read(cell::trim(cell), None) {
-        Some(Civil::At(at)) => Some((at - Instant::from_ns(0)).secs()),
-        Some(_) => None,
-        None => cell::value(cell, false).filter(|value| value.is_nan()),
+/// What a cell of a time stands for; `text` becomes the cell as it is read, with a point for a decimal comma.
+fn read_instant(
+    time: &TimeColumn,
+    commas: Commas,
+    cell: &[u8],
+    text: &mut String,
+    last: Option<(Instant, i64)>,
+) -> Option<Civil> {
+    text.push_str(std::str::from_utf8(cell).ok()?);
+    if commas.times
+        && let Some(comma) = cell::comma_of_time(cell)
+    {
+        text.replace_range(comma..=comma, ".");
     }
+    time.read(text.as_bytes(), last)
 }
 
 /// A cell that is not taken.

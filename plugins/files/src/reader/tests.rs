@@ -404,3 +404,54 @@ fn a_file_that_is_not_there_is_an_error_that_names_it() {
         "{error}"
     );
 }
+
+/// Rows of a plan in a text: the values and instants of each, in s.
+fn planned(text: &str, time: TimeForm, options: Options) -> Result<Vec<[f64; 2]>, String> {
+    let mut layout = Layout::new("t", time, ["a", "from"]);
+    layout.channels[1].is_instant = true;
+    let input = io::Cursor::new(text.to_owned().into_bytes());
+    let mut reader = Reader::from_read("f.csv", input, layout, options).unwrap();
+    let (mut row, mut rows) = (Row::default(), Vec::new());
+    while reader
+        .next_into(&mut row)
+        .map_err(|error| error.to_string())?
+    {
+        rows.push([row.values[0], row.values[1]]);
+    }
+    Ok(rows)
+}
+
+#[test]
+fn an_instant_beside_the_time_is_read_as_the_time_is_whatever_its_decimal_mark() {
+    let strict = Options::default();
+    let seconds = "t;a;from\n0,5;1,5;12,25\n1,5;;\n2,5;2,5;NaN\n3,5;3;14\n";
+    let read = planned(seconds, TimeForm::SECONDS, strict.clone()).unwrap();
+    assert_eq!((read[0], read[3]), ([1.5, 12.25], [3.0, 14.0]));
+    assert!(read[1][1].is_nan() && read[2][1].is_nan());
+    // A date of points is no number with another mark.
+    let form: TimeForm = TimeForm::Format("%d.%m.%Y %H:%M:%S%.f".parse().unwrap());
+    let dates = "t;a;from\n01.01.1970 00:00:01,5;1,5;01.01.1970 00:00:02,25\n\
+                 01.01.1970 00:00:03,5;2,5;01.01.1970 00:00:04.5\n";
+    let read = planned(dates, form, strict.clone()).unwrap();
+    assert_eq!(read, [[1.5, 2.25], [2.5, 4.5]]);
+    let mixed = "t;a;from\n0,5;1,5;12,25\n1,5;1,5;12.75\n";
+    let error = planned(mixed, TimeForm::SECONDS, strict).unwrap_err();
+    assert!(
+        error.contains("f.csv:3: column `from`") && error.contains("decimal mark `,`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_cell_beside_the_time_that_is_no_instant_says_what_one_looks_like() {
+    let text =
+        "t,a,from\n1970-01-01T00:00:00Z,1,soon\n1970-01-01T00:00:01Z,2,1970-01-01T00:00:09Z\n";
+    let error = planned(text, TimeForm::Rfc3339, Options::default()).unwrap_err();
+    assert_eq!(
+        error,
+        "f.csv:2: column `from`: expected a date and time such as 2013-07-04T00:00:00Z, found `soon`; correct the time or how it is to \
+         be read, or read leniently (`--lenient`) to take it as absent"
+    );
+    let read = planned(text, TimeForm::Rfc3339, lenient()).unwrap();
+    assert!(read[0][0] == 1.0 && read[0][1].is_nan() && read[1] == [2.0, 9.0]);
+}
