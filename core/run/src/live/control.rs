@@ -338,6 +338,12 @@ impl Control {
         self.event
     }
 
+    /// Whether a graph is on its way to the engine thread: committed, and neither taken over nor sent back.
+    pub fn is_on_the_way(&mut self) -> bool {
+        self.catch_up();
+        self.committed.is_some()
+    }
+
     /// How much of the past is retained.
     #[must_use]
     pub fn retained(&self) -> Duration {
