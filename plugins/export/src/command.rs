@@ -9,13 +9,15 @@ use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 
 use crate::lower::Rates;
-use crate::{ExportError, Exported, Options, c, export_c, lower, onnx, state};
+use crate::{ExportError, Exported, Options, c, export_c, fmu, lower, onnx, state};
 
 /// What a graph is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Target {
     /// C99 with a runtime, a self test and recipes
     C,
+    /// A functional mock-up unit for co-simulation (FMI 3.0), with its sources
+    Fmu,
     /// ONNX, of the linear parts alone
     Onnx,
 }
@@ -25,6 +27,7 @@ enum Target {
 #[command(after_help = "Examples:
   athermal export c model.json -o c
   athermal export c model.json -o c --rate 1s --rate position=10s --frozen
+  athermal export fmu model.json -o fmu
   athermal export onnx model.json -o onnx")]
 pub(crate) struct Export {
     /// As what
@@ -58,9 +61,7 @@ athermal_command::register_command!(Export, "export");
 
 impl Command for Export {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        if self.target == Target::Onnx {
-            self.no_state()?;
-        }
+        self.for_target()?;
         let mut engine = Model::load(&self.model)?.engine()?;
         let options = Options {
             rates: self.rates()?,
@@ -71,6 +72,9 @@ impl Command for Export {
             return self.onnx(&engine, &options);
         }
         let exported = export_c(&engine, &options, self.float).map_err(failure)?;
+        if self.target == Target::Fmu {
+            return self.fmu(terminal, &exported);
+        }
         c::write(&exported.files, &self.output).map_err(failure)?;
         self.carry(&mut engine, &exported)?;
         self.report(terminal, &exported);
@@ -80,7 +84,9 @@ impl Command for Export {
 
 fn failure(error: ExportError) -> Failure {
     match error {
-        ExportError::Write { .. } => Failure::Outside(error.to_string()),
+        ExportError::Write { .. } | ExportError::Compiler { .. } => {
+            Failure::Outside(error.to_string())
+        }
         _ => Failure::Request(error.to_string()),
     }
 }
@@ -104,19 +110,24 @@ impl Export {
         Ok(rates)
     }
 
-    /// Refuses what ONNX has no place for.
-    fn no_state(&self) -> Result<(), Failure> {
+    /// Refuses what only C has a place for.
+    fn for_target(&self) -> Result<(), Failure> {
         let given = [
-            (self.state.is_some(), "`--state`: it has no state"),
-            (self.state_back.is_some(), "`--state-back`: it has no state"),
-            (self.float, "`--float`: it is in double precision"),
+            ("--state", self.state.is_some()),
+            ("--state-back", self.state_back.is_some()),
+            ("--float", self.float),
         ];
-        let refused = given.iter().find(|(is_given, _)| *is_given);
-        refused.map_or(Ok(()), |(_, option)| {
-            Err(Failure::Request(format!(
-                "ONNX takes no {option}; leave it out, or export to C"
-            )))
-        })
+        let refused = given.iter().find(|(_, is_given)| *is_given);
+        match (self.target, refused) {
+            (Target::C, _) | (_, None) => Ok(()),
+            (target, Some((option, _))) => Err(Failure::Request(format!(
+                "`{option}` is for `export c`, and {} have no place for it: leave it out, or export to C",
+                match target {
+                    Target::Onnx => "ONNX models",
+                    _ => "units for co-simulation",
+                }
+            ))),
+        }
     }
 
     /// Writes the linear parts.
@@ -129,6 +140,28 @@ impl Export {
         println!(
             "wrote {}: {count} linear estimators, whose rows the caller makes",
             self.output.join(path).display()
+        );
+        Ok(Answer::Fine)
+    }
+
+    /// Writes a unit for co-simulation.
+    fn fmu(&self, terminal: &Terminal, exported: &Exported) -> Result<Answer, Failure> {
+        let form = &exported.form;
+        let path = self.output.join(format!("{}.fmu", form.name));
+        let binary = fmu::write(exported, &path, "cc").map_err(failure)?;
+        let (inputs, outputs) = (form.sources.len(), form.outputs.len());
+        let with = match binary {
+            fmu::Binary::Built(platform) => format!("its sources and a binary for {platform}"),
+            fmu::Binary::Without(why) => {
+                terminal.note(format!(
+                    "{why}: the unit has its sources alone, which a simulator can build"
+                ));
+                "its sources".to_owned()
+            }
+        };
+        println!(
+            "wrote {}: {inputs} inputs and {outputs} outputs, with {with}",
+            path.display()
         );
         Ok(Answer::Fine)
     }

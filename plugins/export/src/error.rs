@@ -30,6 +30,14 @@ pub enum ExportError {
         /// Those that there are.
         known: String,
     },
+    /// A C compiler refuses what was written.
+    #[error("`{compiler}` refuses the sources: {said}")]
+    Compiler {
+        /// The compiler.
+        compiler: String,
+        /// What it says.
+        said: String,
+    },
     /// More state than a runtime finds its way in, whose places have 32 bits.
     #[error(
         "its state would take {bytes} bytes, more than there are places for: give the time between two samples with `--rate`"

@@ -11,6 +11,7 @@
 pub mod c;
 mod command;
 mod error;
+pub mod fmu;
 mod form;
 mod lower;
 pub mod onnx;

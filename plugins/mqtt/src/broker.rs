@@ -97,6 +97,28 @@ impl fmt::Display for Broker {
     }
 }
 
+/// By what a broker knows a client.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(try_from = "String")]
+#[schemars(with = "String")]
+pub struct ClientId(String);
+
+impl TryFrom<String> for ClientId {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        match text.len() {
+            0 => Err(
+                "a client id is never empty: leave it out, and the usual one is taken".to_owned(),
+            ),
+            1..=65_535 if !text.contains('\0') => Ok(Self(text)),
+            length => Err(format!(
+                "a client id is a text of up to 65,535 bytes without NUL; this one has {length}"
+            )),
+        }
+    }
+}
+
 /// A version of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 pub enum Version {
@@ -170,7 +192,7 @@ pub struct Way<'a> {
     pub broker: &'a Broker,
     pub authorities: Option<&'a PathBuf>,
     pub login: Option<&'a Login>,
-    pub client_id: Option<&'a str>,
+    pub client_id: Option<&'a ClientId>,
     pub keep_alive: Duration,
 }
 
@@ -194,10 +216,9 @@ impl Way<'_> {
         Ok(Settings {
             broker,
             version: Version::Five,
-            client_id: self.client_id.map_or(own, str::to_owned),
+            client_id: self.client_id.map_or(own, |of| of.0.clone()),
             login: self.login.map(|login| login.read(folder)).transpose()?,
-            keep_alive: Wait::from_nanos(self.keep_alive.as_ns().max(0) as u64)
-                .max(Wait::from_secs(5)),
+            keep_alive: Wait::from_nanos(self.keep_alive.as_ns().max(0) as u64),
             receive_maximum: u16::MAX,
             keeps_session: true,
             last_will: None,
@@ -238,6 +259,15 @@ mod tests {
         ] {
             let error = text.parse::<Broker>().expect_err(text);
             assert!(error.contains(why), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_client_id_is_no_empty_text_and_none_that_the_protocol_cannot_carry() {
+        let of = |text: String| ClientId::try_from(text).map(|of| of.0);
+        assert_eq!(of("me".to_owned()), Ok("me".to_owned()));
+        for text in [String::new(), "a\0b".to_owned(), "a".repeat(65_536)] {
+            assert!(of(text).is_err());
         }
     }
 

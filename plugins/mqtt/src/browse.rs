@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration as Wait;
 
 use athermal_command::{Answer, Command, Failure, Terminal, print};
+use athermal_core::document::placeholders;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use clap::Args;
@@ -76,9 +77,11 @@ impl Command for Browse {
             patience,
             |heard| {
                 match heard {
-                    Heard::Refused(_, why) => refused = Some(why),
+                    Heard::Answer(_, answer) => refused = answer.err(),
                     Heard::Message(message) => {
-                        topics.insert(message.topic, message.payload);
+                        let before = topics.remove(&message.topic);
+                        let payload = with_absent(before, message.payload);
+                        topics.insert(message.topic, payload);
                     }
                 }
                 refused.is_some()
@@ -108,8 +111,29 @@ impl Command for Browse {
     }
 }
 
+/// A message, with the values of one before it where its own are absent: not each has all of them.
+fn with_absent(before: Option<Vec<u8>>, payload: Vec<u8>) -> Vec<u8> {
+    fn fill(value: &mut Value, before: Value) {
+        match (value, before) {
+            (Value::Object(fields), Value::Object(before)) => {
+                for (key, of) in before {
+                    fill(fields.entry(key).or_insert(Value::Null), of);
+                }
+            }
+            (value @ Value::Null, before) => *value = before,
+            _ => {}
+        }
+    }
+    let read = |of: &[u8]| serde_json::from_slice::<Value>(of).ok();
+    let (Some(mut value), Some(before)) = (read(&payload), before.as_deref().and_then(read)) else {
+        return payload;
+    };
+    fill(&mut value, before);
+    value.to_string().into_bytes()
+}
+
 /// Names of times, and of qualities.
-const TIMES: [&str; 8] = [
+const TIMES: [&str; 9] = [
     "time",
     "timestamp",
     "ts",
@@ -118,10 +142,13 @@ const TIMES: [&str; 8] = [
     "date",
     "sourcetimestamp",
     "time_ms",
+    "time_ns",
 ];
-const QUALITIES: [&str; 3] = ["quality", "q", "status"];
+const QUALITIES: [&str; 3] = ["quality", "status", "q"];
 const VALUES: [&str; 4] = ["value", "v", "val", "y"];
 const NAMES: [&str; 4] = ["id", "name", "tag", "n"];
+/// A number of seconds since 1970 that is a time of our days is no smaller.
+const A_TIME: f64 = 1e8;
 
 /// The table of a source.
 fn table(broker: &Broker, topics: &BTreeMap<String, Vec<u8>>) -> String {
@@ -139,9 +166,10 @@ fn table(broker: &Broker, topics: &BTreeMap<String, Vec<u8>>) -> String {
     text + "]\n"
 }
 
-/// A text as TOML writes it.
+/// A text as TOML writes it: as JSON does, but for one sign.
 fn quoted(text: &str) -> String {
-    Value::from(text).to_string()
+    let json = Value::from(text).to_string();
+    json.replace('\u{7f}', "\\u007f")
 }
 
 fn message(
@@ -152,40 +180,63 @@ fn message(
     if topic.starts_with('$') {
         return Err("of the broker itself");
     }
+    if has_braces(topic) {
+        return Err(BRACES);
+    }
     let text = std::str::from_utf8(payload).map_err(|_| "no text")?;
     let head = format!("{{ topic = {}", quoted(topic));
+    let last = topic.rsplit('/').next().unwrap_or(topic);
     if text.trim().parse::<f64>().is_ok_and(f64::is_finite) {
-        let channel = channel(topic, topic.rsplit('/').next().unwrap_or(topic), names);
+        let channel = channel(last, None, names);
         return Ok(format!("{head}, time = \"arrival\", {channel} }}"));
     }
     let value: Value = serde_json::from_str(text).map_err(|_| "neither a number nor JSON")?;
-    if let Some(line) = list(&value, &head, topic, names) {
-        return Ok(line);
+    match list(&value, &head, names) {
+        Some(line) => Ok(line),
+        None => object(&value, &head, last, names),
     }
-    let Value::Object(fields) = &value else {
+}
+
+/// Why what has braces of its own cannot be named.
+const BRACES: &str = "a name in braces would be that of a set";
+
+fn has_braces(text: &str) -> bool {
+    placeholders(text).next().is_some()
+}
+
+/// An object with values.
+fn object(
+    value: &Value,
+    head: &str,
+    last: &str,
+    names: &mut BTreeSet<String>,
+) -> Result<String, &'static str> {
+    let Value::Object(fields) = value else {
         return Err("no object with values");
     };
+    if fields.get("alive").is_some_and(Value::is_boolean) {
+        return Err("whether a service lives");
+    }
     let mut leaves = Vec::new();
-    collect(&value, "", &mut leaves);
-    let time = time_of(&leaves);
-    let quality = leaves.iter().find(|(at, _)| is(at, &QUALITIES));
-    let numbers: Vec<_> = leaves
-        .iter()
-        .filter(|(at, value)| value.is_number() && !is(at, &TIMES) && !is(at, &QUALITIES))
-        .collect();
-    let quality = quality.map_or(String::new(), |(at, good)| {
-        format!(", quality = {{ at = {}, good = [{good}] }}", quoted(at))
-    });
-    let middle = format!("{head}{time}{quality}");
-    match numbers.as_slice() {
+    collect(value, "", &mut leaves);
+    if leaves.iter().any(|(at, _)| has_braces(at)) {
+        return Err(BRACES);
+    }
+    let (quality, quality_at) = quality_of(&leaves);
+    let is_value = |at: &str, value: &Value| {
+        let is_state = is(at, &QUALITIES[..2]) || quality_at == Some(at);
+        value.is_number() && !is_time(at, value) && !is_state
+    };
+    let numbers = leaves.iter().filter(|(at, value)| is_value(at, value));
+    let middle = format!("{head}{}{quality}", time_of(&leaves));
+    match numbers.collect::<Vec<_>>().as_slice() {
         [] => Err("it has no numbers"),
         [(at, _)] if is(at, &VALUES) || fields.len() == 1 => {
-            let last = topic.rsplit('/').next().unwrap_or(topic);
             let unit = fields
                 .iter()
                 .find(|(key, _)| key.eq_ignore_ascii_case("unit"));
             let unit = unit.and_then(|(_, unit)| Unit::in_name(unit.as_str()?));
-            let channel = channel_of(last, unit, names);
+            let channel = channel(last, unit, names);
             Ok(format!("{middle}, value = {}, {channel} }}", quoted(at)))
         }
         several => {
@@ -200,46 +251,50 @@ fn message(
 }
 
 /// A list of objects with a name and a value each.
-fn list(value: &Value, head: &str, topic: &str, names: &mut BTreeSet<String>) -> Option<String> {
+fn list(value: &Value, head: &str, names: &mut BTreeSet<String>) -> Option<String> {
     let (at, items) = match value {
         Value::Array(items) => (String::new(), items),
         Value::Object(fields) => fields
             .iter()
-            .find_map(|(key, of)| Some((format!("/{key}"), of.as_array()?)))?,
+            .find_map(|(key, of)| Some((format!("/{}", escaped(key)), of.as_array()?)))?,
         _ => return None,
     };
     let first = items.first()?.as_object()?;
     let key = |known: &[&str]| {
         let found = first.keys().find(|key| is(key, known))?;
-        Some(format!("/{found}"))
+        Some(format!("/{}", escaped(found)))
     };
     let (name, inner) = (key(&NAMES)?, key(&VALUES)?);
     let mut leaves = Vec::new();
     collect(items.first()?, "", &mut leaves);
-    if time_of(&leaves).is_empty() {
+    if !leaves.iter().any(|(at, value)| is_time(at, value)) {
         collect(value, "", &mut leaves);
     }
-    let time = time_of(&leaves);
-    let quality = leaves.iter().find(|(at, _)| is(at, &QUALITIES));
-    let quality = quality.map_or(String::new(), |(at, good)| {
-        format!(", quality = {{ at = {}, good = [{good}] }}", quoted(at))
-    });
-    let _ = topic;
+    let (time, (quality, _)) = (time_of(&leaves), quality_of(&leaves));
     let tags: BTreeSet<_> = items
         .iter()
         .filter_map(|of| of.pointer(&name)?.as_str())
+        .filter(|tag| !has_braces(tag))
         .collect();
     let entries: Vec<_> = tags
         .into_iter()
         .map(|tag| entry(tag, tag.rsplit(['.', '/']).next().unwrap_or(tag), names))
         .collect();
-    Some(format!(
-        "{head}, each = {}, name = {}, value = {}{time}{quality}, channels = {{ {} }} }}",
-        quoted(&at),
-        quoted(&name),
-        quoted(&inner),
-        entries.join(", ")
-    ))
+    let can_be_named = !entries.is_empty() && !has_braces(&at);
+    can_be_named.then(|| {
+        format!(
+            "{head}, each = {}, name = {}, value = {}{time}{quality}, channels = {{ {} }} }}",
+            quoted(&at),
+            quoted(&name),
+            quoted(&inner),
+            entries.join(", ")
+        )
+    })
+}
+
+/// A key as it stands in a JSON pointer.
+fn escaped(key: &str) -> String {
+    key.replace('~', "~0").replace('/', "~1")
 }
 
 /// The values of an object with their pointers.
@@ -247,8 +302,7 @@ fn collect<'a>(value: &'a Value, at: &str, into: &mut Vec<(String, &'a Value)>) 
     match value {
         Value::Object(fields) => {
             for (key, of) in fields {
-                let key = key.replace('~', "~0").replace('/', "~1");
-                collect(of, &format!("{at}/{key}"), into);
+                collect(of, &format!("{at}/{}", escaped(key)), into);
             }
         }
         Value::Array(_) => {}
@@ -261,10 +315,20 @@ fn is(at: &str, known: &[&str]) -> bool {
     known.contains(&last.as_str())
 }
 
-/// The time among values, with the unit that its size says.
+/// Whether a value is a time by its name and by what it is: `T` is a temperature more often.
+fn is_time(at: &str, value: &Value) -> bool {
+    let is_one = match value {
+        Value::Number(number) => number.as_f64().is_some_and(|of| of >= A_TIME),
+        Value::String(text) => text.parse::<jiff::Timestamp>().is_ok(),
+        _ => false,
+    };
+    is_one && is(at, &TIMES)
+}
+
+/// The time among values, with the unit that its size says; that of the arrival where there is none.
 fn time_of(leaves: &[(String, &Value)]) -> String {
-    let Some((at, value)) = leaves.iter().find(|(at, _)| is(at, &TIMES)) else {
-        return String::new();
+    let Some((at, value)) = leaves.iter().find(|(at, value)| is_time(at, value)) else {
+        return ", time = \"arrival\"".to_owned();
     };
     let unit = value.as_f64().map(|value| match value {
         ..1e11 => "s",
@@ -276,13 +340,32 @@ fn time_of(leaves: &[(String, &Value)]) -> String {
     format!(", time = {{ at = {}{unit} }}", quoted(at))
 }
 
-/// A channel, and its unit where its name says so.
-fn channel(topic: &str, last: &str, names: &mut BTreeSet<String>) -> String {
-    let _ = topic;
-    channel_of(last, unit_in(last), names)
+/// What says that a value is good, where it stands, if it does say so: of a message that is not good nothing can be learned.
+fn quality_of<'a>(leaves: &'a [(String, &Value)]) -> (String, Option<&'a str>) {
+    let is_good = |of: &Value| match of {
+        // OPC DA has 192, OPC UA 0.
+        Value::Number(number) => matches!(number.as_u64(), Some(0 | 192)),
+        Value::String(text) => ["good", "ok"]
+            .iter()
+            .any(|of| text.eq_ignore_ascii_case(of)),
+        _ => false,
+    };
+    let found = leaves
+        .iter()
+        .find(|(at, value)| is(at, &QUALITIES) && is_good(value));
+    let Some((at, value)) = found else {
+        return (String::new(), None);
+    };
+    let good = match value {
+        Value::String(text) => quoted(text),
+        other => other.to_string(),
+    };
+    let text = format!(", quality = {{ at = {}, good = [{good}] }}", quoted(at));
+    (text, Some(at))
 }
 
-fn channel_of(last: &str, unit: Option<Unit>, names: &mut BTreeSet<String>) -> String {
+/// A channel, and its unit where that is known, or its name says so.
+fn channel(last: &str, unit: Option<Unit>, names: &mut BTreeSet<String>) -> String {
     let unit = unit.or_else(|| unit_in(last));
     let shown = unit.as_ref().map_or(String::new(), |unit| {
         format!(", unit = {}", quoted(unit.text()))
@@ -341,6 +424,16 @@ fn name_of(last: &str, unit: Option<&Unit>, names: &mut BTreeSet<String>) -> Str
     {
         name = before.to_owned();
     }
+    if name.is_empty() {
+        name = "channel".to_owned();
+    }
+    // What has the form of a channel is one.
+    let is_word =
+        |of: &str| !of.is_empty() && of.chars().all(|of| of.is_ascii_alphanumeric() || of == '_');
+    let own = last
+        .split_once('.')
+        .filter(|(signal, name)| is_word(signal) && is_word(name));
+    let (signal, name) = own.map_or((signal, name), |(signal, name)| (signal, name.to_owned()));
     let mut full = format!("{signal}.{name}");
     let mut number = 2;
     while !names.insert(full.clone()) {
@@ -404,5 +497,56 @@ mod tests {
             lines[0].contains("\"value.T\"") && lines[1].contains("\"value.T2\""),
             "{lines:?}"
         );
+    }
+
+    #[test]
+    fn a_value_that_is_absent_at_times_is_found() {
+        let payload = |text: &str| text.as_bytes().to_vec();
+        let before = with_absent(None, payload(r#"{"v": {"a": 1.5, "b": 2.5}}"#));
+        let filled = with_absent(Some(before), payload(r#"{"v": {"a": null, "b": 3.5}}"#));
+        let value: Value = serde_json::from_slice(&filled).unwrap();
+        assert_eq!(value, serde_json::json!({ "v": { "a": 1.5, "b": 3.5 } }));
+        assert_eq!(with_absent(Some(filled), payload("on")), payload("on"));
+    }
+
+    #[test]
+    fn a_temperature_is_no_time_and_a_heat_flow_no_quality() {
+        let lines = written(&[
+            ("a", r#"{"T": 21.5, "q": 3.5, "ts": 1764279677}"#),
+            ("b", r#"{"value": 21.5, "status": "failed"}"#),
+        ]);
+        let expected = r#"{ topic = "a", time = { at = "/ts", unit = "s" }, channels = { "/T" = "value.T", "/q" = "value.q" } },"#;
+        assert_eq!(lines[0], expected);
+        let expected =
+            r#"{ topic = "b", time = "arrival", value = "/value", channel = "value.b" },"#;
+        assert_eq!(lines[1], expected);
+    }
+
+    #[derive(serde::Deserialize)]
+    struct Line {
+        messages: Vec<crate::message::Messages>,
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn whatever_is_published_what_is_written_is_a_source_without_mistakes(
+            topic in "[^+#\\x00]{1,8}",
+            key in "\\PC{0,6}|[a-z/~{}\\x7f\"\\\\]{0,6}",
+            unit in "[a-zA-Z\\x7f]{0,4}",
+            number in -1e3..1e13_f64,
+        ) {
+            let list = serde_json::json!({ key.as_str(): [{ "id": key, "v": number, "t": 1_764_279_677 }] });
+            let object = serde_json::json!({ key.as_str(): number, "unit": unit, "a/b": { "~": 1 } });
+            for payload in [list, object, number.into()] {
+                let topics = BTreeMap::from([(topic.clone(), payload.to_string().into_bytes())]);
+                let text = table(&"mqtt://plant".parse().unwrap(), &topics);
+                let table: toml::Table = text.parse().unwrap_or_else(|of| panic!("{of}: {text}"));
+                let line: Line = table["sources"]["line"].clone().try_into().unwrap_or_else(|of| panic!("{of}: {text}"));
+                for of in line.messages {
+                    proptest::prop_assert_eq!(of.mistakes(false), Vec::new());
+                    proptest::prop_assert_eq!(&of.topic, &topic);
+                }
+            }
+        }
     }
 }

@@ -47,8 +47,8 @@ pub enum Event {
     Message(Message),
     /// Subscriptions were sent under this number…
     SubscribeSent(u16),
-    /// …and are answered, one by one in their order.
-    Subscribed(u16, Vec<Result<(), String>>),
+    /// …and are answered, one by one in their order: with the QoS that is granted, or why not.
+    Subscribed(u16, Vec<Result<u8, String>>),
     /// The same of the ends of subscriptions.
     UnsubscribeSent(u16),
     /// They have ended.
@@ -230,7 +230,7 @@ fn event_of_three(event: rumqttc::Event) -> Event {
             }),
             Packet::SubAck(of) => {
                 let codes = of.return_codes.iter().map(|code| match code {
-                    rumqttc::SubscribeReasonCode::Success(_) => Ok(()),
+                    rumqttc::SubscribeReasonCode::Success(qos) => Ok(*qos as u8),
                     rumqttc::SubscribeReasonCode::Failure => Err("refused".to_owned()),
                 });
                 Event::Subscribed(of.pkid, codes.collect())
@@ -262,7 +262,7 @@ fn event_of_five(event: v5::Event) -> Event {
             }),
             Packet::SubAck(of) => {
                 let codes = of.return_codes.iter().map(|code| match code {
-                    five::SubscribeReasonCode::Success(_) => Ok(()),
+                    five::SubscribeReasonCode::Success(qos) => Ok(*qos as u8),
                     code => Err(format!("{code:?}")),
                 });
                 Event::Subscribed(of.pkid, codes.collect())

@@ -12,11 +12,11 @@ use crate::client::{Connection, Ended, Event, Message, Settings};
 pub enum Heard {
     /// A message.
     Message(Message),
-    /// A topic that the broker refuses, and why.
-    Refused(String, String),
+    /// What the broker says to a topic: the QoS that it grants, or why none.
+    Answer(String, Result<u8, String>),
 }
 
-/// Hands all that comes on, until it has been told enough, or so long. The other version of the protocol is tried where this one is
+/// Hands all that comes on, until that is enough, or for so long. The other version of the protocol is tried where this one is
 /// not spoken.
 ///
 /// # Errors
@@ -77,10 +77,10 @@ async fn once(
                 sender.subscribe(filters);
                 false
             }
-            Event::Subscribed(_, codes) => filters.iter().zip(codes).any(|(topic, code)| {
-                let refused = code.err().map(|why| Heard::Refused(topic.clone(), why));
-                refused.is_some_and(&mut *take)
-            }),
+            Event::Subscribed(_, codes) => {
+                let mut answers = filters.iter().zip(codes);
+                answers.any(|(topic, code)| take(Heard::Answer(topic.clone(), code)))
+            }
             Event::Message(message) => {
                 if let Some(packet) = message.packet {
                     sender.acknowledge(packet);

@@ -27,7 +27,7 @@ pub fn look(
         quality: format!("nothing came in {} s", patience.as_secs()),
         stamp: None,
         offset: None,
-        granted: "QoS 1".to_owned(),
+        granted: "no answer".to_owned(),
     };
     let mut all: Vec<_> = (0..channels.len()).map(nothing).collect();
     let filters: BTreeMap<_, ()> = routes
@@ -37,10 +37,14 @@ pub fn look(
     let filters: Vec<_> = filters.into_keys().collect();
     listen(settings.clone(), &filters, patience, |heard| {
         match heard {
-            Heard::Refused(topic, why) => {
+            Heard::Answer(topic, answer) => {
+                let granted = match answer {
+                    Ok(qos) => format!("QoS {qos}"),
+                    Err(why) => format!("refused: {why}"),
+                };
                 for route in routes.iter().filter(|of| of.topic.filter() == topic) {
                     for channel in channels_of(&route.form.values) {
-                        all[channel].granted = format!("refused: {why}");
+                        all[channel].granted.clone_from(&granted);
                     }
                 }
             }

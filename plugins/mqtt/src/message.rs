@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use athermal_core::document::fill_placeholders;
+use athermal_core::document::{fill_placeholders, placeholders};
+use athermal_core::node::Forms;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use athermal_serve::connector::{Mapping, WiredChannel};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use crate::payload::{Form, Quality, Time, Values};
 use crate::topic::{self, Topic};
@@ -24,7 +25,7 @@ pub struct Messages {
     /// Where the value stands: a JSON pointer such as "/value"; without it the whole message is a number. With `each` within one of the list.
     #[serde(default)]
     pub value: Option<String>,
-    /// The unit of the value; that of the signal without.
+    /// The unit of its values, but of those that name their own; that of the signal without.
     #[serde(default)]
     pub unit: Option<Unit>,
     /// A value no later than this is given to the next tick.
@@ -51,38 +52,66 @@ pub struct Messages {
 }
 
 /// A channel of several of one message.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged)]
 pub enum ChannelOf {
     /// The channel, or a pattern of them.
     Named(String),
     /// The same, with its unit and how late it may be.
-    Mapped {
-        /// The channel, or a pattern of them.
-        channel: String,
-        /// The unit of the value; that of the signal without.
-        #[serde(default)]
-        unit: Option<Unit>,
-        /// A value no later than this is given to the next tick.
-        #[serde(default)]
-        late: Option<Duration>,
-    },
+    Mapped(MappedChannel),
+}
+
+/// A channel, with what is said of its values.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MappedChannel {
+    /// The channel, or a pattern of them.
+    channel: String,
+    /// The unit of the value; that of the message without, or of the signal.
+    #[serde(default)]
+    unit: Option<Unit>,
+    /// A value no later than this is given to the next tick.
+    #[serde(default)]
+    late: Option<Duration>,
+}
+
+impl<'de> Deserialize<'de> for ChannelOf {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Forms::new("a channel, or a table with `channel`, `unit` and `late`")
+            .text(Self::Named)
+            .table(Self::Mapped)
+            .read(deserializer)
+    }
 }
 
 /// Where the time of a value stands.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged)]
 pub enum TimeForm {
     /// "arrival": nowhere, so that it is that of the arrival. What comes again after an outage is then taken for new.
     Arrival(Arrival),
     /// In the message.
-    There {
-        /// Where, a JSON pointer.
-        at: String,
-        /// The unit of the number that stands there, counted from 1970-01-01T00:00:00Z; a text of RFC 3339 without.
-        #[serde(default)]
-        unit: Option<Unit>,
-    },
+    There(TimePlace),
+}
+
+/// Where a message has its time.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TimePlace {
+    /// Where, a JSON pointer.
+    at: String,
+    /// The unit of the number that stands there, counted from 1970-01-01T00:00:00Z; a text of RFC 3339 without.
+    #[serde(default)]
+    unit: Option<Unit>,
+}
+
+impl<'de> Deserialize<'de> for TimeForm {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Forms::new("\"arrival\", or a table with `at` and `unit`")
+            .text(Self::Arrival)
+            .table(Self::There)
+            .read(deserializer)
+    }
 }
 
 /// That of the arrival.
@@ -109,16 +138,16 @@ pub type Mistake = (Vec<String>, String);
 impl Messages {
     /// The channels that it names, in the order of [`mappings`](Self::mappings).
     fn named(&self) -> Vec<(&str, &str, Option<&Unit>, Option<Duration>)> {
+        let (unit, late) = (self.unit.as_ref(), self.late);
         let several = self.channels.iter().map(|(key, of)| match of {
-            ChannelOf::Named(channel) => (key.as_str(), channel.as_str(), None, None),
-            ChannelOf::Mapped {
-                channel,
-                unit,
-                late,
-            } => (key.as_str(), channel.as_str(), unit.as_ref(), *late),
+            ChannelOf::Named(channel) => (key.as_str(), channel.as_str(), unit, late),
+            ChannelOf::Mapped(of) => {
+                let own = (of.unit.as_ref().or(unit), of.late.or(late));
+                (key.as_str(), of.channel.as_str(), own.0, own.1)
+            }
         });
         let one = self.channel.as_deref();
-        let one = one.map(|channel| ("", channel, self.unit.as_ref(), self.late));
+        let one = one.map(|channel| ("", channel, unit, late));
         one.into_iter().chain(several).collect()
     }
 
@@ -194,7 +223,36 @@ impl Messages {
                 );
             }
         }
+        for (key, text, channel) in self.places() {
+            let known: Vec<_> = channel
+                .into_iter()
+                .flat_map(placeholders)
+                .chain(channel.map(|_| "channel"))
+                .collect();
+            if let Some(name) = placeholders(text).find(|name| !known.contains(name)) {
+                let why = match channel {
+                    Some(channel) => {
+                        format!("`{{{name}}}` stands for nothing: it is no set of `{channel}`")
+                    }
+                    None => format!("`{{{name}}}` stands for nothing that all `channels` share"),
+                };
+                wrong(key, why);
+            }
+        }
         let is_plain = self.channel.is_some() && self.value.is_none();
+        for (key, is_there) in [
+            ("quality", self.quality.is_some()),
+            ("sequence", self.sequence.is_some()),
+        ] {
+            if is_plain && is_there {
+                wrong(
+                    key,
+                    format!(
+                        "a message that is a number has no {key}: say where its `value` stands"
+                    ),
+                );
+            }
+        }
         match &self.time {
             _ if is_plain && !matches!(self.time, Some(TimeForm::Arrival(_))) => {
                 let why = "a message that is a number has no time: write `time = \"arrival\"`, or where the `value` stands";
@@ -212,6 +270,29 @@ impl Messages {
             None => {}
         }
         all
+    }
+
+    /// Places in a message that may have sets in them, with their keys, and the channels whose sets they are.
+    fn places(&self) -> Vec<(&str, &str, Option<&str>)> {
+        let time = self.time.as_ref().and_then(|of| match of {
+            TimeForm::Arrival(_) => None,
+            TimeForm::There(of) => Some(&of.at),
+        });
+        let own = [
+            ("value", self.value.as_ref()),
+            ("name", self.name.as_ref()),
+            ("each", self.each.as_ref()),
+            ("sequence", self.sequence.as_ref()),
+            ("time", time),
+            ("quality", self.quality.as_ref().map(|of| &of.at)),
+        ];
+        let channel = self.channel.as_deref();
+        let own = own
+            .into_iter()
+            .filter_map(|(key, text)| Some((key, text?.as_str(), channel)));
+        let named = self.named().into_iter().filter(|(key, ..)| !key.is_empty());
+        let keys = named.map(|(key, channel, ..)| ("channels", key, Some(channel)));
+        own.chain(keys).collect()
     }
 
     /// The forms of its messages, each with the topic: one for each topic that its sets give. `wired` are the channels of this one, by
@@ -235,7 +316,7 @@ impl Messages {
             let there = forms.iter().position(|(known, _)| *known == topic);
             // One value has a form of its own; those of one message share it.
             let place = there.filter(|_| self.channel.is_none()).unwrap_or_else(|| {
-                forms.push((topic, self.empty_form(time, channel)));
+                forms.push((topic, self.empty_form(time, channel, &pairs)));
                 forms.len() - 1
             });
             match &mut forms[place].1.values {
@@ -249,17 +330,23 @@ impl Messages {
         forms
     }
 
-    fn empty_form(&self, time: Option<&TimeForm>, channel: usize) -> Form {
-        let text = |of: &Option<String>| of.clone().unwrap_or_default();
+    fn empty_form(
+        &self,
+        time: Option<&TimeForm>,
+        channel: usize,
+        members: &[(&str, &str)],
+    ) -> Form {
+        let fill = |of: &str| fill_placeholders(of, members);
+        let text = |of: &Option<String>| of.as_deref().map(fill).unwrap_or_default();
         let values = match (&self.each, &self.value) {
             (Some(list), _) => Values::Each {
-                list: list.clone(),
+                list: fill(list),
                 name: text(&self.name),
                 value: text(&self.value),
                 channels: std::collections::HashMap::new(),
             },
             (None, _) if self.channel.is_none() => Values::Fields(Vec::new()),
-            (None, Some(at)) => Values::One(at.clone(), channel),
+            (None, Some(at)) => Values::One(fill(at), channel),
             (None, None) => Values::Plain(channel),
         };
         Form {
@@ -267,10 +354,10 @@ impl Messages {
                 .time
                 .as_ref()
                 .or(time)
-                .map_or(Time::Arrival, TimeForm::time),
-            sequence: self.sequence.clone(),
+                .map_or(Time::Arrival, |of| of.time(fill)),
+            sequence: self.sequence.as_deref().map(fill),
             quality: self.quality.as_ref().map(|of| Quality {
-                at: of.at.clone(),
+                at: fill(&of.at),
                 good: of.good.clone(),
             }),
             values,
@@ -291,7 +378,7 @@ impl TimeForm {
 
     /// Why it is none, if so.
     pub fn mistake(&self) -> Option<String> {
-        let Self::There { at, unit } = self else {
+        let Self::There(TimePlace { at, unit }) = self else {
             return None;
         };
         if !at.starts_with('/') {
@@ -304,10 +391,98 @@ impl TimeForm {
     }
 
     /// How it is read.
-    fn time(&self) -> Time {
+    fn time(&self, fill: impl Fn(&str) -> String) -> Time {
         match self {
             Self::Arrival(_) => Time::Arrival,
-            Self::There { at, unit } => Time::At(at.clone(), unit.as_ref().and_then(Self::unit_ns)),
+            Self::There(TimePlace { at, unit }) => {
+                Time::At(fill(at), unit.as_ref().and_then(Self::unit_ns))
+            }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn messages(text: &str) -> Messages {
+        toml::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn a_unit_of_a_message_is_that_of_all_its_values_but_of_those_that_have_their_own() {
+        let of = messages(
+            "topic = \"a\"\nunit = \"degF\"\nlate = \"2s\"\n\
+             channels = { \"/x\" = \"temperature.x\", \"/y\" = { channel = \"temperature.y\", unit = \"Cel\" } }",
+        );
+        let units: Vec<_> = of
+            .mappings(0)
+            .into_iter()
+            .map(|of| (of.unit.map(|of| of.text().to_owned()), of.late))
+            .collect();
+        let late = Some(Duration::from_ns(2_000_000_000));
+        assert_eq!(units.len(), 2);
+        assert_eq!(units[0].1, late);
+        assert_eq!(units[1].1, late);
+        let fahrenheit: Unit = Unit::parse("degF").unwrap();
+        assert_eq!(units[0].0.as_deref(), Some(fahrenheit.text()));
+        assert_eq!(units[1].0.as_deref(), Some("Cel"));
+    }
+
+    #[test]
+    fn a_key_that_is_none_is_refused_also_within_a_channel_or_a_time() {
+        for text in [
+            "topic = \"a\"\nchannels = { \"/x\" = { channel = \"t.x\", units = \"Cel\" } }",
+            "topic = \"a\"\ntime = { at = \"/t\", units = \"ms\" }",
+            "topic = \"a\"\ntime = \"departure\"",
+        ] {
+            let read = toml::from_str::<Messages>(text);
+            let error = read.unwrap_err().to_string();
+            let is_named = error.contains("units") || error.contains("departure");
+            assert!(is_named, "{error}");
+        }
+    }
+
+    #[test]
+    fn what_a_number_cannot_say_and_what_stands_for_nothing_is_a_mistake() {
+        let plain = "topic = \"a\"\nchannel = \"t.x\"\ntime = \"arrival\"\n";
+        let one =
+            "topic = \"a/{s}\"\nchannel = \"t.{s}\"\ntime = \"arrival\"\nvalue = \"/{s}/v\"\n";
+        let several = "topic = \"a\"\ntime = \"arrival\"\nchannels = { \"/T/{s}\" = \"t.{s}\" }\n";
+        for (text, key) in [
+            (plain.to_owned(), None),
+            (format!("{plain}sequence = \"/n\""), Some("sequence")),
+            (
+                format!("{plain}quality = {{ at = \"/q\", good = [192] }}"),
+                Some("quality"),
+            ),
+            (one.to_owned(), None),
+            (one.replace("/{s}/v", "/{other}/v"), Some("value")),
+            (several.to_owned(), None),
+            (several.replace("/T/{s}", "/T/{other}"), Some("channels")),
+            (
+                format!("{several}sequence = \"/{{s}}/n\""),
+                Some("sequence"),
+            ),
+        ] {
+            let mistakes = messages(&text).mistakes(false);
+            let keys: Vec<_> = mistakes.iter().map(|(at, _)| at[0].as_str()).collect();
+            assert_eq!(keys, Vec::from_iter(key), "{text}: {mistakes:?}");
+        }
+    }
+
+    #[test]
+    fn a_set_in_the_place_of_a_value_is_filled_in() {
+        let of = messages(
+            "topic = \"a\"\nchannel = \"t.{s}\"\nvalue = \"/{s}/v\"\ntime = { at = \"/{s}/t\", unit = \"s\" }",
+        );
+        let form = of.empty_form(None, 0, &[("s", "plate")]);
+        let read = form.read(
+            br#"{"plate": {"v": 21.5, "t": 7}}"#,
+            athermal_core::time::Instant::from_ns(0),
+        );
+        assert_eq!(read.given.len(), 1, "{read:?}");
+        assert_eq!(read.given[0].value.to_bits(), 21.5_f64.to_bits());
+        assert_eq!(read.given[0].stamp.as_ns(), 7_000_000_000);
     }
 }

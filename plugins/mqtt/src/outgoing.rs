@@ -17,7 +17,9 @@ pub struct Outgoing {
 /// How outputs become messages.
 #[derive(Debug)]
 pub struct Form {
-    /// A topic for each output, or one for all.
+    /// The topic of all outputs.
+    whole: Option<String>,
+    /// A topic for each output; none where they have one for all.
     topics: Vec<String>,
     outputs: Vec<WiredOutput>,
     /// Whether an absent output is a message too.
@@ -27,11 +29,15 @@ pub struct Form {
 impl Form {
     /// With `{output}` in the topic there is one for each output; otherwise a tick is one message.
     pub fn new(topic: &str, outputs: Vec<WiredOutput>, has_absent: bool) -> Self {
-        let topics = match topic.contains("{output}") {
-            true => outputs.iter().map(|of| topic_of(topic, &of.name)).collect(),
-            false => vec![topic.to_owned()],
+        let (whole, topics) = match topic.contains("{output}") {
+            true => {
+                let topics = outputs.iter().map(|of| topic_of(topic, &of.name));
+                (None, topics.collect())
+            }
+            false => (Some(topic.to_owned()), Vec::new()),
         };
         Self {
+            whole,
             topics,
             outputs,
             has_absent,
@@ -48,7 +54,7 @@ impl Form {
         });
         let Value::Object(facts) = facts else { return };
         let outputs = self.outputs.iter().zip(row.outputs);
-        if self.topics.len() == 1 && self.outputs.len() != 1 {
+        if let Some(topic) = &self.whole {
             let (mut values, mut units) = (Map::new(), Map::new());
             for (of, value) in outputs {
                 // What is not there is null, never zero.
@@ -58,7 +64,7 @@ impl Form {
             let mut message = facts;
             message.insert("values".to_owned(), values.into());
             message.insert("units".to_owned(), units.into());
-            into.push(outgoing(&self.topics[0], message));
+            into.push(outgoing(topic, message));
             return;
         }
         for ((of, value), topic) in outputs.zip(&self.topics) {
@@ -131,6 +137,18 @@ mod tests {
         assert_eq!(all.len(), 1);
         assert_eq!(all[0].1["values"], json!({ "a": 1.0, "b": null }));
         assert_eq!(all[0].1["units"], json!({ "a": "nm", "b": "nm" }));
+    }
+
+    #[test]
+    fn the_form_of_a_message_does_not_depend_on_how_many_outputs_there_are() {
+        for outputs in [&[("a", 1.0)][..], &[("a", 1.0), ("b", 2.0)]] {
+            let whole = messages("dt/tick", outputs, true);
+            assert_eq!(whole.len(), 1);
+            assert_eq!(whole[0].1["values"]["a"], json!(1.0));
+            let each = messages("dt/{output}", outputs, true);
+            assert_eq!(each.len(), outputs.len());
+            assert_eq!(each[0].1["value"], json!(1.0));
+        }
     }
 
     #[test]

@@ -150,6 +150,8 @@ pub struct Readings {
     pub left_out: Vec<LeftOut>,
     /// Its number among the messages of its topic.
     pub sequence: Option<i64>,
+    /// The newest time that stands in it, also of a value that is left out.
+    pub newest: Option<Instant>,
 }
 
 impl Form {
@@ -178,6 +180,7 @@ impl Form {
         }
         if let Values::Plain(channel) = self.values {
             let text = text_of(payload)?;
+            into.newest = Some(arrival);
             let value = number_of_text(text)?;
             into.given.push(Reading {
                 channel,
@@ -193,6 +196,7 @@ impl Form {
             Values::Plain(_) => {}
             Values::One(at, channel) => {
                 let stamp = self.stamp(&message, &message, arrival)?;
+                into.newest = Some(stamp);
                 self.is_good(&message, &message)?;
                 let value = number_at(&message, at)?;
                 let channel = *channel;
@@ -204,6 +208,7 @@ impl Form {
             }
             Values::Fields(fields) => {
                 let stamp = self.stamp(&message, &message, arrival)?;
+                into.newest = Some(stamp);
                 self.is_good(&message, &message)?;
                 for (at, channel) in fields {
                     match number_at(&message, at) {
@@ -222,7 +227,7 @@ impl Form {
                     return Err(LeftOut::new(Reason::NotThere, what));
                 };
                 for item in items {
-                    match self.item(item, &message, arrival) {
+                    match self.item(item, &message, arrival, &mut into.newest) {
                         Ok(reading) => into.given.push(reading),
                         Err(left_out) => into.left_out.push(left_out),
                     }
@@ -233,7 +238,13 @@ impl Form {
     }
 
     /// What one of a list says.
-    fn item(&self, item: &Value, message: &Value, arrival: Instant) -> Result<Reading, LeftOut> {
+    fn item(
+        &self,
+        item: &Value,
+        message: &Value,
+        arrival: Instant,
+        newest: &mut Option<Instant>,
+    ) -> Result<Reading, LeftOut> {
         let Values::Each {
             name,
             value,
@@ -255,6 +266,7 @@ impl Form {
             return Err(LeftOut::new(Reason::UnknownName, named));
         };
         let stamp = self.stamp(item, message, arrival)?;
+        *newest = (*newest).max(Some(stamp));
         self.is_good(item, message)?;
         Ok(Reading {
             channel,

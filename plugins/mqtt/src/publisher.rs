@@ -7,7 +7,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::time::Duration;
-use athermal_serve::connector::{ConnectorError, Stop};
+use athermal_serve::connector::{BackOff, ConnectorError, Stop};
 use serde_json::json;
 use tokio::sync::Notify;
 use tokio::time::{MissedTickBehavior, interval, timeout};
@@ -16,10 +16,6 @@ use crate::broker::Version;
 use crate::client::{Connection, Ended, Event, Sender, Settings};
 use crate::outgoing::Outgoing;
 
-/// How long a broker that is away is left alone: at first, and at most.
-const BACK_OFF: (Wait, Wait) = (Wait::from_millis(500), Wait::from_secs(30));
-/// A connection that has lasted so long was a good one.
-const GOOD: Wait = Wait::from_secs(30);
 /// How many messages of a connection are without an answer.
 const IN_FLIGHT: usize = 500;
 /// How many commands wait for a connection that is slow.
@@ -239,15 +235,12 @@ struct Work {
 
 impl Work {
     async fn run(&mut self) {
-        let mut pause = BACK_OFF.0;
-        let mut turn: u32 = 0;
+        let mut back_off = BackOff::default();
         while !self.stop.is_asked() {
             let mut connected = None;
             let ended = self.connection(&mut connected).await;
             let Err(ended) = ended else { return };
-            if connected.is_some_and(|since: Clock| since.elapsed() >= GOOD) {
-                pause = BACK_OFF.0;
-            }
+            let lasted = connected.map_or(Wait::ZERO, |since: Clock| since.elapsed());
             let is_open = self.manner.is_version_open && connected.is_none();
             if is_open && matches!(ended, Ended::Version(_) | Ended::Closed(_)) {
                 self.settings.version = match self.settings.version {
@@ -263,12 +256,10 @@ impl Work {
                 Ended::Version(words) | Ended::Closed(words) | Ended::Other(words) => words,
             };
             self.ended(words);
-            turn = turn.wrapping_add(1);
-            let until = Clock::now() + pause.mul_f64(jitter(&self.settings.client_id, turn));
+            let until = Clock::now() + back_off.after(lasted);
             while Clock::now() < until && !self.stop.is_asked() {
                 tokio::time::sleep(Wait::from_millis(20)).await;
             }
-            pause = (pause * 2).min(BACK_OFF.1);
         }
     }
 
@@ -400,11 +391,4 @@ impl Work {
             alive.to_string().as_bytes(),
         )
     }
-}
-
-/// Between 0.8 and 1.2, another for each machine and time, so that a fleet does not come back at once.
-fn jitter(id: &str, turn: u32) -> f64 {
-    use std::hash::{BuildHasher, RandomState};
-    let hash = RandomState::new().hash_one((id, turn));
-    0.8 + 0.4 * (hash >> 11) as f64 / (1_u64 << 53) as f64
 }

@@ -131,6 +131,12 @@ impl<'a> Session<'a> {
                 self.was_connected = true;
                 self.inlet.gaps.connected();
                 self.out.connected();
+                match std::mem::take(&mut self.inlet.unstamped) {
+                    0 => {}
+                    count => self.out.remarks().report(format_args!(
+                        "{count} of `channels` have the time of their arrival: what the broker sends again after an outage cannot be known from what is new; `messages` say where a time stands"
+                    )),
+                }
                 if was_kept && !session_present {
                     let (broker, id) =
                         (&self.inlet.settings.broker, &self.inlet.settings.client_id);
@@ -141,10 +147,8 @@ impl<'a> Session<'a> {
             }
             Event::SubscribeSent(packet) => subscriptions.sent(packet),
             Event::Subscribed(packet, codes) => {
-                for (topic, why) in subscriptions.answered(packet, &codes) {
-                    self.out.remarks().report(format_args!(
-                        "the broker refuses `{topic}`: {why}; it is asked again, the others go on"
-                    ));
+                for words in subscriptions.answered(packet, &codes) {
+                    self.out.remarks().report(words);
                 }
             }
             Event::UnsubscribeSent(packet) => subscriptions.taken_back_sent(packet),
@@ -207,10 +211,8 @@ impl<'a> Session<'a> {
             for left_out in &of.left_out {
                 self.leave_out(left_out.reason, topic, &left_out.what);
             }
-            if let Some(stamp) = of.given.iter().map(|of| of.stamp).max() {
-                let gap = self.inlet.gaps.seen(topic, stamp, of.sequence);
-                self.report(topic, gap);
-            }
+            let gap = self.inlet.gaps.seen(topic, of.newest, of.sequence);
+            self.report(topic, gap);
             into.extend(of.given);
         }
     }

@@ -11,7 +11,7 @@ use athermal_serve::register_sink;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::broker::{Broker, Login, Version, Way, keep_alive};
+use crate::broker::{Broker, ClientId, Login, Version, Way, keep_alive};
 use crate::client::{Connection, Settings};
 use crate::outgoing::{Form, Outgoing};
 use crate::publisher::{Manner, Publisher};
@@ -35,11 +35,12 @@ pub struct MqttSink {
     /// With `mqtts://`: a file of certificates that the broker's own is judged by; those of the system without.
     #[serde(default)]
     authorities: Option<PathBuf>,
-    /// The client id, if not the usual one. No two clients may have one.
+    /// The client id, if not the usual one: `athermal-`, the names of machine and sink, and `-sink`. No two clients may have one.
     #[serde(default)]
-    client_id: Option<String>,
-    /// How long nothing may come until the broker is asked whether it is there; at least 5 s.
+    client_id: Option<ClientId>,
+    /// How long nothing may come until the broker is asked whether it is there.
     #[serde(default = "keep_alive")]
+    #[schemars(extend("minimum" = 5, "maximum" = 65_535))]
     keep_alive: Duration,
     /// The topic: with `{output}` in it one for each output, such as "machine/drift/{output}"; without, a tick is one message.
     topic: String,
@@ -53,7 +54,7 @@ pub struct MqttSink {
     /// How much may wait for a broker that is away; "0 B" for commands.
     #[serde(default = "nothing")]
     spool: Size,
-    /// Under which topic it says that it lives: a number that grows; the client id and "/alive" without.
+    /// Under which topic it says that it lives: a number that grows. Without it `client_id`, or "athermal-MACHINE-SINK", and "/alive".
     #[serde(default)]
     alive: Option<String>,
     /// How often it says so.
@@ -107,17 +108,23 @@ impl Sink for MqttSink {
             broker: &self.broker,
             authorities: self.authorities.as_ref(),
             login: self.login.as_ref(),
-            client_id: self.client_id.as_deref(),
+            client_id: self.client_id.as_ref(),
             keep_alive: self.keep_alive,
         };
         let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
         let settings = settings.map_err(ConnectorError::new)?;
         let alive = self.alive.clone();
         let alive = alive.unwrap_or_else(|| format!("{}/alive", settings.client_id));
+        // A source may have the same name, and each has a session of its own.
+        let client_id = match self.client_id {
+            Some(_) => settings.client_id,
+            None => format!("{}-sink", settings.client_id),
+        };
         let settings = Settings {
             version: self.version.unwrap_or(Version::Five),
             // What waits is kept here: nothing is left of a connection that has ended.
             keeps_session: false,
+            client_id,
             last_will: Some((alive.clone(), "{\"alive\":false}".to_owned())),
             ..settings
         };

@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use tokio::runtime::Builder;
 
-use crate::broker::{Broker, Login, Version, Way, keep_alive};
+use crate::broker::{Broker, ClientId, Login, Version, Way, keep_alive};
 use crate::client::{Ended, Settings};
 use crate::gap::GapWatch;
 use crate::left_out::LeftOutCounts;
@@ -28,7 +28,7 @@ use crate::topic::Topic;
 /// Messages of an MQTT broker. Each is acknowledged once its values are in the journal, so that none is lost that a publisher with QoS 1
 /// has sent, whatever ends in between.
 ///
-/// The broker keeps a session under a fixed client id, `athermal-` and the names of machine and source. What it sends again is told
+/// The broker keeps a session under a fixed client id, `athermal-` and the names of machine and source. What it sends again is known
 /// apart by the time of the value. A message that cannot be read is left out and counted.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub struct MqttSource {
@@ -45,9 +45,10 @@ pub struct MqttSource {
     authorities: Option<PathBuf>,
     /// Under which id the broker keeps the session, if not the usual one. No two clients may have one.
     #[serde(default)]
-    client_id: Option<String>,
-    /// How long nothing may come until the broker is asked whether it is there; at least 5 s.
+    client_id: Option<ClientId>,
+    /// How long nothing may come until the broker is asked whether it is there.
     #[serde(default = "keep_alive")]
+    #[schemars(extend("minimum" = 5, "maximum" = 65_535))]
     keep_alive: Duration,
     /// How many messages the broker may send that are not acknowledged. Only MQTT 5 asks the broker for it.
     #[serde(default = "receive_maximum")]
@@ -109,7 +110,7 @@ impl MqttSource {
             broker: &self.broker,
             authorities: self.authorities.as_ref(),
             login: self.login.as_ref(),
-            client_id: self.client_id.as_deref(),
+            client_id: self.client_id.as_ref(),
             keep_alive: self.keep_alive,
         };
         let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
@@ -214,6 +215,12 @@ impl Source for MqttSource {
         // That it cannot speak to such a broker is known before anything runs.
         crate::client::Connection::new(&settings).map_err(ConnectorError::new)?;
         let routes = self.routes(&wiring.channels);
+        let unmapped = wiring.channels.iter().filter(|of| of.mapped.is_none());
+        let unstamped = unmapped.count();
+        if unstamped > 0 && self.retained == Retained::Take {
+            let words = "`channels` has topics whose messages are numbers without a time, and a retained one would be taken for a fresh one: name them in `messages`, or leave `retained` out";
+            return Err(ConnectorError::new(words));
+        }
         let wanted: BTreeSet<_> = routes
             .iter()
             .map(|of| of.topic.filter().to_owned())
@@ -227,6 +234,7 @@ impl Source for MqttSource {
             retained: self.retained,
             channels: wiring.channels.len(),
             routes,
+            unstamped,
             gaps: GapWatch::after(newest.filter(|of| *of > Instant::MIN)),
             left_out: LeftOutCounts::default(),
             take_overs: VecDeque::new(),
@@ -245,6 +253,8 @@ pub(crate) struct MqttInlet {
     pub(crate) retained: Retained,
     pub(crate) channels: usize,
     pub(crate) routes: Vec<Route>,
+    /// How many channels have the time of their arrival, since `channels` names topics of numbers: reported once.
+    pub(crate) unstamped: usize,
     pub(crate) subscriptions: Subscriptions,
     pub(crate) gaps: GapWatch,
     pub(crate) left_out: LeftOutCounts,

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
+use athermal_run::live::store::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::client::Sender;
@@ -131,28 +132,32 @@ impl Subscriptions {
         }
     }
 
-    /// The broker has answered. Gives the topics that it refuses, each the first time.
-    pub fn answered(&mut self, packet: u16, codes: &[Result<(), String>]) -> Vec<(String, String)> {
-        let mut refused = Vec::new();
+    /// The broker has answered. Gives what is to be reported: what it refuses, each the first time, and what it grants less of.
+    pub fn answered(&mut self, packet: u16, codes: &[Result<u8, String>]) -> Vec<String> {
+        let mut reports = Vec::new();
         let topics = self.sent.remove(&packet).unwrap_or_default();
         for (topic, code) in topics.into_iter().zip(codes) {
             match code {
-                Ok(()) => {
+                Ok(qos) => {
                     self.refused.remove(&topic);
-                    self.confirmed.insert(topic);
+                    if self.confirmed.insert(topic.clone()) && *qos == 0 {
+                        reports.push(format!(
+                            "the broker grants `{topic}` with QoS 0, where QoS 1 was asked: what comes while the connection is interrupted is lost"
+                        ));
+                    }
                 }
                 Err(why) => {
                     if self.refused.insert(topic.clone(), why.clone()).is_none() {
-                        refused.push((topic, why.clone()));
+                        self.pause = REFUSED.0;
+                        self.again = Clock::now() + self.pause;
+                        reports.push(format!(
+                            "the broker refuses `{topic}`: {why}; it is asked again, the others go on"
+                        ));
                     }
                 }
             }
         }
-        if !refused.is_empty() {
-            self.pause = REFUSED.0;
-            self.again = Clock::now() + self.pause;
-        }
-        refused
+        reports
     }
 
     /// What was taken back next has this number.
@@ -182,9 +187,7 @@ impl Subscriptions {
             if let Some(folder) = self.path.parent() {
                 std::fs::create_dir_all(folder)?;
             }
-            let next = self.path.with_extension("next");
-            std::fs::write(&next, serde_json::to_vec(&self.known)?)?;
-            std::fs::rename(next, &self.path)
+            write_whole(&self.path, &serde_json::to_vec(&self.known)?)
         };
         let _ = write();
     }

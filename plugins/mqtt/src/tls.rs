@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
-use rumqttc::tokio_rustls::rustls::{ClientConfig, RootCertStore, crypto::ring};
 use rumqttc::{TlsConfiguration, Transport};
+use rustls::crypto::ring;
+use rustls::pki_types::CertificateDer;
+use rustls::pki_types::pem::PemObject;
+use rustls::{ClientConfig, RootCertStore};
 
 use crate::broker::Broker;
 
@@ -12,29 +15,35 @@ use crate::broker::Broker;
 /// # Errors
 /// When the certificates that its own is judged by cannot be read.
 pub fn transport(broker: &Broker) -> Result<Transport, String> {
-    let provider = Arc::new(ring::default_provider());
-    // What this crate builds goes by it; what the other one builds goes by the default.
-    let _ = ring::default_provider().install_default();
-    if let Some(path) = &broker.authorities {
-        let read = std::fs::read(path);
-        let ca = read.map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-        return Ok(Transport::tls(ca, None, None));
-    }
     let mut authorities = RootCertStore::empty();
-    let known = rustls_native_certs::load_native_certs().certs;
-    authorities.add_parsable_certificates(known);
-    if authorities.is_empty() {
-        return Err(
-            "this system has no certificates of authorities: name a file of them as `authorities`"
-                .to_owned(),
-        );
+    match &broker.authorities {
+        Some(path) => {
+            let failed = |why: &dyn std::fmt::Display| {
+                format!("cannot read certificates of {}: {why}", path.display())
+            };
+            let all = CertificateDer::pem_file_iter(path).map_err(|error| failed(&error))?;
+            for of in all {
+                let of = of.map_err(|error| failed(&error))?;
+                authorities.add(of).map_err(|error| failed(&error))?;
+            }
+            if authorities.is_empty() {
+                return Err(failed(&"there is none in it; it is a file of PEM"));
+            }
+        }
+        None => {
+            let known = rustls_native_certs::load_native_certs().certs;
+            authorities.add_parsable_certificates(known);
+            if authorities.is_empty() {
+                let why = "this system has no certificates of authorities: name a file of them as `authorities`";
+                return Err(why.to_owned());
+            }
+        }
     }
-    let config = ClientConfig::builder_with_provider(provider)
+    let config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_safe_default_protocol_versions()
         .map_err(|error| error.to_string())?
         .with_root_certificates(authorities)
         .with_no_client_auth();
-    Ok(Transport::tls_with_config(TlsConfiguration::Rustls(
-        Arc::new(config),
-    )))
+    let config = TlsConfiguration::Rustls(Arc::new(config));
+    Ok(Transport::tls_with_config(config))
 }

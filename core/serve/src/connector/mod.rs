@@ -4,6 +4,7 @@
 //! or [`register_sink!`](crate::register_sink). What works is an [`Inlet`] or an [`Outlet`]. Each has a thread of its own: it may wait,
 //! block and fail, and the engine thread does not notice.
 
+mod back_off;
 mod error;
 mod inlet;
 mod kind;
@@ -11,6 +12,7 @@ mod outlet;
 mod source_link;
 mod stop;
 
+pub use back_off::BackOff;
 pub use error::ConnectorError;
 pub use inlet::{
     Inlet, Mapped, Mapping, ParameterRemark, Seen, Source, SourceWiring, Stamps, WiredChannel,

@@ -85,6 +85,7 @@ impl Deployment {
                 "future": runtime.future,
                 "sync": runtime.sync,
                 "checkpoint": runtime.checkpoint,
+                "retain": runtime.retain,
                 "keep": {
                     "journal": runtime.keep.journal,
                     "at_most_bytes": runtime.keep.at_most.0,

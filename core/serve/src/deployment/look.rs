@@ -15,14 +15,14 @@ use crate::connector::{ConnectorError, Seen};
 pub struct Found {
     /// The name of the source.
     pub source: String,
-    /// A row for each channel, in the order of [`NAMES`]; or why it cannot be asked.
-    pub rows: Result<Vec<[String; 7]>, ConnectorError>,
+    /// What it has of each channel, with the names of the channel and of its place; or why it cannot be asked.
+    pub channels: Result<Vec<(String, String, Seen)>, ConnectorError>,
     /// How many channels have no value.
     pub missing: usize,
 }
 
 /// The columns of a table.
-pub const NAMES: [&str; 7] = [
+const NAMES: [&str; 7] = [
     "channel", "from", "value", "quality", "time", "clock", "granted",
 ];
 
@@ -35,24 +35,14 @@ impl Deployment {
                 .parameters
                 .look(source.wiring(plan, PathBuf::new()), patience);
             let lacks = |seen: &Vec<Seen>| seen.iter().filter(|of| of.value.is_none()).count();
-            let cells = |of: &Seen| {
+            let named = |of: Seen| {
                 let channel = &source.channels[of.channel];
-                let dash = || "-".to_owned();
-                [
-                    channel.channel.name.clone(),
-                    channel.address.clone(),
-                    of.value.map_or_else(dash, |value| value.to_string()),
-                    of.quality.clone(),
-                    of.stamp.clone().unwrap_or_else(dash),
-                    of.offset
-                        .map_or_else(dash, |of| format!("{:.3} s", of.secs())),
-                    of.granted.clone(),
-                ]
+                (channel.channel.name.clone(), channel.address.clone(), of)
             };
             Found {
                 source: source.name.clone(),
                 missing: seen.as_ref().map_or(source.channels.len(), lacks),
-                rows: seen.map(|seen| seen.iter().map(cells).collect()),
+                channels: seen.map(|seen| seen.into_iter().map(named).collect()),
             }
         });
         found.collect()
@@ -63,29 +53,43 @@ impl Found {
     /// The same for programs.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let row = |row: &[String; 7]| {
-            let cells = NAMES.iter().zip(row);
-            Value::Object(
-                cells
-                    .map(|(name, cell)| ((*name).to_owned(), json!(cell)))
-                    .collect(),
-            )
+        let channel = |(name, from, of): &(String, String, Seen)| {
+            json!({
+                "channel": name,
+                "from": from,
+                "value": of.value,
+                "quality": of.quality,
+                "time": of.stamp,
+                "clock_s": of.offset.map(|of| of.secs()),
+                "granted": of.granted,
+            })
         };
-        let rows = self
-            .rows
-            .as_ref()
-            .map(|rows| rows.iter().map(row).collect::<Vec<_>>());
-        let error = rows.as_ref().err().map(ToString::to_string);
-        json!({ "source": self.source, "channels": rows.ok(), "error": error })
+        let channels = self.channels.as_ref();
+        let channels = channels.map(|all| all.iter().map(channel).collect::<Vec<_>>());
+        let error = channels.as_ref().err().map(ToString::to_string);
+        json!({ "source": self.source, "channels": channels.ok(), "error": error })
     }
 }
 
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = match &self.rows {
-            Ok(rows) => rows,
+        let channels = match &self.channels {
+            Ok(channels) => channels,
             Err(error) => return writeln!(f, "source `{}`: {error}", self.source),
         };
+        let cells = |(name, from, of): &(String, String, Seen)| {
+            let shown = |of: Option<String>| of.unwrap_or_else(|| "-".to_owned());
+            [
+                name.clone(),
+                from.clone(),
+                shown(of.value.map(|of| of.to_string())),
+                of.quality.clone(),
+                shown(of.stamp.clone()),
+                shown(of.offset.map(|of| format!("{:.3} s", of.secs()))),
+                of.granted.clone(),
+            ]
+        };
+        let rows: Vec<_> = channels.iter().map(cells).collect();
         writeln!(
             f,
             "source `{}`, {} of {} missing",
@@ -94,7 +98,7 @@ impl fmt::Display for Found {
             rows.len()
         )?;
         let head = NAMES.map(str::to_owned);
-        let all = || std::iter::once(&head).chain(rows);
+        let all = || std::iter::once(&head).chain(&rows);
         let width = |nth: usize| all().map(|row| row[nth].chars().count()).max().unwrap_or(0);
         let widths: [usize; 7] = std::array::from_fn(width);
         for row in all() {

@@ -12,7 +12,7 @@ mod size;
 mod sources;
 
 pub(crate) use keys::read as read_keys;
-pub use look::{Found, NAMES};
+pub use look::Found;
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
 pub use size::Size;

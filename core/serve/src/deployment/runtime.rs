@@ -34,6 +34,8 @@ pub struct Runtime {
     /// How often a checkpoint is taken.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub checkpoint: Duration,
+    /// How much of the past is held in memory, so that a graph that takes over can warm up.
+    pub retain: Duration,
     /// What is kept of the past.
     pub keep: Keep,
 }
@@ -77,6 +79,7 @@ impl Default for Runtime {
             future: ms(5_000),
             sync: ms(1_000),
             checkpoint: ms(60_000),
+            retain: ms(3_600_000),
             keep: Keep::default(),
         }
     }

@@ -215,6 +215,7 @@ impl Service {
         }
         let live = LiveOptions {
             isolates: true,
+            retain: runtime.retain,
             channels: given.clone(),
             ..LiveOptions::default()
         };

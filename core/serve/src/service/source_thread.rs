@@ -3,15 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Sender;
-use std::time::{Duration as Wait, Instant as Clock};
+use std::time::Instant as Clock;
 
 use super::ServiceEvent;
-use crate::connector::{ConnectorError, Inlet, Outflow, Stop};
+use crate::connector::{BackOff, ConnectorError, Inlet, Outflow, Stop};
 use crate::diagnostic::panic_message;
 use crate::time::Duration;
-
-/// How long a source that failed is left alone: at first, and at most.
-const BACK_OFF: (Wait, Wait) = (Wait::from_millis(500), Wait::from_secs(30));
 
 /// A source at work.
 pub(super) struct SourceThread {
@@ -34,7 +31,7 @@ impl SourceThread {
             run,
             silent,
         } = self;
-        let mut pause = BACK_OFF.0;
+        let mut back_off = BackOff::default();
         let either = stop.or(&run);
         loop {
             let began = Clock::now();
@@ -65,11 +62,8 @@ impl SourceThread {
                 )),
             };
             out.away();
-            if began.elapsed() >= BACK_OFF.1 {
-                pause = BACK_OFF.0;
-            }
             out.counts().restarts.fetch_add(1, Ordering::Relaxed);
-            let again = pause.mul_f64(jitter(&name, out.counts().restarts.load(Ordering::Relaxed)));
+            let again = back_off.after(began.elapsed());
             let _ = events.send(ServiceEvent::SourceFailed {
                 source: name.clone(),
                 error,
@@ -79,16 +73,6 @@ impl SourceThread {
                 out.end();
                 return;
             }
-            pause = (pause * 2).min(BACK_OFF.1);
         }
     }
-}
-
-/// Between 0.8 and 1.2, another for each machine and time, so that a fleet does not come back at once.
-fn jitter(name: &str, count: u64) -> f64 {
-    use std::hash::{BuildHasher, Hasher, RandomState};
-    let mut hasher = RandomState::new().build_hasher();
-    hasher.write(name.as_bytes());
-    hasher.write_u64(count);
-    0.8 + 0.4 * (hasher.finish() >> 11) as f64 / (1_u64 << 53) as f64
 }

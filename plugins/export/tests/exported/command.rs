@@ -119,28 +119,21 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
 }
 
 #[test]
-fn onnx_takes_no_state_and_no_single_precision() {
-    let scratch = Scratch::new("command-onnx");
-    let (path, folder) = (scratch.path("model.json"), scratch.path("out"));
+fn onnx_and_units_for_co_simulation_take_no_state_and_no_single_precision() {
+    let scratch = Scratch::new("command-targets");
+    let path = scratch.path("model.json");
     model(&path);
-    let first = [
-        "onnx",
-        path.to_str().unwrap(),
-        "-o",
-        folder.to_str().unwrap(),
-    ];
-    for (words, expected) in [
-        (&["--state", "a"][..], "`--state`"),
-        (&["--state-back", "a"], "`--state-back`"),
-        (&["--float"], "`--float`"),
-    ] {
-        let error = export(&[&first[..], words].concat()).unwrap_err();
-        assert!(
-            error.contains(&format!("ONNX takes no {expected}")),
-            "{error}"
-        );
-        assert!(!folder.exists());
+    for (target, written) in [("onnx", "random_graph.onnx"), ("fmu", "random_graph.fmu")] {
+        let folder = scratch.path(target);
+        let first = [target, path.to_str().unwrap(), "-o"];
+        let first = [&first[..], &[folder.to_str().unwrap()]].concat();
+        for words in [&["--state", "a"][..], &["--state-back", "a"], &["--float"]] {
+            let error = export(&[&first[..], words].concat()).unwrap_err();
+            let begun = format!("`{}` is for `export c`", words[0]);
+            assert!(error.contains(&begun), "{error}");
+            assert!(!folder.exists());
+        }
+        export(&first).unwrap();
+        assert!(folder.join(written).exists());
     }
-    export(&first).unwrap();
-    assert!(folder.join("random_graph.onnx").exists());
 }

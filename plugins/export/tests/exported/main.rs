@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod command;
+mod fmu;
 mod onnx;
 mod processors;
 mod random;

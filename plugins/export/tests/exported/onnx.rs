@@ -8,12 +8,12 @@ use athermal_export::{Rates, onnx};
 use crate::shipped::{second, shipped};
 use crate::support::{Scratch, installed, ran};
 
-/// The Python that has onnxruntime; `ATHERMAL_PYTHON` names another than that of the system.
-fn python() -> Option<String> {
+/// The Python that has a package; `ATHERMAL_PYTHON` names another than that of the system.
+pub fn python(package: &str) -> Option<String> {
     let python = std::env::var("ATHERMAL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let mut shown_by = Command::new(&python);
-    shown_by.args(["-c", "import onnxruntime, onnx"]);
-    installed("onnxruntime", &mut shown_by).then_some(python)
+    shown_by.args(["-c", &format!("import {package}")]);
+    installed(package, &mut shown_by).then_some(python)
 }
 
 const SCRIPT: &str = r#"
@@ -32,7 +32,9 @@ for node, of in rows.items():
 
 #[test]
 fn onnxruntime_gives_every_linear_estimator_within_1e12th_of_the_sum_of_magnitudes() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("onnxruntime, onnx") else {
+        return;
+    };
     let scratch = Scratch::new("onnx");
     let (engine, exported) = shipped("die-tester.toml", Rates::every(second(10.0)));
     let (model, rows) = (scratch.path("model.onnx"), scratch.path("rows.json"));

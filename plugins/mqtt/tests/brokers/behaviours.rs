@@ -212,6 +212,19 @@ fn behaviour_02_a_refused_topic_is_reported_and_asked_again_and_the_others_are_n
 }
 
 #[test]
+fn behaviour_10_a_lower_quality_of_service_than_was_asked_for_is_reported() {
+    let (port, _asked) = by_hand(vec![Some(0)]);
+    let folder = Folder::new("b10");
+    let source = format!("version = \"3.1.1\"\n{APART}");
+    let mut service = Running::start(&folder, &machine(port, &source, ""));
+    service.until("that it is reported", |of| {
+        of.heard("the broker grants `plant/plate` with QoS 0")
+    });
+    assert!(!service.heard("plant/room"), "{:?}", service.events);
+    service.stop();
+}
+
+#[test]
 fn behaviour_15_a_subscription_without_an_answer_is_made_again_on_the_next_connection() {
     let (port, asked) = by_hand(vec![None, None, Some(1)]);
     let folder = Folder::new("b15b");

@@ -7,6 +7,8 @@ mod behaviours;
 mod kills;
 mod outages;
 mod peer;
+mod secure;
 mod server;
 mod service;
 mod sinks;
+mod soak;

@@ -174,6 +174,17 @@ impl Peer {
     }
 }
 
+impl Peer {
+    /// Takes leave, and waits until the broker has read all that was acknowledged.
+    pub fn leave(mut self) {
+        write(&mut self.stream, 0xe0, &[]).unwrap();
+        while self
+            .packet(Duration::from_secs(5))
+            .is_ok_and(|of| of.is_some())
+        {}
+    }
+}
+
 /// What a publisher sends again on a new connection although the broker had answered: a broker that saves after each message answers
 /// a moment before it has saved.
 const AGAIN: usize = 50;
@@ -187,9 +198,34 @@ pub fn publish_all(
     published: &AtomicU64,
     stop: &AtomicBool,
 ) {
+    let message = |nth: usize| messages[nth].clone();
+    publish_each(
+        port,
+        messages.len(),
+        message,
+        pace,
+        AGAIN,
+        stop,
+        |_, is_answered| {
+            published.fetch_add(u64::from(is_answered), Ordering::Relaxed);
+        },
+    );
+}
+
+/// The same with messages that are made when they are sent, so many of which are sent again; what becomes of each is noted: it is sent
+/// for the first time, or answered.
+pub fn publish_each(
+    port: u16,
+    count: usize,
+    message: impl Fn(usize) -> (String, String),
+    pace: Duration,
+    again: usize,
+    stop: &AtomicBool,
+    mut note: impl FnMut(usize, bool),
+) {
     let began = Instant::now();
     let (mut next, mut open) = (0, VecDeque::<usize>::new());
-    while (next < messages.len() || !open.is_empty()) && !stop.load(Ordering::Relaxed) {
+    while (next < count || !open.is_empty()) && !stop.load(Ordering::Relaxed) {
         let Ok(mut peer) = Peer::connect(port, "publisher", true) else {
             std::thread::sleep(Duration::from_millis(50));
             continue;
@@ -197,25 +233,26 @@ pub fn publish_all(
         let mut waiting = VecDeque::new();
         let mut work = || -> io::Result<()> {
             let first = open.front().copied().unwrap_or(next);
-            for nth in (first.saturating_sub(AGAIN)..first).rev() {
+            for nth in (first.saturating_sub(again)..first).rev() {
                 open.push_front(nth);
             }
             for &nth in &open {
-                let (topic, payload) = &messages[nth];
-                waiting.push_back(peer.publish(topic, payload.as_bytes(), 8)?);
+                let (topic, payload) = message(nth);
+                waiting.push_back(peer.publish(&topic, payload.as_bytes(), 8)?);
             }
-            while next < messages.len() || !open.is_empty() {
+            while next < count || !open.is_empty() {
                 if stop.load(Ordering::Relaxed) {
                     return Ok(());
                 }
                 let due = began + pace * next as u32;
                 let now = Instant::now();
-                if next < messages.len() && open.len() < 20 + AGAIN && due <= now {
-                    let (topic, payload) = &messages[next];
+                if next < count && open.len() < 20 + again && due <= now {
+                    let (topic, payload) = message(next);
+                    note(next, false);
                     // Before it is sent: where that fails it is sent again.
                     open.push_back(next);
                     next += 1;
-                    waiting.push_back(peer.publish(topic, payload.as_bytes(), 0)?);
+                    waiting.push_back(peer.publish(&topic, payload.as_bytes(), 0)?);
                     continue;
                 }
                 let left = due
@@ -228,8 +265,9 @@ pub fn publish_all(
                             .is_some_and(|of| of.to_be_bytes() == body[..2])
                     {
                         waiting.pop_front();
-                        open.pop_front();
-                        published.fetch_add(1, Ordering::Relaxed);
+                        if let Some(nth) = open.pop_front() {
+                            note(nth, true);
+                        }
                     }
                     if due <= Instant::now() {
                         break;

@@ -105,7 +105,7 @@ impl Broker {
         let store = folder.0.display().to_string();
         let text = format!(
             "server_name: one\nlisten: 127.0.0.1:{client}\njetstream {{ store_dir: \"{store}\" }}\n\
-             mqtt {{ listen: \"127.0.0.1:{port}\", ack_wait: \"{ack_wait}\", max_ack_pending: 1000 }}\n"
+             mqtt {{ listen: \"127.0.0.1:{port}\", ack_wait: \"{ack_wait}\", max_ack_pending: 10000 }}\n"
         );
         fs::write(folder.0.join("conf"), text).unwrap();
         let mut broker = Self {
@@ -116,6 +116,10 @@ impl Broker {
         };
         broker.start();
         Some(broker)
+    }
+
+    pub fn is_nats(&self) -> bool {
+        self.program == "nats-server"
     }
 
     pub fn start(&mut self) {
@@ -162,7 +166,7 @@ impl Drop for Broker {
     }
 }
 
-/// A line that can be cut, so that nothing comes through and nobody is told.
+/// A line that can be cut, so that nothing comes through, and neither end notices.
 pub struct Line {
     pub port: u16,
     is_cut: Arc<AtomicBool>,

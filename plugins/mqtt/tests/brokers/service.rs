@@ -130,6 +130,20 @@ impl Running {
             .load(std::sync::atomic::Ordering::Relaxed)
     }
 
+    /// Whether the source is connected.
+    pub fn is_connected(&mut self) -> bool {
+        self.service.as_ref().unwrap().sources()[0].1.is_connected()
+    }
+
+    /// Lets the graph of another machine file take over.
+    pub fn swap(&mut self, folder: &Folder, machine: &str) {
+        fs::write(folder.0.join("machine.toml"), machine).unwrap();
+        let (model, _) = deployment(&folder.0);
+        let service = self.service.as_mut().unwrap();
+        service.stage(&model, "a test").unwrap();
+        service.commit("a test").unwrap();
+    }
+
     /// Waits for so many samples.
     pub fn until_given(&mut self, samples: u64) {
         self.until(&format!("{samples} samples"), |of| of.given() >= samples);

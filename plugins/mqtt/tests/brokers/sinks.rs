@@ -98,6 +98,23 @@ fn each_output_has_a_topic_and_the_service_says_that_it_lives() {
 }
 
 #[test]
+fn a_source_and_a_sink_of_one_name_are_two_clients() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let folder = Folder::new("names");
+    let sink = sink(&broker, "topic = \"out/tick\"").replace("sinks.out", "sinks.line");
+    let mut listener = Peer::connect(broker.port, "listener", true).unwrap();
+    listener.subscribe("athermal-tester-line/alive");
+    let mut service = Running::start(&folder, &machine(broker.port, TOGETHER, &sink));
+    receive(&mut listener, |all| all.len() >= 3);
+    service.pump();
+    assert!(!service.heard("SourceFailed"), "{:?}", service.events);
+    assert!(!service.heard("SinkFailed"), "{:?}", service.events);
+    service.stop();
+}
+
+#[test]
 fn a_service_that_is_killed_has_a_last_will() {
     let Some(broker) = Broker::mosquitto(SAFE) else {
         return;
@@ -143,7 +160,9 @@ fn behaviour_23_a_log_is_stored_while_the_broker_is_away_and_published_in_order_
     publish(0, 20);
     service.until("ticks", |_| history(&folder).len() == 20);
     let mut all = receive(&mut listener, |all| times(all).len() >= 20);
-    drop(listener);
+    listener.leave();
+    // By then the broker has saved that all were acknowledged.
+    sleep(2 * SECOND);
     target.kill();
     publish(20, 60);
     service.until("that it is reported", |of| {
@@ -168,10 +187,10 @@ fn behaviour_23_a_log_is_stored_while_the_broker_is_away_and_published_in_order_
     }));
     service.until("that it is back", |of| of.heard("SinkBack"));
     service.stop();
-    // At least once, and in order but for what is published again after a start, and what the broker gives again to the listener.
+    // At least once, and in order but for what is published again after a start.
     let times = times(&all);
     let falls = times.windows(2).filter(|of| of[1] < of[0]).count();
-    assert!(falls <= 2, "{times:?}");
+    assert!(falls <= 1, "{times:?}");
 }
 
 #[test]
@@ -218,14 +237,21 @@ fn an_old_command_is_not_sent_once_the_broker_is_back() {
         nth += 1;
         all.extend(listener.receive(Duration::from_millis(200)).unwrap());
     }
+    // Those that were published while the connection came may have been too old by then; from here on none is.
+    publish(nth, nth + 5);
+    let last = 10_000_000 * (i64::try_from(nth).unwrap() + 4);
+    all.extend(receive(&mut listener, |more| times(more).contains(&last)));
     service.stop();
     let found = times(&all);
     assert!(
         (5..10).all(|nth| !found.contains(&(nth * 10_000_000))),
         "{found:?}"
     );
+    let nth = i64::try_from(nth).unwrap();
     assert!(
-        (0..5).all(|nth| found.contains(&(nth * 10_000_000))),
+        (0..5)
+            .chain(nth..nth + 5)
+            .all(|nth| found.contains(&(nth * 10_000_000))),
         "{found:?}"
     );
 }
