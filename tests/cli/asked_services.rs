@@ -102,21 +102,22 @@ fn a_service_is_asked_given_another_graph_and_ended_from_the_command_line() {
         .replace("type = \"slope\"", "type = \"slop\"")
         .replace("\"1min\"", "\"1 apple\"")
         .replace("outputs.trend = \"trend\"", "outputs.trend = \"trent\"")
-        + "[runtime]\nwait = \"soon\"\n";
+        .replace("outputs.masses = \"masses\"", "outputs.masses = \"mases\"");
     let wrong_path = scratch.path("wrong.toml");
     scratch.file("wrong.toml", &wrong);
     let refused = athermal(&[&"swap", &machine, &wrong_path, &"--commit"]).ended(2);
     println!("{}", refused.told);
     let carets = refused.told.matches("wrong.toml:").count();
     assert!(
-        carets >= 5 && refused.told.contains("^^^"),
+        carets == 6 && refused.told.contains("^^^"),
         "{}",
         refused.told
     );
     let as_json = athermal(&[&"swap", &machine, &wrong_path, &"--format", &"json"]).ended(2);
     let as_json: Value = serde_json::from_str(&as_json.out).unwrap();
-    assert!(
-        as_json["diagnostics"].as_array().unwrap().len() >= 5,
+    assert_eq!(
+        as_json["diagnostics"].as_array().unwrap().len(),
+        6,
         "{as_json:#}"
     );
     let same = until(&scratch, "the same", |of| of["staged"].is_null());

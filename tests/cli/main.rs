@@ -6,6 +6,8 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+#[cfg(unix)]
+mod ageing_services;
 mod architecture_page;
 #[cfg(unix)]
 mod asked_services;

@@ -33,10 +33,10 @@ impl Message {
         self.name
     }
 
-    /// What is known of it, as JSON.
+    /// What is known of it: an object.
     #[must_use]
-    pub fn facts(&self) -> String {
-        Value::Object(self.facts.clone()).to_string()
+    pub fn facts(&self) -> Value {
+        Value::Object(self.facts.clone())
     }
 
     /// For programs: an object on one line, with how grave it is.
@@ -60,26 +60,14 @@ impl fmt::Display for Message {
 /// Words without facts for programs.
 const REMARK: &str = "remark";
 
-impl From<fmt::Arguments<'_>> for Message {
-    fn from(words: fmt::Arguments<'_>) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
+macro_rules! words {
+    ($($of:ty),*) => {
+        $(impl From<$of> for Message {
+            fn from(words: $of) -> Self {
+                Self::new(REMARK, Value::Null, words)
+            }
+        })*
+    };
 }
 
-impl From<&str> for Message {
-    fn from(words: &str) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
-}
-
-impl From<&String> for Message {
-    fn from(words: &String) -> Self {
-        words.as_str().into()
-    }
-}
-
-impl From<String> for Message {
-    fn from(words: String) -> Self {
-        Self::new(REMARK, Value::Null, words)
-    }
-}
+words!(fmt::Arguments<'_>, &str, &String, String);

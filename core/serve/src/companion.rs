@@ -26,9 +26,9 @@ pub trait Companion: Debug + Send {
 pub struct Beside {
     /// The name of the machine.
     pub name: String,
-    /// Its file.
+    /// Its file, from the root on.
     pub machine: PathBuf,
-    /// The state folder.
+    /// The state folder, from the root on.
     pub state: PathBuf,
     /// To ask it.
     pub handle: ServiceHandle,

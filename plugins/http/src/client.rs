@@ -9,8 +9,14 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration as Wait;
 
+use athermal_command::{Failure, Format, Terminal, println};
 use athermal_serve::service::usual_state;
 use serde_json::{Value, json};
+
+use crate::control::RUN;
+
+/// Where the unit of the package keeps the states of services.
+const STATES: &str = "/var/lib/athermal";
 
 /// How long an answer may take.
 const PATIENCE: Wait = Wait::from_secs(90);
@@ -50,6 +56,13 @@ pub enum ClientError {
         /// Where it was looked for.
         tried: Vec<PathBuf>,
     },
+    /// The file with the token cannot be read.
+    NoToken {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
     /// It cannot be reached, or did not answer in time.
     Unreachable {
         /// Where.
@@ -63,27 +76,21 @@ impl Address {
     /// The service of a name, a machine file, a state folder, a socket, or an `http://` address.
     ///
     /// # Errors
-    /// When none is found.
+    /// When none is found, or the token cannot be read that `http://` needs for orders.
     pub fn of(name: &str, token: Option<&Path>) -> Result<Self, ClientError> {
         if let Some(rest) = name.strip_prefix("http://") {
             let authority = rest.trim_end_matches('/').to_owned();
-            let token = token.and_then(|path| fs::read_to_string(path).ok());
-            let token = token.map(|text| text.trim().to_owned());
+            let read = |path: &Path| match fs::read_to_string(path) {
+                Ok(text) => Ok(text.trim().to_owned()),
+                Err(error) => Err(ClientError::NoToken {
+                    path: path.to_owned(),
+                    error,
+                }),
+            };
+            let token = token.map(read).transpose()?;
             return Ok(Self::Loopback { authority, token });
         }
-        let path = Path::new(name);
-        let folder = match path.is_dir() {
-            true => path.to_owned(),
-            false => usual_state(path),
-        };
-        // The state folder knows where the socket is.
-        let noted = fs::read_to_string(folder.join("socket")).ok();
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let tried: Vec<_> = [path.to_owned()]
-            .into_iter()
-            .chain(noted.map(PathBuf::from))
-            .chain([PathBuf::from(format!("/run/athermal/{stem}.sock"))])
-            .collect();
+        let tried = places(name, Path::new(STATES), Path::new(RUN));
         let is_socket =
             |path: &&PathBuf| fs::metadata(path).is_ok_and(|of| of.file_type().is_socket());
         let found = tried.iter().find(is_socket).cloned();
@@ -179,6 +186,29 @@ impl Address {
     }
 }
 
+/// Where the socket of a service may be. State folders know where it is.
+fn places(name: &str, states: &Path, run: &Path) -> Vec<PathBuf> {
+    let path = Path::new(name);
+    let folder = match path.is_dir() {
+        true => path.to_owned(),
+        false => usual_state(path),
+    };
+    let noted = |folder: PathBuf| {
+        let note = folder.join("socket");
+        fs::read_to_string(&note).map_or(note, PathBuf::from)
+    };
+    // A name may have dots of its own.
+    let is_file = path.exists() || path.extension().is_some_and(|of| of == "toml");
+    let stem = path.file_stem().filter(|_| is_file);
+    let stem = stem.map_or(name.into(), |of| of.to_string_lossy());
+    vec![
+        path.to_owned(),
+        noted(folder),
+        noted(states.join(name)),
+        run.join(format!("{stem}.sock")),
+    ]
+}
+
 /// The status of an answer, and what follows its head.
 fn begin(mut answer: impl BufRead + 'static) -> io::Result<(u16, Box<dyn BufRead>)> {
     let mut line = String::new();
@@ -206,6 +236,40 @@ impl Reply {
         serde_json::from_slice(&self.body)
             .unwrap_or_else(|_| json!({ "error": String::from_utf8_lossy(&self.body) }))
     }
+
+    /// What was answered, or why not: with all mistakes of a graph and their places.
+    ///
+    /// # Errors
+    /// When it was refused.
+    pub fn answered(&self, terminal: &Terminal) -> Result<Value, Failure> {
+        let body = self.json();
+        if self.is_fine() {
+            return Ok(body);
+        }
+        if terminal.format == Format::Json {
+            println!("{body:#}");
+            return Err(Failure::Exit(2));
+        }
+        if let Some(text) = body["text"].as_str() {
+            terminal.warning(format!(
+                "the service refuses the graph:\n{}",
+                text.trim_end()
+            ));
+        }
+        let words = body["error"].as_str().unwrap_or("it was refused");
+        Err(Failure::Request(words.to_owned()))
+    }
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Self {
+        match error {
+            ClientError::NoService { .. } => Self::Request(error.to_string()),
+            ClientError::NoToken { .. } | ClientError::Unreachable { .. } => {
+                Self::Outside(error.to_string())
+            }
+        }
+    }
 }
 
 impl fmt::Display for Address {
@@ -228,6 +292,9 @@ impl fmt::Display for ClientError {
                     tried.join(", ")
                 )
             }
+            Self::NoToken { path, error } => {
+                write!(f, "cannot read the token in {}: {error}", path.display())
+            }
             Self::Unreachable { address, error } => {
                 write!(f, "{address}: the service does not answer: {error}")
             }
@@ -236,3 +303,29 @@ impl fmt::Display for ClientError {
 }
 
 impl std::error::Error for ClientError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_service_is_found_by_its_name_with_dots_and_by_that_of_its_unit() {
+        let states = std::env::temp_dir().join(format!("athermal-names-{}", std::process::id()));
+        let run = Path::new("/run/athermal");
+        fs::create_dir_all(states.join("line.v2")).unwrap();
+        fs::write(states.join("line.v2/socket"), "/run/athermal/another.sock").unwrap();
+        let found = places("line.v2", &states, run);
+        assert_eq!(found[2], run.join("another.sock"));
+        assert_eq!(found[3], run.join("line.v2.sock"));
+        // The name of a machine file is that of its service.
+        assert_eq!(places("line.v2.toml", &states, run)[3], found[3]);
+        fs::remove_dir_all(states).unwrap();
+    }
+
+    #[test]
+    fn a_token_that_cannot_be_read_is_an_error_with_its_path() {
+        let error = Address::of("http://127.0.0.1:1", Some(Path::new("/nowhere/token")));
+        let words = error.unwrap_err().to_string();
+        assert!(words.contains("/nowhere/token"), "{words}");
+    }
+}

@@ -1,6 +1,6 @@
 //! The commands that ask a running service. Each is a request and what is shown of the answer.
 
-use std::io::BufRead as _;
+use std::io::{self, BufRead as _, Read as _};
 use std::path::{Path, PathBuf};
 
 use athermal_command::{
@@ -9,7 +9,7 @@ use athermal_command::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::client::{Address, ClientError, Reply};
+use crate::client::{Address, Reply};
 use crate::shown;
 
 /// Which service is asked.
@@ -22,26 +22,17 @@ pub struct Service {
     token: Option<PathBuf>,
 }
 
-fn failed(error: ClientError) -> Failure {
-    match error {
-        ClientError::NoService { .. } => Failure::Request(error.to_string()),
-        ClientError::Unreachable { .. } => Failure::Outside(error.to_string()),
-    }
-}
-
 impl Service {
     fn address(&self) -> Result<Address, Failure> {
-        Address::of(&self.service, self.token.as_deref()).map_err(failed)
+        Ok(Address::of(&self.service, self.token.as_deref())?)
     }
 
     fn get(&self, terminal: &Terminal, path: &str) -> Result<Value, Failure> {
-        let reply = self.address()?.get(path).map_err(failed)?;
-        answered(terminal, &reply)
+        self.address()?.get(path)?.answered(terminal)
     }
 
     fn post(&self, terminal: &Terminal, path: &str, body: &Value) -> Result<Value, Failure> {
-        let reply = self.address()?.post(path, body).map_err(failed)?;
-        answered(terminal, &reply)
+        self.address()?.post(path, body)?.answered(terminal)
     }
 
     /// Orders something, and shows a sentence about it or the answer as JSON.
@@ -54,26 +45,6 @@ impl Service {
         let done = self.post(terminal, path, &json!({}))?;
         show(terminal, &done, || words(&done))
     }
-}
-
-/// What was answered, or why not: with all mistakes of a graph and their places.
-fn answered(terminal: &Terminal, reply: &Reply) -> Result<Value, Failure> {
-    let body = reply.json();
-    if reply.is_fine() {
-        return Ok(body);
-    }
-    if terminal.format == Format::Json {
-        println!("{body:#}");
-        return Err(Failure::Exit(2));
-    }
-    if let Some(text) = body["text"].as_str() {
-        terminal.warning(format!(
-            "the service refuses the graph:\n{}",
-            text.trim_end()
-        ));
-    }
-    let words = body["error"].as_str().unwrap_or("it was refused");
-    Err(Failure::Request(words.to_owned()))
 }
 
 fn show(
@@ -148,15 +119,17 @@ impl Command for Tap {
             path += "&channel=";
             path.extend(escaped);
         }
-        let (status, lines) = self.service.address()?.listen(&path).map_err(failed)?;
+        let (status, mut lines) = self.service.address()?.listen(&path)?;
+        let outside = |error: io::Error| Failure::Outside(error.to_string());
         if status != 200 {
-            return Err(Failure::Request(format!(
-                "the service refuses that ({status})"
-            )));
+            let mut body = Vec::new();
+            lines.read_to_end(&mut body).map_err(outside)?;
+            let refused = Reply { status, body }.answered(terminal);
+            return refused.map(|_| Answer::Fine);
         }
         let (mut event, mut ticks) = (String::new(), 0);
         for line in lines.lines() {
-            let line = line.map_err(|error| Failure::Outside(error.to_string()))?;
+            let line = line.map_err(outside)?;
             if let Some(name) = line.strip_prefix("event: ") {
                 name.clone_into(&mut event);
             }
@@ -194,21 +167,11 @@ struct Swap {
     #[arg(long, value_name = "DURATION")]
     shadow: Option<String>,
     /// By how much its error may be larger, such as "5%"
-    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = percent, requires = "shadow")]
+    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = numbers::percent, requires = "shadow")]
     margin: f64,
     /// Let it take over: at once, or after a comparison that it passes
     #[arg(long)]
     commit: bool,
-}
-
-fn percent(text: &str) -> Result<f64, String> {
-    let number = text
-        .strip_suffix('%')
-        .and_then(|number| number.trim().parse::<f64>().ok());
-    let number = number.filter(|number| (0.0..1e5).contains(number));
-    number
-        .map(|of| of / 100.0)
-        .ok_or_else(|| "give a percentage of 0 or more, such as 5%".to_owned())
 }
 
 impl Command for Swap {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::io;
 use std::net::TcpListener;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use std::time::Duration as Wait;
 use athermal_core::engine::fnv_1a;
 use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::ConnectorError;
+use athermal_serve::service::Service;
 
 use crate::hub::{Hub, Looker};
 use crate::routes::Routes;
@@ -20,7 +21,7 @@ use crate::settings::Control;
 use crate::token::Token;
 
 /// Where services have their sockets, by name.
-const RUN: &str = "/run/athermal";
+pub(crate) const RUN: &str = "/run/athermal";
 /// The socket in a state folder, where that folder cannot be written.
 const SOCKET: &str = "control.sock";
 /// How many bytes the path of a socket has at most, on all systems.
@@ -47,12 +48,13 @@ impl Companion for Control {
         );
         noted.map_err(failed("socket".to_owned()))?;
         let hub = Arc::new(Hub::default());
-        let looker = Looker::new(Arc::clone(&hub));
-        let handle = beside.handle.clone();
+        let (handle, seen) = (beside.handle.clone(), Arc::clone(&hub));
+        let look = move |service: &mut Service| {
+            let looker = Looker(seen, service.channels().to_vec());
+            service.observe(Box::new(looker));
+        };
         // The service answers once it is pumped, which is after this.
-        std::thread::spawn(move || {
-            handle.ask(PATIENCE, move |service| service.observe(Box::new(looker)))
-        });
+        std::thread::spawn(move || handle.ask(PATIENCE, look));
         let routes = Routes::new(beside.clone(), hub);
         let doors = Doors { unix, tcp, path };
         let server = Server::start(doors, routes).map_err(failed("thread".to_owned()))?;
@@ -63,25 +65,29 @@ impl Companion for Control {
 impl Control {
     fn socket(&self, beside: &Beside) -> Result<(PathBuf, UnixListener), ConnectorError> {
         let path = match &self.socket {
-            Some(path) => path.clone(),
-            None => socket_of(&beside.name, &beside.state),
+            Some(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+            None => socket_of(Path::new(RUN), &beside.name, &beside.state),
         };
         let bound = bind(&path);
         let bound = bound.map_err(|error| {
-            ConnectorError::new(format_args!("[control] {}: {error}", path.display()))
+            let path = path.display();
+            ConnectorError::new(format_args!(
+                "[control] cannot listen on {path}: {error}; name another by `socket`"
+            ))
         });
         Ok((path, bound?))
     }
 }
 
-/// The socket of a service, by its name and state folder.
-fn socket_of(name: &str, state: &Path) -> PathBuf {
-    let run = Path::new(RUN);
+/// The socket of a service, by its name among the others, or in its state folder where another has that name.
+fn socket_of(run: &Path, name: &str, state: &Path) -> PathBuf {
     let probe = run.join(format!(".{}", std::process::id()));
     let is_writable = fs::File::create(&probe).is_ok();
     let _ = fs::remove_file(probe);
-    match is_writable && !name.is_empty() && !name.contains('/') {
-        true => run.join(format!("{name}.sock")),
+    let path = run.join(format!("{name}.sock"));
+    let is_taken = name.is_empty() || name.contains('/') || UnixStream::connect(&path).is_ok();
+    match is_writable && !is_taken {
+        true => path,
         false => short(state.join(SOCKET)),
     }
 }
@@ -95,9 +101,12 @@ fn short(path: PathBuf) -> PathBuf {
     std::env::temp_dir().join(format!("athermal-{hash:016x}.sock"))
 }
 
-/// Binds a socket that its user and group may use. One that nobody listens on any more is taken over.
+/// Binds a socket that its user and group may use. One that nobody listens on any more is taken over; what is no socket stays.
 fn bind(path: &Path) -> io::Result<UnixListener> {
-    if path.exists() {
+    if let Ok(of) = fs::symlink_metadata(path) {
+        if !of.file_type().is_socket() {
+            return Err(io::Error::other("what is there is no socket"));
+        }
         if UnixStream::connect(path).is_ok() {
             return Err(io::Error::other("another service listens there"));
         }
@@ -111,4 +120,34 @@ fn bind(path: &Path) -> io::Result<UnixListener> {
     fs::set_permissions(&aside, fs::Permissions::from_mode(0o660))?;
     fs::rename(&aside, path)?;
     Ok(listener)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_socket_stays_and_a_socket_that_nobody_listens_on_is_taken_over() {
+        let folder = std::env::temp_dir().join(format!("athermal-bind-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let [file, link] = ["notes.txt", "link"].map(|name| folder.join(name));
+        fs::write(&file, "of somebody").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        for path in [&file, &link, &folder] {
+            let refused = bind(path).unwrap_err().to_string();
+            assert!(refused.contains("no socket"), "{refused}");
+        }
+        assert_eq!(fs::read_to_string(&link).unwrap(), "of somebody");
+        let socket = socket_of(&folder, "line", &folder.join("state"));
+        assert_eq!(socket, folder.join("line.sock"));
+        let listener = bind(&socket).unwrap();
+        assert!(bind(&socket).is_err());
+        // Another service has the name.
+        let beside = socket_of(&folder, "line", &folder.join("state"));
+        assert_eq!(beside, folder.join("state/control.sock"));
+        drop(listener);
+        assert_eq!(socket_of(&folder, "line", &folder), socket);
+        drop(bind(&socket).unwrap());
+        fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -132,18 +132,12 @@ impl Inner {
     }
 }
 
-/// Looks on at a service, and fills a hub.
-pub struct Looker(Arc<Hub>);
-
-impl Looker {
-    pub fn new(hub: Arc<Hub>) -> Self {
-        Self(hub)
-    }
-}
+/// Looks on at a service of these channels, and fills a hub.
+pub struct Looker(pub Arc<Hub>, pub Vec<String>);
 
 impl Observer for Looker {
     fn event(&mut self, event: &ServiceEvent) {
-        let (name, facts, words) = described(event);
+        let (_, message) = described(event, &self.1);
         let mut inner = self.0.inner();
         let known = &mut inner.known;
         match event {
@@ -157,6 +151,7 @@ impl Observer for Looker {
         }
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let at_s = now.map_or(0.0, |of| of.as_secs_f64());
+        let (name, facts, words) = (message.name(), message.facts(), message.to_string());
         let event = json!({ "event": name, "host_time_s": at_s, "message": words, "facts": facts });
         if known.recent.len() == RECENT {
             known.recent.pop_front();

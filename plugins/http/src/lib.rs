@@ -31,7 +31,7 @@ mod stage;
 mod status;
 mod stream;
 mod token;
-mod words;
+pub mod words;
 
 pub use reload::reload;
 pub use routes::{OPENAPI, ROUTES};

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use athermal_core::compile::{Plan, TruthLink};
-use athermal_core::engine::{Engine, Pairing};
+use athermal_core::compile::Plan;
+use athermal_core::engine::Engine;
 use athermal_core::time::Instant;
+use athermal_run::score::{PairedPrediction, link};
 
 /// After so many seconds an error counts half.
 const HALF_LIFE_S: f64 = 3_600.0;
@@ -14,6 +15,8 @@ const HALF_LIFE_S: f64 = 3_600.0;
 pub struct PredictionErrors {
     plan: Option<Arc<Plan>>,
     all: Vec<PredictionError>,
+    /// The last tick.
+    last: Option<Instant>,
 }
 
 /// The error of a prediction.
@@ -23,9 +26,8 @@ pub struct PredictionError {
     pub name: String,
     /// The unit of its errors.
     pub unit: String,
-    slot: usize,
     truth: usize,
-    pairing: Pairing,
+    paired: PairedPrediction,
     squares: f64,
     weight: f64,
     last: Option<Instant>,
@@ -44,7 +46,13 @@ impl PredictionErrors {
             self.all = predictions(plan);
             self.plan = Some(Arc::clone(plan));
         }
+        // What lies before a new segment pairs with nothing in it.
+        let is_break = self.last.replace(now).is_some_and(|last| now <= last);
         for error in &mut self.all {
+            if is_break {
+                error.paired.clear();
+                error.last = None;
+            }
             error.look(now, engine);
         }
     }
@@ -57,20 +65,8 @@ impl PredictionError {
     }
 
     fn look(&mut self, now: Instant, engine: &Engine) {
-        // What lies before a new segment pairs with nothing in it.
-        if self.last.is_some_and(|last| now <= last) {
-            self.pairing.clear();
-            self.last = None;
-        }
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
-        }
-        let truth = engine.value(self.truth);
-        if truth.is_nan() {
-            return;
-        }
-        let predicted = self.pairing.truth(now).map_or(f64::NAN, |pair| pair.row[0]);
-        if predicted.is_nan() {
+        let error = self.paired.error(engine, now, engine.value(self.truth));
+        if error.is_nan() {
             return;
         }
         let passed = self
@@ -78,30 +74,20 @@ impl PredictionError {
             .map_or(0.0, |last| (now - last).as_ns() as f64 / 1e9);
         self.last = Some(now);
         let kept = 0.5_f64.powf(passed / HALF_LIFE_S);
-        self.squares = self.squares * kept + (predicted - truth).powi(2);
+        self.squares = self.squares * kept + error.powi(2);
         self.weight = self.weight * kept + 1.0;
     }
 }
 
 fn predictions(plan: &Plan) -> Vec<PredictionError> {
     let prediction = |(slot, channel): (usize, &athermal_core::compile::PlannedChannel)| {
-        let truth_slot = channel.predicts?;
-        let truth = &plan.channels[truth_slot];
-        let own = plan.nodes[channel.node?].role.truth();
-        let link = TruthLink {
-            slot: truth_slot,
-            ahead: channel.channel.ahead,
-            span: truth.channel.span,
-            limit: own
-                .map(|link| link.limit)
-                .or(truth.channel.default_max_age())?,
-        };
+        let link = link(plan, slot)?;
+        let truth = &plan.channels[link.slot].channel;
         Some(PredictionError {
             name: channel.name.clone(),
-            unit: truth.channel.unit.difference().to_string(),
-            slot,
-            truth: truth_slot,
-            pairing: Pairing::new(&link, 1),
+            unit: truth.unit.difference().to_string(),
+            truth: link.slot,
+            paired: PairedPrediction::new(slot, &link),
             squares: 0.0,
             weight: 0.0,
             last: None,
@@ -112,4 +98,35 @@ fn predictions(plan: &Plan) -> Vec<PredictionError> {
         .enumerate()
         .filter_map(prediction)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fitted;
+
+    #[test]
+    fn what_was_predicted_before_a_break_is_no_prediction_of_what_comes_after_it() {
+        let path = std::env::temp_dir().join(format!("athermal-break-{}.toml", std::process::id()));
+        std::fs::write(&path, crate::tests::GRAPH).unwrap();
+        let model = fitted(athermal_run::model::Model::load(&path).unwrap());
+        std::fs::remove_file(path).unwrap();
+        let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
+        let mut errors = PredictionErrors::default();
+        let mut step = |ms: i64, z: f64| {
+            let now = Instant::from_ns(ms * 1_000_000);
+            if engine.last().is_some_and(|last| now <= last) {
+                engine.segment();
+            }
+            engine.step(now, &[20.5, 21.5, z]).unwrap();
+            errors.look(now, &engine);
+            errors.iter().filter(|of| of.rmse().is_some()).count()
+        };
+        for tick in 0..30 {
+            assert_eq!(step(100 * tick, f64::NAN), 0);
+        }
+        // It goes back by less than the predictions reach, and no truth has been paired before.
+        assert_eq!(step(2_050, 50.0), 0);
+        assert_eq!(step(3_050, 50.0), 2);
+    }
 }

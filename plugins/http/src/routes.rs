@@ -1,6 +1,5 @@
 //! What is answered.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration as Wait;
 
@@ -8,7 +7,6 @@ use athermal_core::time::Duration;
 use athermal_run::live::Staged;
 use athermal_run::model::Model;
 use athermal_serve::companion::Beside;
-use athermal_serve::folder::StatePaths;
 use athermal_serve::service::{CommitError, NoAnswer, Service};
 use http_body_util::{BodyExt as _, Limited};
 use hyper::body::Incoming;
@@ -17,11 +15,13 @@ use hyper::{Method, Request, StatusCode};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
+use tokio::sync::Mutex;
 
 use crate::answer::{Answer, Refused, json_of, text, with_body};
 use crate::guard::Peer;
 use crate::hub::Hub;
 use crate::metrics;
+use crate::reload::{revision, running};
 use crate::server::not_understood;
 use crate::stage::{Given, load, of_file};
 use crate::status;
@@ -61,6 +61,8 @@ const PATIENCE: Wait = Wait::from_secs(60);
 pub struct Routes {
     beside: Beside,
     hub: Arc<Hub>,
+    /// The revision that ran when its model was read last, and when that was fitted.
+    fitted: Mutex<(Option<String>, Option<String>)>,
 }
 
 /// `POST /v1/shadow`.
@@ -82,7 +84,12 @@ struct Nothing {}
 
 impl Routes {
     pub fn new(beside: Beside, hub: Arc<Hub>) -> Self {
-        Self { beside, hub }
+        let fitted = Mutex::default();
+        Self {
+            beside,
+            hub,
+            fitted,
+        }
     }
 
     pub fn hub(&self) -> &Hub {
@@ -101,8 +108,7 @@ impl Routes {
         let path = parts.uri.path();
         let known = ROUTES.iter().find(|(_, known)| *known == path);
         let Some((method, _)) = known else {
-            let words = "nothing is here; /v1/openapi.json describes what there is";
-            return Err(Refused::new(StatusCode::NOT_FOUND, words));
+            return Err(nothing_here());
         };
         if parts.method.as_str() != *method {
             let words = format!("this takes {method}");
@@ -144,7 +150,7 @@ impl Routes {
             "/metrics" => {
                 let (name, known) = (self.beside.name.clone(), self.hub.known());
                 let turned_away = self.hub.count_turned_away();
-                let created = self.model().await.and_then(|of| of.card?.created);
+                let created = self.created().await;
                 let text_of = self.ask(move |service| {
                     metrics::text(&name, service, &known, turned_away, created.as_deref())
                 });
@@ -157,11 +163,12 @@ impl Routes {
             }
             "/v1/channels" => self.ask(status::channels).await?,
             "/v1/outputs" => self.ask(status::outputs).await?,
-            _ => {
+            "/v1/nodes" => {
                 let known = self.hub.known();
                 self.ask(move |service| status::nodes(service, &known))
                     .await?
             }
+            _ => return Err(nothing_here()),
         };
         Ok(json_of(StatusCode::OK, &body))
     }
@@ -238,16 +245,17 @@ impl Routes {
                 let taken = taken.ok_or_else(|| Refused::new(StatusCode::CONFLICT, words))?;
                 json!({ "happenings": taken })
             }
-            _ => {
+            "/v1/stop" => {
                 self.ask(move |service| service.ask_to_end(&by)).await?;
                 json!({})
             }
+            _ => return Err(nothing_here()),
         })
     }
 
     /// Stages what is given: it is read beside the service, so that nothing waits for a file.
     async fn stage(&self, given: Given, by: String) -> Result<Value, Refused> {
-        let running = self.model().await;
+        let (_, running) = self.running().await;
         let loaded = blocking(move || load(given, running.as_ref())).await??;
         let doubts = loaded.doubts;
         let staged = self.swapped(move |service| {
@@ -259,13 +267,23 @@ impl Routes {
         Ok(staged)
     }
 
-    /// The model that runs.
-    async fn model(&self) -> Option<Model> {
-        let of = |service: &mut Service| service.running().map(|of| of.revision().to_owned());
-        let revision = self.ask(of).await.ok()??;
-        let state: PathBuf = self.beside.state.clone();
-        let read = move || StatePaths::new(&state).model(&revision).ok();
-        blocking(read).await.ok()?
+    /// What runs: its revision, and its model.
+    async fn running(&self) -> (Option<String>, Option<Model>) {
+        let beside = self.beside.clone();
+        let running = blocking(move || running(&beside)).await;
+        running.ok().and_then(Result::ok).unwrap_or_default()
+    }
+
+    /// When the model that runs was fitted. Its file is read once.
+    async fn created(&self) -> Option<String> {
+        let runs = self.ask(revision).await.ok()?;
+        let mut fitted = self.fitted.lock().await;
+        if fitted.0 != runs
+            && let (revision, Some(model)) = self.running().await
+        {
+            *fitted = (revision, model.card.and_then(|of| of.created));
+        }
+        fitted.1.clone().filter(|_| fitted.0 == runs)
     }
 
     /// Has something done that may be refused.
@@ -292,6 +310,11 @@ impl Routes {
             Refused::new(status, &error.to_string())
         })
     }
+}
+
+fn nothing_here() -> Refused {
+    let words = "nothing is here; /v1/openapi.json describes what there is";
+    Refused::new(StatusCode::NOT_FOUND, words)
 }
 
 /// Does what waits on a thread for that.
@@ -358,4 +381,29 @@ fn report(staged: &Staged) -> Value {
         "silent": silent,
         "endless": staged.endless().1,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{Bench, GRAPH};
+
+    #[test]
+    fn an_order_that_is_listed_and_not_known_is_refused_and_the_service_goes_on() {
+        let bench = Bench::start(GRAPH, "");
+        let beside = Beside {
+            name: "line".to_owned(),
+            machine: bench.path("machine.toml"),
+            state: bench.path("state"),
+            handle: bench.handle.clone(),
+        };
+        let routes = Routes::new(beside, Arc::default());
+        let runtime = tokio::runtime::Builder::new_current_thread().build();
+        let answered =
+            runtime
+                .unwrap()
+                .block_on(routes.post("/v1/restart", b"", "test".to_owned()));
+        assert_eq!(answered.unwrap_err().status, StatusCode::NOT_FOUND);
+        assert_eq!(bench.status()["state"], "running");
+    }
 }

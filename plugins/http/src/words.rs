@@ -1,76 +1,65 @@
-//! What a service reports, as an event for programs: its name, its facts, and a sentence.
+//! What a service reports: its name and its facts for programs, a sentence for people. The terminal and the control interface say the same.
 
+use athermal_analysis::figures::{instant, seconds};
+use athermal_command::Message;
+use athermal_core::diagnostic::{count, counted};
 use athermal_run::live::Notice;
 use athermal_serve::sequencer::{Admission, Refusal};
 use athermal_serve::service::ServiceEvent;
 use serde_json::{Value, json};
 
-/// An event by name, with its facts and a sentence.
-pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
+/// An event of a service with these channels, and whether it is a fault.
+#[must_use]
+pub fn described(event: &ServiceEvent, channels: &[String]) -> (bool, Message) {
+    let of_source = |source| json!({ "source": source });
+    let of_sink = |sink| json!({ "sink": sink });
     match event {
         ServiceEvent::SourceFailed {
             source,
             error,
             again_s,
-        } => (
+        } => fault(
             "source_failed",
             json!({ "source": source, "again_s": again_s }),
-            format!("source `{source}`: {error}"),
+            format!("source `{source}`: {error}; tried again in {again_s:.1} s"),
         ),
-        ServiceEvent::SourceRemark { source, words } => (
+        ServiceEvent::SourceRemark { source, words } => fault(
             "source_remark",
-            json!({ "source": source }),
+            of_source(source),
             format!("source `{source}`: {words}"),
         ),
-        ServiceEvent::SourceEnded { source } => (
+        ServiceEvent::SourceEnded { source } => note(
             "source_ended",
-            json!({ "source": source }),
+            of_source(source),
             format!("source `{source}` has ended"),
         ),
-        ServiceEvent::SinkFailed { sink, error } => (
+        ServiceEvent::SinkFailed { sink, error } => fault(
             "sink_failed",
-            json!({ "sink": sink }),
-            format!("sink `{sink}`: {error}"),
+            of_sink(sink),
+            format!("sink `{sink}`: {error}; tried again, rows wait meanwhile"),
         ),
-        ServiceEvent::SinkBack { sink } => (
+        ServiceEvent::SinkBack { sink } => note(
             "sink_back",
-            json!({ "sink": sink }),
+            of_sink(sink),
             format!("sink `{sink}` puts out again"),
         ),
         ServiceEvent::NotAccepted { admission, count } => {
-            let (reason, channel) = reason(*admission);
-            (
-                "not_accepted",
-                json!({ "reason": reason, "channel": channel, "count": count }),
-                format!("a sample was left out: {reason}, {count} so far"),
-            )
+            not_accepted(*admission, *count, channels)
         }
-        ServiceEvent::Swap(Notice::TookOver { revision, tick, .. }) => (
-            "took_over",
-            json!({ "revision": revision, "tick": tick }),
-            format!("revision {revision} took over before tick {tick}"),
-        ),
-        ServiceEvent::Swap(Notice::SentBack) => (
-            "sent_back",
-            Value::Null,
-            "the new graph came too late and was sent back; commit it again".to_owned(),
-        ),
-        ServiceEvent::Swap(Notice::Missed { ticks }) => (
-            "missed",
-            json!({ "ticks": ticks }),
-            format!("{ticks} ticks were missed by the control thread"),
-        ),
-        ServiceEvent::Staged { revision, .. } => (
+        ServiceEvent::Swap(of) => notice(of),
+        ServiceEvent::Staged { revision, .. } => note(
             "staged",
             json!({ "revision": revision }),
-            format!("the machine file has another graph: {revision} takes over"),
+            format!("another graph than the one that ran last was given: {revision} takes over"),
         ),
-        ServiceEvent::NotStaged(reason) => (
+        ServiceEvent::NotStaged(reason) => fault(
             "not_staged",
             Value::Null,
-            format!("the machine file has another graph, which cannot take over: {reason}"),
+            format!(
+                "another graph than the one that ran last was given, and cannot take over: {reason}; what ran last goes on"
+            ),
         ),
-        ServiceEvent::Compared { revision, verdict } => (
+        ServiceEvent::Compared { revision, verdict } => note(
             "compared",
             json!({ "revision": revision, "verdict": verdict }),
             match verdict.ratio {
@@ -80,35 +69,46 @@ pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
                 None => format!("{revision} in the shadow: there was nothing to compare"),
             },
         ),
-        ServiceEvent::NotTakenOver(reason) => (
+        ServiceEvent::NotTakenOver(reason) => fault(
             "not_taken_over",
             Value::Null,
-            format!("the staged graph does not take over: {reason}"),
+            format!("the staged graph does not take over: {reason}; what runs goes on"),
         ),
-        ServiceEvent::HostClock { is_synchronised } => (
+        ServiceEvent::HostClock { is_synchronised } => note(
             "host_clock",
             json!({ "is_synchronised": is_synchronised }),
             match is_synchronised {
-                true => "the host's clock is synchronised".to_owned(),
-                false => "the host's clock is not synchronised yet".to_owned(),
+                true => "the host's clock is synchronised: stamps are compared with it from now on",
+                false => {
+                    "the host's clock is not synchronised: until it is, the clocks of sources are not judged, and the first stamp may be any"
+                }
             },
         ),
-        ServiceEvent::NoCheckpoint(error) => (
+        ServiceEvent::NoCheckpoint(error) => fault(
             "no_checkpoint",
             Value::Null,
-            format!("no checkpoint: {error}"),
+            format!("no checkpoint: {error}; tried again"),
         ),
-        ServiceEvent::Journal(status) => (
-            "journal",
-            json!({ "is_degraded": status.is_degraded, "lost": status.lost }),
-            match (&status.error, status.is_degraded) {
-                (Some(error), true) => format!("the journal cannot be written: {error}"),
-                (None, true) => "the journal cannot be written: the disk hangs".to_owned(),
-                (_, false) => "the journal is written again".to_owned(),
-            },
+        ServiceEvent::Journal(of) => {
+            let facts = json!({ "is_degraded": of.is_degraded, "lost": of.lost });
+            let why = of.error.as_deref().unwrap_or("the disk hangs");
+            let words = match of.is_degraded {
+                true => format!(
+                    "the journal cannot be written: {why}; the service goes on without it, and tries again"
+                ),
+                false => format!(
+                    "the journal is written again; {} lost",
+                    counted(of.lost, "record")
+                ),
+            };
+            (of.is_degraded, Message::new("journal", facts, words))
+        }
+        ServiceEvent::NodeGivenUp(panic) => fault(
+            "node_given_up",
+            Value::Null,
+            format!("{panic}; it gives nothing from now on"),
         ),
-        ServiceEvent::NodeGivenUp(panic) => ("node_given_up", Value::Null, panic.clone()),
-        ServiceEvent::EngineFailed(reason) => (
+        ServiceEvent::EngineFailed(reason) => fault(
             "engine_failed",
             Value::Null,
             format!("the engine cannot go on: {reason}"),
@@ -116,13 +116,74 @@ pub fn described(event: &ServiceEvent) -> (&'static str, Value, String) {
     }
 }
 
-fn reason(admission: Admission) -> (&'static str, Option<u32>) {
-    match admission {
-        Admission::Late(sample) => ("late", Some(sample.channel)),
-        Admission::Twice(sample) => ("repeated", Some(sample.channel)),
-        Admission::Refused(sample, Refusal::Future { .. }) => ("future", Some(sample.channel)),
-        Admission::Refused(sample, Refusal::Clock { .. }) => ("clock", Some(sample.channel)),
-        Admission::Refused(_, Refusal::NoChannel) => ("no channel", None),
-        Admission::Accepted(_) | Admission::Held => ("waits", None),
+/// What happened at a hand-over, and whether it is a fault.
+#[must_use]
+pub fn notice(notice: &Notice) -> (bool, Message) {
+    match notice {
+        Notice::TookOver {
+            revision,
+            tick,
+            time,
+        } => note(
+            "took_over",
+            json!({ "revision": revision, "tick": tick, "time_s": seconds(*time) }),
+            format!("revision {revision} took over before tick {}", count(tick)),
+        ),
+        Notice::SentBack => fault(
+            "sent_back",
+            Value::Null,
+            "the new graph came too late and was sent back",
+        ),
+        Notice::Missed { ticks } => {
+            let were = if *ticks == 1 { "was" } else { "were" };
+            let words = format!("{} {were} missed", counted(*ticks, "tick"));
+            fault("missed", json!({ "ticks": ticks }), words)
+        }
     }
+}
+
+fn note(name: &'static str, facts: Value, words: impl std::fmt::Display) -> (bool, Message) {
+    (false, Message::new(name, facts, words))
+}
+
+fn fault(name: &'static str, facts: Value, words: impl std::fmt::Display) -> (bool, Message) {
+    (true, Message::new(name, facts, words))
+}
+
+/// A sample that was left out, and how many like it.
+fn not_accepted(admission: Admission, count: u64, channels: &[String]) -> (bool, Message) {
+    let (reason, sample, why) = match admission {
+        Admission::Late(sample) => ("late", Some(sample), "came after its tick".to_owned()),
+        Admission::Twice(sample) => (
+            "repeated",
+            Some(sample),
+            "is not after the one before".to_owned(),
+        ),
+        Admission::Refused(sample, Refusal::Future { ahead }) => {
+            let why = format!("is {ahead} ahead of the newest one and the time since");
+            ("future", Some(sample), why)
+        }
+        Admission::Refused(sample, Refusal::Clock { off }) => (
+            "clock",
+            Some(sample),
+            format!("is {off} from the time of its arrival"),
+        ),
+        Admission::Refused(_, Refusal::NoChannel) | Admission::Accepted(_) | Admission::Held => {
+            ("no channel", None, "is of no channel".to_owned())
+        }
+    };
+    let channel = sample.and_then(|of| channels.get(of.channel as usize));
+    let name = channel.map_or("a sample", String::as_str);
+    let at = sample.map_or_else(String::new, |of| {
+        format!(" at {}", instant(seconds(of.stamp)))
+    });
+    let so_far = match count {
+        1 => "others like it are counted".to_owned(),
+        count => format!("{count} so far"),
+    };
+    fault(
+        "not_accepted",
+        json!({ "reason": reason, "channel": channel, "count": count }),
+        format!("{name}{at}: left out, since it {why}; {so_far}"),
+    )
 }

@@ -64,22 +64,7 @@ impl Companion for Log {
             "json" => lines.json().flatten_event(true).try_init(),
             other => return Err(wrong("ATHERMAL_LOG", other, "text, json")),
         };
-        let summed = Arc::new(Mutex::new(Summed::default()));
-        let (stop, own) = (Stop::default(), Arc::clone(&summed));
-        divert(Some(Box::new(move |level, message| {
-            write(&own, level, message)
-        })));
-        let (stopped, own) = (stop.clone(), Arc::clone(&summed));
-        let thread = std::thread::spawn(move || {
-            while stopped.wait(LOOK) {
-                locked(&own).due(Instant::now()).iter().for_each(emit);
-            }
-        });
-        Ok(Box::new(Running {
-            stop,
-            thread: Some(thread),
-            summed,
-        }))
+        Ok(Box::new(Running::start()))
     }
 }
 
@@ -90,12 +75,36 @@ struct Running {
     summed: Arc<Mutex<Summed>>,
 }
 
+impl Running {
+    fn start() -> Self {
+        let summed = Arc::new(Mutex::new(Summed::default()));
+        let (stop, own) = (Stop::default(), Arc::clone(&summed));
+        divert(Some(Box::new(move |level, message| {
+            let all = locked(&own).take(line(level, message), Instant::now());
+            all.iter().for_each(emit);
+        })));
+        let (stopped, own) = (stop.clone(), Arc::clone(&summed));
+        let thread = std::thread::spawn(move || {
+            while stopped.wait(LOOK) {
+                locked(&own).due(Instant::now()).iter().for_each(emit);
+            }
+        });
+        Self {
+            stop,
+            thread: Some(thread),
+            summed,
+        }
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         self.stop.ask();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
+        // First, so that nothing is summed any more that nobody would write.
+        divert(Some(Box::new(|level, message| emit(&line(level, message)))));
         locked(&self.summed).rest().iter().for_each(emit);
     }
 }
@@ -104,16 +113,14 @@ fn locked(summed: &Mutex<Summed>) -> MutexGuard<'_, Summed> {
     summed.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn write(summed: &Mutex<Summed>, level: &str, message: &Message) {
-    let line = Line {
+fn line(level: &str, message: &Message) -> Line {
+    Line {
         level: level.to_owned(),
         event: message.name().to_owned(),
-        facts: message.facts(),
+        facts: message.facts().to_string(),
         // An event is a line.
         words: message.to_string().replace('\n', "; "),
-    };
-    let all = locked(summed).take(line, Instant::now());
-    all.iter().for_each(emit);
+    }
 }
 
 fn emit(line: &Line) {
@@ -127,5 +134,56 @@ fn emit(line: &Line) {
         "error" => tracing::error!(event, facts, "{words}"),
         "warning" => tracing::warn!(event, facts, "{words}"),
         _ => tracing::info!(event, facts, "{words}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use athermal_command::{Terminal, terminal::Options};
+
+    use super::*;
+
+    static WRITTEN: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+
+    struct Written;
+
+    impl Write for Written {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            WRITTEN.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn what_is_reported_after_the_end_is_written_as_it_comes() {
+        let lines = tracing_subscriber::fmt().with_ansi(false);
+        lines.with_writer(|| Written).init();
+        let (format, quiet) = ("table".to_owned(), false);
+        let terminal = Terminal::new(&Options { format, quiet });
+        let running = Running::start();
+        for nth in 0..3 {
+            terminal.warning(format!("sink `out`: {nth} rows are lost"));
+        }
+        drop(running);
+        for nth in 3..5 {
+            terminal.warning(format!("sink `out`: {nth} rows are lost"));
+        }
+        let written = String::from_utf8(WRITTEN.lock().unwrap().clone()).unwrap();
+        let words = written.lines().filter_map(|line| line.split_once("out`: "));
+        let words: Vec<_> = words
+            .map(|(_, rest)| rest.split(" event=").next().unwrap())
+            .collect();
+        let wanted = [
+            "0 rows are lost",
+            "2 rows are lost; 2 like it within 60 s",
+            "3 rows are lost",
+            "4 rows are lost",
+        ];
+        assert_eq!(words, wanted, "{written}");
     }
 }

@@ -45,17 +45,11 @@ impl Summed {
             all.push(line);
             return all;
         }
-        let kind = kind_of(&line);
-        if let Some(known) = self.kinds.get_mut(&kind) {
-            known.more += 1;
-            known.last = line;
-            return all;
+        let mut kind = kind_of(&line);
+        if self.kinds.len() >= KINDS && !self.kinds.contains_key(&kind) {
+            // A flood of kinds is a kind.
+            kind = String::new();
         }
-        // A flood of kinds is a kind.
-        let kind = match self.kinds.len() < KINDS {
-            true => kind,
-            false => String::new(),
-        };
         match self.kinds.get_mut(&kind) {
             Some(known) => {
                 known.more += 1;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use athermal_command::{
     Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
 };
+use athermal_core::diagnostic::counted;
 use athermal_core::time::Duration;
-use athermal_http::client::{Address, ClientError, Reply};
+use athermal_http::client::Address;
 use athermal_run::model::Model;
 use athermal_serve::journal::JournalRecording;
 use athermal_serve::service::usual_state;
@@ -24,7 +25,7 @@ use crate::shelf;
 /// there either; otherwise `athermal commit` lets it.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  athermal retrain machine.toml\n  athermal retrain machine.toml --on 7d --shadow 1h --margin 0.02 --commit"
+    after_help = "Examples:\n  athermal retrain machine.toml\n  athermal retrain machine.toml --on 7d --shadow 1h --margin 2% --commit"
 )]
 struct Retrain {
     /// The machine file of the service
@@ -38,28 +39,12 @@ struct Retrain {
     /// Compare the fit with what runs for so long
     #[arg(long, value_name = "DURATION")]
     shadow: Option<Duration>,
-    /// By how much its error may be larger: 0.05 for 5 %
-    #[arg(long, value_name = "PART", default_value_t = 0.0, value_parser = numbers::read::<f64>("a number, such as 0.05"))]
+    /// By how much its error may be larger, such as "5%"
+    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = numbers::percent, allow_hyphen_values = true)]
     margin: f64,
     /// Let it take over if it is no worse
     #[arg(long)]
     commit: bool,
-}
-
-fn failed(error: ClientError) -> Failure {
-    Failure::Outside(error.to_string())
-}
-
-/// What was answered, or why not.
-fn answered(reply: &Reply) -> Result<Value, Failure> {
-    let body = reply.json();
-    if reply.is_fine() {
-        return Ok(body);
-    }
-    let words = body["text"].as_str().or(body["error"].as_str());
-    Err(Failure::Request(
-        words.unwrap_or("the service refuses it").to_owned(),
-    ))
 }
 
 /// A service that runs, and where it keeps its state.
@@ -67,22 +52,24 @@ struct Running {
     address: Address,
     state: PathBuf,
     status: Value,
+    terminal: Terminal,
 }
 
 impl Running {
-    fn of(machine: &Path, state: Option<&Path>) -> Result<Self, Failure> {
+    fn of(machine: &Path, state: Option<&Path>, terminal: &Terminal) -> Result<Self, Failure> {
         let state = state.map_or_else(|| usual_state(machine), Path::to_owned);
-        let address = Address::of(&state.to_string_lossy(), None).map_err(failed)?;
-        let status = answered(&address.get("/v1/status").map_err(failed)?)?;
+        let address = Address::of(&state.to_string_lossy(), None)?;
+        let status = address.get("/v1/status")?.answered(terminal)?;
         Ok(Self {
             address,
             state,
             status,
+            terminal: *terminal,
         })
     }
 
     fn post(&self, path: &str, body: &Value) -> Result<Value, Failure> {
-        answered(&self.address.post(path, body).map_err(failed)?)
+        self.address.post(path, body)?.answered(&self.terminal)
     }
 
     fn revision(&self) -> &str {
@@ -91,6 +78,11 @@ impl Running {
 
     /// The model that runs.
     fn model(&self) -> Result<Model, Failure> {
+        if self.revision().is_empty() {
+            let words =
+                "the service does not know what runs, since ticks were missed: start it again";
+            return Err(Failure::Request(words.to_owned()));
+        }
         let paths = athermal_serve::folder::StatePaths::new(&self.state);
         Ok(paths.model(self.revision())?)
     }
@@ -98,7 +90,7 @@ impl Running {
 
 impl Command for Retrain {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let service = Running::of(&self.machine, self.state.as_deref())?;
+        let service = Running::of(&self.machine, self.state.as_deref(), terminal)?;
         let running = service.model()?;
         let journal = JournalRecording::in_state(&service.state);
         let terms = Terms {
@@ -107,7 +99,7 @@ impl Command for Retrain {
         };
         let now = jiff::Timestamp::now();
         let created = now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string();
-        let proposed = propose(&running, &running, &journal, &terms, Some(created));
+        let proposed = propose(&running, &journal, &terms, Some(created));
         let proposal = match proposed {
             Ok(proposal) => proposal,
             Err(NotProposed::Unreadable(error)) => return Err(Failure::Outside(error.to_string())),
@@ -212,24 +204,26 @@ fn line(of: &Value) -> String {
     } else {
         ""
     };
-    format!(
-        "{}  fitted {}  on {} ticks{proposed}{runs}",
-        text("revision"),
-        text("created"),
-        of["ticks"]
-    )
+    let fitted = match of["ticks"].as_u64() {
+        Some(ticks) => format!("fitted {} on {}", text("created"), counted(ticks, "tick")),
+        None => "not fitted by itself".to_owned(),
+    };
+    format!("{}  {fitted}{proposed}{runs}", text("revision"))
 }
 
 impl Command for Models {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let service = Running::of(&self.machine, self.state.as_deref())?;
+        let service = Running::of(&self.machine, self.state.as_deref(), terminal)?;
         let all = shelf::all(&service.state);
         if let Some(name) = &self.take {
             let taken = Self::named(&all, name)?;
             let path = std::path::absolute(&taken.path).unwrap_or_else(|_| taken.path.clone());
             service.post("/v1/stage", &json!({ "path": path }))?;
-            service.post("/v1/commit", &json!({}))?;
-            println!("{} takes over before the next tick", taken.revision);
+            let done = service.post("/v1/commit", &json!({}))?;
+            match terminal.format {
+                Format::Json => println!("{done:#}"),
+                Format::Table => println!("{} takes over before the next tick", taken.revision),
+            }
             return Ok(Answer::Fine);
         }
         let shown: Vec<_> = match &*self.compare {

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use athermal_core::compile::{Plan, TruthLink};
-use athermal_core::engine::{Engine, EngineError, Fitted, Pairing};
+use athermal_core::compile::Plan;
+use athermal_core::engine::{Engine, EngineError, Fitted};
 use athermal_core::time::{Duration, Instant};
 use athermal_run::fit::{FitError, FitOptions, fit};
 use athermal_run::model::{Card, DataCard, Model};
 use athermal_run::recording::{Event, Recording, SourceError, Table, pass};
+use athermal_run::score::{PairedPrediction, link};
 
 use crate::sensors::{Broken, broken};
 
@@ -63,18 +64,17 @@ pub enum NotProposed {
     },
 }
 
-/// Fits the graph of a model anew on the end of a recording. `running` is what runs.
+/// Fits the graph of what runs anew on the end of a recording.
 ///
 /// # Errors
 /// When that is not worth proposing, and why.
 pub fn propose(
-    graph: &Model,
     running: &Model,
     recording: &dyn Recording,
     terms: &Terms,
     created: Option<String>,
 ) -> Result<Proposal, NotProposed> {
-    let plan = &graph.plan;
+    let plan = &running.plan;
     let data = Table::read(recording, plan).map_err(NotProposed::Unreadable)?;
     let newest = newest(&data).ok_or(NotProposed::NoData)?;
     let data = between(&data, newest - terms.on, newest);
@@ -100,13 +100,13 @@ pub fn propose(
         |data: &Table| fit(plan, data, &options, &mut |_| {}).map_err(NotProposed::Unfit);
     let (judged, _) = fitted_on(&between(&data, oldest, cut))?;
     let new = errors(plan, &judged, &data, cut)?;
-    let old = errors(&running.plan, &running.fitted, &data, cut)?;
+    let old = errors(plan, &running.fitted, &data, cut)?;
     let ratio = ratio(&old, &new).ok_or(NotProposed::NothingToCompare)?;
     if ratio.is_nan() || ratio > 1.0 + terms.margin {
         return Err(NotProposed::Worse { ratio });
     }
     let (all, report) = fitted_on(&data)?;
-    let mut model = graph.clone();
+    let mut model = running.clone();
     model.fitted = all;
     let of = DataCard {
         path: "journal".to_owned(),
@@ -167,7 +167,7 @@ fn errors(
         for pair in &mut pairs {
             match event {
                 Event::Row(at) => pair.look(engine, at, at > from),
-                Event::Segment => pair.pairing.clear(),
+                Event::Segment => pair.paired.clear(),
             }
         }
     });
@@ -181,46 +181,28 @@ fn errors(
 /// A prediction, and the truth that it is of.
 struct Pair {
     name: String,
-    slot: usize,
     truth: usize,
-    pairing: Pairing,
+    paired: PairedPrediction,
     squares: f64,
     count: u64,
 }
 
 impl Pair {
     fn new(plan: &Plan, name: &str, slot: usize) -> Option<Self> {
-        let channel = &plan.channels[slot];
-        let truth = channel.predicts?;
-        let of = &plan.channels[truth].channel;
-        let own = plan.nodes[channel.node?].role.truth();
-        let link = TruthLink {
-            slot: truth,
-            ahead: channel.channel.ahead,
-            span: of.span,
-            limit: own.map(|link| link.limit).or(of.default_max_age())?,
-        };
+        let link = link(plan, slot)?;
         Some(Self {
             name: name.to_owned(),
-            slot,
-            truth,
-            pairing: Pairing::new(&link, 1),
+            truth: link.slot,
+            paired: PairedPrediction::new(slot, &link),
             squares: 0.0,
             count: 0,
         })
     }
 
     fn look(&mut self, engine: &Engine, now: Instant, counts: bool) {
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
-        }
-        let truth = engine.value(self.truth);
-        if truth.is_nan() {
-            return;
-        }
-        let predicted = self.pairing.truth(now).map_or(f64::NAN, |pair| pair.row[0]);
-        if counts && !predicted.is_nan() {
-            self.squares += (predicted - truth).powi(2);
+        let error = self.paired.error(engine, now, engine.value(self.truth));
+        if counts && !error.is_nan() {
+            self.squares += error.powi(2);
             self.count += 1;
         }
     }

@@ -71,15 +71,18 @@ pub fn broken(plan: &Plan, data: &Table, fitted: &[SampleRange]) -> Vec<Broken> 
     for (at, row) in std::iter::once((begin, first)).chain(rows) {
         // Times that start again are another stretch of the same data.
         end = end.max(at);
-        for (course, &value) in courses.iter_mut().zip(row) {
-            course.take(at, value);
+        for ((course, source), &value) in courses.iter_mut().zip(&plan.sources).zip(row) {
+            // What is out of the range of its signal is no sample, as where the graph runs.
+            if source.admits(value) {
+                course.take(at, value);
+            }
         }
     }
     let whole = end - begin;
     let long = Duration::from_ns((whole.as_ns() as f64 * PART) as i64);
     let channels = plan.sources.iter().zip(&mut courses);
     let broken = channels
-        .filter(|(source, _)| !source.optional)
+        .filter(|(source, _)| !source.rests())
         .filter_map(|(source, course)| {
             let known = fitted.iter().find(|of| of.channel == source.name);
             let fault = course.fault(begin, end, long, known)?;
@@ -102,9 +105,6 @@ impl Course {
     }
 
     fn take(&mut self, at: Instant, value: f64) {
-        if value.is_nan() {
-            return;
-        }
         self.first = self.first.or(Some(at));
         if let Some(last) = self.last {
             self.silent = self.silent.max(at - last);

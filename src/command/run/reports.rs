@@ -63,7 +63,7 @@ impl Reporter for Reports {
                 beyond::warn_first(terminal, usual, time, value);
             }
             Report::Sensors { changes, at_s } => sensor_words::changes(terminal, changes, at_s),
-            Report::Swap(notice) => swap_words::notice(terminal, notice),
+            Report::Swap(notice) => swap_words::notice(terminal, &notice),
             Report::Doubts { doubts, sources } => terminal.doubts(doubts, sources),
             Report::FitsKept { path, nodes } => terminal.warning(format_args!(
                 "{}: {} could not be fitted there, and {} the fit of what ran before",

@@ -10,6 +10,7 @@ use athermal::run::live::{Replacement, Reporter, StageError};
 use athermal::{Duration, Model};
 use clap::Args;
 
+use crate::command::numbers;
 use crate::terminal::Failure;
 
 /// When and how the graph is replaced.
@@ -32,7 +33,7 @@ pub struct Options {
         long,
         value_name = "PERCENT",
         default_value = "0%",
-        value_parser = percent,
+        value_parser = numbers::percent,
         allow_hyphen_values = true,
         requires = "shadow"
     )]
@@ -41,16 +42,6 @@ pub struct Options {
     /// another graph that it finds in the file as a change
     #[arg(long, group = "replaced")]
     watch: bool,
-}
-
-fn percent(text: &str) -> Result<f64, String> {
-    let digits = text.trim().strip_suffix('%').map(str::trim);
-    match digits.and_then(|digits| digits.parse::<f64>().ok()) {
-        Some(percent) if percent.is_finite() && percent >= 0.0 => Ok(percent / 100.0),
-        _ => Err(format!(
-            "expected a percentage such as \"5%\", found {text:?}"
-        )),
-    }
 }
 
 fn some_time(text: &str) -> Result<Duration, String> {

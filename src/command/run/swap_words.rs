@@ -7,11 +7,11 @@ use athermal::Duration;
 use athermal::core::engine::{Carry, NodeCarry};
 use athermal::run::live::session::{Refusal, WatchedGraph};
 use athermal::run::live::{Notice, StageError, Staged, Verdict};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal};
-use athermal_analysis::figures::{apart, count, counted, length, seconds};
+use athermal_analysis::figures::{apart, counted, length};
 
 /// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
 const ANOTHER_RUN: &str =
@@ -118,8 +118,11 @@ pub fn shadow(verdict: &Verdict) -> Message {
             counted(output.n as u64, "instant")
         );
     }
-    if let Some(ratio) = verdict.ratio {
-        let _ = write!(text, "\n  new to running: {ratio:.3}");
+    match verdict.ratio {
+        Some(ratio) => {
+            let _ = write!(text, "\n  new to running: {ratio:.3}");
+        }
+        None => text += " there was nothing to compare",
     }
     let facts = json!({ "outputs": verdict.outputs, "ratio": verdict.ratio });
     Message::new("shadow", facts, text)
@@ -191,25 +194,9 @@ pub fn not_read(failure: Failure, watched: Option<&WatchedGraph>) -> Failure {
 }
 
 /// What happened at a hand-over.
-pub fn notice(terminal: &Terminal, notice: Notice) {
-    match notice {
-        Notice::TookOver {
-            revision,
-            tick,
-            time,
-        } => {
-            let words = format!("revision {revision} took over before tick {}", count(tick));
-            let facts = json!({ "revision": revision, "tick": tick, "time_s": seconds(time) });
-            terminal.note(Message::new("took_over", facts, words));
-        }
-        Notice::SentBack => {
-            let words = "the new graph came too late and was sent back";
-            terminal.warning(Message::new("sent_back", Value::Null, words));
-        }
-        Notice::Missed { ticks } => {
-            let were = if ticks == 1 { "was" } else { "were" };
-            let words = format!("{} {were} missed", counted(ticks, "tick"));
-            terminal.warning(Message::new("missed", json!({ "ticks": ticks }), words));
-        }
+pub fn notice(terminal: &Terminal, notice: &Notice) {
+    match athermal_http::words::notice(notice) {
+        (true, message) => terminal.warning(message),
+        (false, message) => terminal.note(message),
     }
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use athermal::serve::recovery::{RecoveryReport, Start};
-use athermal::serve::sequencer::{Admission, Refusal, Sample};
 use athermal::serve::service::{ServiceEvent, SinkCounts};
 
 use crate::command::run::swap_words;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, instant, seconds};
+use athermal_http::words::described;
 
 /// A service's way to the terminal.
 pub struct Events<'a> {
@@ -21,97 +21,17 @@ pub struct Events<'a> {
 impl Events<'_> {
     /// Reports an event.
     pub fn report(&self, event: ServiceEvent) {
-        let terminal = &self.terminal;
-        match event {
-            ServiceEvent::SourceFailed {
-                source,
-                error,
-                again_s,
-            } => terminal.warning(format_args!(
-                "source `{source}`: {error}; tried again in {again_s:.1} s"
-            )),
-            ServiceEvent::SourceRemark { source, words } => {
-                terminal.warning(format_args!("source `{source}`: {words}"));
-            }
-            ServiceEvent::SourceEnded { source } => {
-                terminal.note(format_args!("source `{source}` has ended"));
-            }
-            ServiceEvent::SinkFailed { sink, error } => terminal.warning(format_args!(
-                "sink `{sink}`: {error}; tried again, rows wait meanwhile"
-            )),
-            ServiceEvent::SinkBack { sink } => {
-                terminal.note(format_args!("sink `{sink}` puts out again"));
-            }
-            ServiceEvent::NotAccepted { admission, count } => self.not_accepted(admission, count),
-            ServiceEvent::Swap(notice) => swap_words::notice(terminal, notice),
-            ServiceEvent::Staged { revision, carry } => {
-                terminal.note(format_args!(
-                    "another graph than the one that ran last was given: {revision} takes over"
-                ));
-                swap_words::carry(terminal, &carry);
-            }
-            ServiceEvent::NotStaged(reason) => terminal.warning(format_args!(
-                "another graph than the one that ran last was given, and cannot take over: {reason}; what ran last goes on"
-            )),
-            ServiceEvent::Compared { verdict, .. } => terminal.note(swap_words::shadow(&verdict)),
-            ServiceEvent::NotTakenOver(reason) => terminal.warning(format_args!(
-                "the staged graph does not take over: {reason}; what runs goes on"
-            )),
-            ServiceEvent::HostClock { is_synchronised } => terminal.note(if is_synchronised {
-                "the host's clock is synchronised: stamps are compared with it from now on"
-            } else {
-                "the host's clock is not synchronised: until it is, the clocks of sources are not judged, and the first stamp may be any"
-            }),
-            ServiceEvent::NoCheckpoint(error) => {
-                terminal.warning(format_args!("no checkpoint: {error}; tried again"));
-            }
-            ServiceEvent::Journal(status) if status.is_degraded => {
-                let why = status.error.unwrap_or_else(|| "the disk hangs".to_owned());
-                terminal.warning(format_args!(
-                    "the journal cannot be written: {why}; the service goes on without it, and tries again"
-                ));
-            }
-            ServiceEvent::Journal(status) => terminal.note(format_args!(
-                "the journal is written again; {} lost",
-                counted(status.lost, "record")
-            )),
-            ServiceEvent::NodeGivenUp(panic) => {
-                terminal.warning(format_args!("{panic}; it gives nothing from now on"));
-            }
-            ServiceEvent::EngineFailed(reason) => {
-                terminal.warning(format_args!("the engine cannot go on: {reason}"));
-            }
+        let (is_fault, message) = match &event {
+            ServiceEvent::Compared { verdict, .. } => (false, swap_words::shadow(verdict)),
+            event => described(event, self.channels),
+        };
+        match is_fault {
+            true => self.terminal.warning(message),
+            false => self.terminal.note(message),
         }
-    }
-
-    fn not_accepted(&self, admission: Admission, count: u64) {
-        let (sample, why): (Sample, String) = match admission {
-            Admission::Late(sample) => (sample, "came after its tick".to_owned()),
-            Admission::Twice(sample) => (sample, "is not after the one before".to_owned()),
-            Admission::Refused(sample, Refusal::Future { ahead }) => (
-                sample,
-                format!("is {ahead} ahead of the newest one and the time since"),
-            ),
-            Admission::Refused(sample, Refusal::Clock { off }) => {
-                (sample, format!("is {off} from the time of its arrival"))
-            }
-            Admission::Refused(_, Refusal::NoChannel)
-            | Admission::Accepted(_)
-            | Admission::Held => return,
-        };
-        let unknown = "a channel".to_owned();
-        let channel = self
-            .channels
-            .get(sample.channel as usize)
-            .unwrap_or(&unknown);
-        let so_far = match count {
-            1 => "others like it are counted".to_owned(),
-            count => format!("{count} so far"),
-        };
-        self.terminal.warning(format_args!(
-            "{channel} at {}: left out, since it {why}; {so_far}",
-            instant(seconds(sample.stamp))
-        ));
+        if let ServiceEvent::Staged { carry, .. } = &event {
+            swap_words::carry(&self.terminal, carry);
+        }
     }
 }
 

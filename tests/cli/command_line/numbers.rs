@@ -6,7 +6,7 @@ use crate::workbench::athermal;
 
 #[test]
 fn a_number_that_is_none_is_told_with_what_is_expected() {
-    let calls: [(&[&str], &[&str], &str); 7] = [
+    let calls: [(&[&str], &[&str], &str); 8] = [
         (
             &[
                 "evaluate", "a", "--data", "b", "--mode", "k-step", "--steps",
@@ -42,6 +42,11 @@ fn a_number_that_is_none_is_told_with_what_is_expected() {
         (
             &["run", "a", "--input", "b", "--margin"],
             &["5"],
+            "a percentage such as \"5%\"",
+        ),
+        (
+            &["retrain", "a", "--margin"],
+            &["0.05", "-1%", "NaN%"],
             "a percentage such as \"5%\"",
         ),
     ];

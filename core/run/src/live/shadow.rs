@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use crate::compile::{Plan, TruthLink};
-use crate::engine::{Engine, Pairing};
+use crate::compile::Plan;
+use crate::engine::Engine;
+use crate::score::{PairedPrediction, link};
 use crate::time::{Duration, Instant};
 
 /// A candidate and what runs, compared for a while.
@@ -56,8 +57,7 @@ struct Pair {
 /// One side of a pair.
 #[derive(Debug)]
 struct Predicted {
-    slot: usize,
-    pairing: Pairing,
+    paired: PairedPrediction,
     squares: f64,
 }
 
@@ -85,27 +85,23 @@ impl Shadow {
     ) {
         self.left -= elapsed;
         for pair in &mut self.pairs {
-            pair.running.look(running, now);
-            pair.candidate.look(candidate, now);
             let truth = running.value(pair.truth);
-            if truth.is_nan() {
-                continue;
-            }
-            let (a, b) = (pair.running.at(now), pair.candidate.at(now));
+            let a = pair.running.paired.error(running, now, truth);
+            let b = pair.candidate.paired.error(candidate, now, truth);
             if a.is_nan() || b.is_nan() {
                 continue;
             }
             pair.n += 1;
-            pair.running.squares += (a - truth).powi(2);
-            pair.candidate.squares += (b - truth).powi(2);
+            pair.running.squares += a.powi(2);
+            pair.candidate.squares += b.powi(2);
         }
     }
 
     /// What follows belongs to another segment.
     pub(super) fn segment(&mut self) {
         for pair in &mut self.pairs {
-            pair.running.pairing.clear();
-            pair.candidate.pairing.clear();
+            pair.running.paired.clear();
+            pair.candidate.paired.clear();
         }
     }
 
@@ -157,17 +153,9 @@ fn pairs(running: &Plan, candidate: &Plan) -> Vec<Pair> {
         if !predicts_same {
             return None;
         }
-        let own = here.node.and_then(|node| running.nodes[node].role.truth());
-        let limit = own.map(|link| link.limit);
-        let link = TruthLink {
-            slot: here.predicts?,
-            ahead: here.channel.ahead,
-            span: truth.channel.span,
-            limit: limit.or(truth.channel.default_max_age())?,
-        };
+        let link = link(running, output.slot)?;
         let predicted = |slot| Predicted {
-            slot,
-            pairing: Pairing::new(&link, 1),
+            paired: PairedPrediction::new(slot, &link),
             squares: 0.0,
         };
         Some(Pair {
@@ -192,20 +180,5 @@ impl Pair {
             running_rmse: rmse(self.running.squares),
             candidate_rmse: rmse(self.candidate.squares),
         }
-    }
-}
-
-impl Predicted {
-    fn look(&mut self, engine: &Engine, now: Instant) {
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
-        }
-    }
-
-    /// What had been predicted for a truth that arrives now; NaN for nothing.
-    fn at(&mut self, now: Instant) -> f64 {
-        self.pairing
-            .truth(now)
-            .map_or(f64::NAN, |paired| paired.row[0])
     }
 }

@@ -3,6 +3,7 @@
 mod evidence;
 mod interval;
 mod no_model;
+mod paired;
 mod table;
 mod trace;
 mod unscored;
@@ -15,6 +16,7 @@ pub use evidence::Lack;
 pub use interval::IntervalScore;
 pub(crate) use no_model::Means;
 pub use no_model::{Levels, NoModel, is_level};
+pub use paired::{PairedPrediction, link};
 pub use table::{RESTRICTS, Score, Scores, hide_much, if_few};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
 pub use unscored::Unscored;

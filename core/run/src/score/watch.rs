@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::evidence::Tally;
 use super::interval::Intervals;
+use super::paired::link;
 use crate::compile::{Plan, TruthLink, persistence_lag};
 use crate::engine::{Cursor, Engine, History, Mode, Pairing, StepLength, times};
 use crate::recording::Event;
@@ -75,21 +76,10 @@ impl Watch {
     pub fn new(plan: &Plan, mode: Mode) -> Self {
         let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
-            let (Some(of), Some(node)) = (channel.predicts, channel.node) else {
+            let (Some(link), Some(node)) = (link(plan, slot), channel.node) else {
                 continue;
             };
-            let (span, ahead) = (plan.channels[of].channel.span, channel.channel.ahead);
-            // As the node itself is given truths; a combiner may be given none.
-            let own = plan.nodes[node].role.truth().map(|link| link.limit);
-            let Some(limit) = own.or(plan.channels[of].channel.default_max_age()) else {
-                continue;
-            };
-            let link = TruthLink {
-                slot: of,
-                ahead,
-                span,
-                limit,
-            };
+            let (of, ahead) = (link.slot, link.ahead);
             let truth = truths.entry(of).or_insert_with(|| Truth::new(plan, of));
             let intervals = Intervals::of(&plan.nodes[node]);
             let pairing = Pairing::new(&link, if intervals.is_some() { 3 } else { 1 });

@@ -540,10 +540,11 @@ impl Service {
     fn beside(&self, model: &Model, options: &ServiceOptions) -> Beside {
         let stem = options.machine.file_stem();
         let stem = stem.map(|of| of.to_string_lossy().into_owned());
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or(path.to_owned());
         Beside {
             name: model.graph.name.clone().or(stem).unwrap_or_default(),
-            machine: options.machine.clone(),
-            state: self.folder.path().to_owned(),
+            machine: absolute(&options.machine),
+            state: absolute(self.folder.path()),
             handle: self.handle(),
         }
     }

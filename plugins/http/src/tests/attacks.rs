@@ -7,6 +7,7 @@ use std::time::{Duration as Wait, Instant as Clock};
 use athermal_core::prng::Prng;
 use serde_json::Value;
 
+use super::metrics::value;
 use super::{Bench, GRAPH, exchange, free_port, tcp};
 use crate::client::Address;
 
@@ -145,8 +146,11 @@ fn whoever_sends_slowly_or_never_reads_loses_its_connection_and_others_are_answe
             .write_all(b"GET /v1/events?channel=* HTTP/1.1\r\nHost: x\r\n\r\n")
             .unwrap();
     }
+    let listeners = || value(&bench, "athermal_control_listeners{").unwrap();
+    let mut most = 0.0_f64;
     let began = Clock::now();
     while began.elapsed() < Wait::from_secs(7) {
+        most = most.max(listeners());
         for stream in &mut slow {
             let _ = stream.write_all(b"G");
         }
@@ -157,6 +161,14 @@ fn whoever_sends_slowly_or_never_reads_loses_its_connection_and_others_are_answe
         stream.set_read_timeout(Some(Wait::from_secs(5))).unwrap();
         let mut text = Vec::new();
         assert!(stream.read_to_end(&mut text).is_ok(), "it is still open");
+    }
+    assert_eq!(most, 4.0);
+    while listeners() > 0.0 {
+        assert!(
+            began.elapsed() < Wait::from_secs(60),
+            "they are still heard"
+        );
+        std::thread::sleep(Wait::from_millis(250));
     }
 }
 

@@ -6,11 +6,12 @@ mod metrics;
 mod openapi;
 mod swaps;
 
+use std::collections::VecDeque;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration as Wait, Instant as Clock};
@@ -18,26 +19,38 @@ use std::time::{Duration as Wait, Instant as Clock};
 use athermal_connectors as _;
 use athermal_core::compile::Wanted;
 use athermal_core::diagnostic::{Diagnostics, Sources};
+use athermal_core::prng::Prng;
+use athermal_core::time::Instant;
 use athermal_estimators as _;
 use athermal_features as _;
-use athermal_run::model::Model;
+use athermal_run::fit::{FitOptions, fit};
+use athermal_run::model::{Card, Model};
+use athermal_run::recording::Table;
 use athermal_serve::deployment::Deployment;
-use athermal_serve::service::{Service, ServiceOptions};
+use athermal_serve::service::{Service, ServiceHandle, ServiceOptions};
 use serde_json::Value;
 
 use crate::client::{Address, Reply};
 
-/// A prediction that learns while it runs, so that there are errors and a truth.
-const GRAPH: &str = r#"schema = 1
+/// A position a second ahead, predicted by an estimator that goes on learning and by one that knows how far it is from its fit.
+pub(crate) const GRAPH: &str = r#"schema = 1
 name = "line"
 time = { column = "time_s", unit = "s" }
 signals.temperature = { unit = "Cel", channels = ["plate", "room"], max_age = "3s" }
 signals.position = { unit = "nm", channels = ["Z"], max_age = "3s" }
 nodes.trend = { type = "slope", inputs.signal = "temperature", windows = ["2s", "7s"] }
 nodes.masses = { type = "first_order", inputs.signal = "temperature", time_constants = ["3s", "1min"] }
+nodes.learned = { type = "rls", inputs.features = "temperature", inputs.truth = "position.Z", ahead = "1s" }
+nodes.steady = { type = "linear", inputs.features = "temperature", inputs.truth = "position.Z", ahead = "1s" }
 outputs.trend = "trend"
 outputs.masses = "masses"
+outputs.learned = "learned"
+outputs.steady = "steady"
+outputs.novelty = "steady:novelty"
 "#;
+
+/// When its model was fitted, in s since 1970 and as its card says.
+const FITTED: (&str, &str) = ("1767323045", "2026-01-02T03:04:05Z");
 
 const SECTIONS: &str = r#"
 [runtime]
@@ -56,6 +69,7 @@ path = "history.csv"
 /// A service in a folder of its own, pumped by a thread.
 pub(crate) struct Bench {
     pub(crate) folder: PathBuf,
+    pub(crate) handle: ServiceHandle,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -78,15 +92,17 @@ impl Bench {
         fs::write(&machine, format!("{graph}{sections}")).unwrap();
         let (mut sources, mut mistakes) = (Sources::new(), Diagnostics::new());
         let model = Model::load_from(&machine, Wanted::default(), &mut sources, &mut mistakes);
-        let model = model.unwrap_or_else(|error| panic!("{error}"));
+        let model = fitted(model.unwrap_or_else(|error| panic!("{error}")));
         let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut mistakes);
         let deployment =
             deployment.unwrap_or_else(|| panic!("{}", mistakes.render(&sources, false, 100)));
+        // As where it is started in the folder of its file.
         let options = ServiceOptions {
-            machine,
-            ..ServiceOptions::new(folder.join("state"))
+            machine: from_here(&machine),
+            ..ServiceOptions::new(from_here(&folder.join("state")))
         };
         let (mut service, _) = Service::start(&model, deployment, &options).unwrap();
+        let handle = service.handle();
         let thread = std::thread::spawn(move || {
             while !service.is_over() {
                 service.pump();
@@ -96,6 +112,7 @@ impl Bench {
         });
         let bench = Self {
             folder,
+            handle,
             thread: Some(thread),
         };
         bench.until("the first ticks", |status| {
@@ -164,22 +181,49 @@ impl Drop for Bench {
     }
 }
 
-/// Rows of a log, ten a second.
-pub(crate) fn log(rows: usize) -> String {
+/// A path as it is from the folder that this process works in.
+fn from_here(path: &Path) -> PathBuf {
+    let up = std::env::current_dir().unwrap().components().count() - 1;
+    let path = std::path::absolute(path).unwrap();
+    PathBuf::from("../".repeat(up)).join(path.strip_prefix("/").unwrap())
+}
+
+/// Rows of a log, ten a second. The position follows the plate a second later, but for noise of 2.9 nm.
+fn rows(count: usize) -> Vec<[f64; 3]> {
+    let mut prng = Prng::stream(3, "http");
+    let mut plates = VecDeque::from([0.5; 10]);
+    let row = |_| {
+        plates.push_back(prng.uniform());
+        let before = plates.pop_front().unwrap();
+        let noise = 10.0 * prng.uniform();
+        [
+            20.0 + plates[9],
+            21.0 + prng.uniform(),
+            100.0 * before + noise,
+        ]
+    };
+    (0..count).map(row).collect()
+}
+
+fn log(count: usize) -> String {
     let mut text = "time_s,plate,room,Z\n".to_owned();
-    let mut prng = athermal_core::prng::Prng::stream(3, "http");
-    for nth in 0..rows {
-        let (a, b) = (prng.uniform(), prng.uniform());
-        text += &format!(
-            "{}.{},{},{},{}\n",
-            nth / 10,
-            nth % 10,
-            20.0 + a,
-            21.0 + b,
-            100.0 * a
-        );
+    for (nth, [plate, room, z]) in rows(count).into_iter().enumerate() {
+        text += &format!("{}.{},{plate},{room},{z}\n", nth / 10, nth % 10);
     }
     text
+}
+
+/// A model with a fit on a minute of the log.
+pub(crate) fn fitted(mut model: Model) -> Model {
+    let mut data = Table::default();
+    for (nth, row) in rows(600).iter().enumerate() {
+        data.push(Instant::from_ns(nth as i64 * 100_000_000), row);
+    }
+    let fit = fit(&model.plan, &data, &FitOptions::default(), &mut |_| {});
+    let (fits, report) = fit.unwrap();
+    model.fitted = fits;
+    model.card = Some(Card::of(&report, Vec::new(), Some(FITTED.1.to_owned())));
+    model
 }
 
 /// Sends bytes, and gives what comes back until the other side has had enough.

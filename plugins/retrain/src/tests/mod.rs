@@ -1,6 +1,7 @@
 //! A machine that ages: the coefficients of its drift change by a fifth in a week.
 
 use athermal_core::compile::Plan;
+use athermal_core::engine::SampleRange;
 use athermal_core::prng::Prng;
 use athermal_core::time::{Duration, Instant};
 use athermal_estimators as _;
@@ -11,7 +12,7 @@ use athermal_run::model::{Card, Model};
 use athermal_run::recording::{Event, Table};
 
 use crate::propose::{NotProposed, Terms, propose};
-use crate::sensors::Fault;
+use crate::sensors::{Fault, broken};
 
 const GRAPH: &str = r#"
 schema = 1
@@ -132,7 +133,7 @@ fn of_a_machine_that_ages_a_better_fit_is_proposed_within_a_day_and_the_shadow_t
         let data = machine(seed, 9);
         // Fitted on its first day, and run for a week.
         let old = fitted(&graph, &part(&data, 0, DAY));
-        let proposed = propose(&graph, &old, &part(&data, 0, 8 * DAY), &terms(1), None);
+        let proposed = propose(&old, &part(&data, 0, 8 * DAY), &terms(1), None);
         let proposal = proposed.unwrap_or_else(|reason| panic!("seed {seed}: {reason}"));
         println!("seed {seed}: {:.3} times the error", proposal.ratio);
         assert!(proposal.ratio < 0.95, "seed {seed}: {}", proposal.ratio);
@@ -160,7 +161,7 @@ fn a_fit_that_is_worse_on_what_it_has_not_seen_is_not_proposed() {
             z += 60.0 * (prng.uniform() - 0.5);
             row[2] = z;
         }
-        let refused = propose(&graph, &running, &wrong, &terms(14), None);
+        let refused = propose(&running, &wrong, &terms(14), None);
         assert!(
             matches!(refused, Err(NotProposed::Worse { ratio }) if ratio > 1.0),
             "seed {seed}"
@@ -186,7 +187,7 @@ fn a_broken_sensor_in_the_data_is_refused_with_the_reason() {
         for (nth, (_, row)) in data.events_mut().iter_mut().enumerate() {
             change(nth, row);
         }
-        match propose(&graph, &running, &data, &terms(14), None) {
+        match propose(&running, &data, &terms(14), None) {
             Err(NotProposed::Broken(all)) => all,
             other => panic!("{other:?}"),
         }
@@ -222,11 +223,62 @@ fn a_broken_sensor_in_the_data_is_refused_with_the_reason() {
     );
     // Of few rows nothing is proposed either.
     let few = propose(
-        &graph,
         &fitted(&graph, &data),
         &part(&data, DAY, DAY + 400),
         &terms(14),
         None,
     );
     assert!(matches!(few, Err(NotProposed::FewRows { .. })), "{few:?}");
+}
+
+const PLANNED: &str = r#"
+schema = 1
+signals.set_point = { unit = "Cel", channels = ["chuck"], known_ahead = "10min", max_age = "1h" }
+signals.temperature = { unit = "Cel", channels = ["plate", "room"], range = ["0 Cel", "60 Cel"], max_age = "5min" }
+nodes.held = { type = "sum", inputs.signal = ["set_point", "temperature.plate", "temperature.room"], weights = [1.0, 1.0, -1.0] }
+outputs.held = "held"
+"#;
+
+#[test]
+fn a_plan_may_rest_and_a_value_out_of_range_is_none() {
+    let path = std::env::temp_dir().join(format!("athermal-rests-{}.toml", std::process::id()));
+    std::fs::write(&path, PLANNED).unwrap();
+    let plan = Model::load(&path).unwrap().plan;
+    std::fs::remove_file(path).unwrap();
+    assert_eq!(
+        sources(&plan),
+        [
+            "set_point.chuck",
+            "temperature.plate",
+            "temperature.room",
+            "set_point:applies_at.chuck"
+        ]
+    );
+    let mut data = Table::default();
+    for minute in 0..DAY {
+        // One set point for the whole day. A plate that says 850 for a third of it, as one that is not connected does.
+        let wave = (minute as f64 / 90.0).sin();
+        let plate = if minute > 900 { 850.0 } else { 20.0 + wave };
+        let (chuck, applies) = match minute {
+            0 => (50.0, 0.0),
+            _ => (f64::NAN, f64::NAN),
+        };
+        // The room has a spike now and then.
+        let room = if minute % 100 == 0 {
+            -273.0
+        } else {
+            21.0 + wave
+        };
+        data.push(at(minute), &[chuck, plate, room, applies]);
+    }
+    let ranges = ["temperature.plate", "temperature.room"].map(|channel| SampleRange {
+        channel: channel.to_owned(),
+        lowest: 19.0,
+        highest: 22.0,
+    });
+    let broken = broken(&plan, &data, &ranges);
+    assert!(
+        matches!(&*broken, [of] if of.channel == "temperature.plate" && matches!(of.fault, Fault::Silent(_))),
+        "{broken:?}"
+    );
 }
