@@ -210,12 +210,8 @@ impl Control {
             live.engine.isolate_panics();
         }
         let mut warmed = false;
-        let slots: Vec<usize> = model
-            .plan
-            .outputs
-            .iter()
-            .map(|output| output.slot)
-            .collect();
+        let outputs = model.plan.outputs.iter();
+        let slots: Vec<_> = outputs.map(|output| output.slot).collect();
         let mut gave = vec![false; slots.len()];
         self.retained.for_each(|time, samples| match time {
             Some(time) => {
