@@ -483,8 +483,7 @@ impl Service {
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
         if let Some(Ok(worker)) = worker {
-            let (_, _, recorder) = worker.into_parts();
-            recorder.finish();
+            worker.into_parts().2.finish();
         } else {
             has_failed = true;
         }
