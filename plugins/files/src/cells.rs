@@ -3,6 +3,9 @@
 use crate::ledger::Ledger;
 use crate::{FileError, Place};
 
+/// The values of the channels of a row, and the texts that are no numbers, by their channels.
+pub(crate) type Numbers<'a> = (&'a [f64], &'a [(usize, String)]);
+
 /// Cells of the current row, whatever the format.
 pub(crate) trait Cells {
     /// Goes to the next whole row; false at the end.
@@ -16,8 +19,8 @@ pub(crate) trait Cells {
     fn instant(&self) -> Option<(i64, bool, &str)> {
         None
     }
-    /// The values of the channels, where the format has numbers, and the texts that are none, by their channels.
-    fn numbers(&self) -> Option<(&[f64], &[(usize, String)])> {
+    /// The values of the channels, where the format has numbers.
+    fn numbers(&self) -> Option<Numbers<'_>> {
         None
     }
     /// Takes the columns from here on as the current row names them, if that is what it does.

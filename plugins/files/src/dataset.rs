@@ -79,7 +79,7 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         name.starts_with(['.', '_'])
     };
-    paths.retain(|path| !is_hidden(path) && !(path.is_symlink() && path.is_dir()));
+    paths.retain(|path| !(is_hidden(path) || path.is_symlink() && path.is_dir()));
     let found = paths.into_iter().flat_map(|path| match path.is_dir() {
         true => recordings_in(&path),
         false => Format::of_file(&path).map(|_| path).into_iter().collect(),

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::cells::Cells;
+use crate::cells::{Cells, Numbers};
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
 use crate::{FileError, Layout, Place};
@@ -266,7 +266,7 @@ impl Cells for TypedCells {
         }
     }
 
-    fn numbers(&self) -> Option<(&[f64], &[(usize, String)])> {
+    fn numbers(&self) -> Option<Numbers<'_>> {
         (self.numbers > 0).then(|| (self.rows.values(), self.rows.no_numbers()))
     }
 }
