@@ -46,7 +46,7 @@ impl Replay {
                 failed = failed.take().or(written.err());
             }
         };
-        let found = Recovered::replay(&StatePaths::new(&self.state), write);
+        let found = Recovered::replay(&StatePaths::new(&self.state), 0, write);
         let found = found.map_err(|error| Failure::Outside(error.to_string()))?;
         let Some(found) = found else {
             return Err(Failure::Request(format!(

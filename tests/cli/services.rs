@@ -2,11 +2,12 @@
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use athermal::core::prng::Prng;
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Scratch, athermal, athermal_fed, graph, simulated};
 
 const GRAPH: &str = r#"
 schema = 1
@@ -106,7 +107,15 @@ fn told(child: &mut Child) -> String {
 }
 
 /// What a service reports, up to given words.
-fn until_reported(child: &mut Child, words: &str) -> String {
+pub fn until_reported(child: &mut Child, words: &str) -> String {
+    // One that never reports it is ended, so that the test does not wait for ever.
+    let (id, (_reported, is_reported)) = (child.id().to_string(), std::sync::mpsc::channel::<()>());
+    std::thread::spawn(move || {
+        let patience = Duration::from_secs(60);
+        if is_reported.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
+            let _ = Command::new("kill").args(["-s", "KILL", &id]).status();
+        }
+    });
     let stderr = child.stderr.as_mut().unwrap();
     let (mut text, mut byte) = (Vec::new(), [0]);
     while !String::from_utf8_lossy(&text).contains(words) {
@@ -148,7 +157,10 @@ fn plain(text: &str) -> String {
 
 /// What a service wrote, without the column of revisions.
 pub fn history(scratch: &Scratch) -> String {
-    let text = std::fs::read_to_string(scratch.path("history.csv")).unwrap();
+    without_revisions(&std::fs::read_to_string(scratch.path("history.csv")).unwrap())
+}
+
+fn without_revisions(text: &str) -> String {
     let line = |line: &str| line.rsplit_once(',').unwrap().0.to_owned() + "\n";
     plain(&text.lines().map(line).collect::<String>())
 }
@@ -180,6 +192,69 @@ fn a_service_gives_what_a_run_gives_and_its_journal_what_the_log_gives() {
             .replace(&*log.to_string_lossy(), "DATA")
     };
     assert_eq!(of(&journal), of(&log));
+}
+
+#[test]
+fn a_service_of_standard_input_and_output_gives_the_rows_of_a_run_bit_for_bit() {
+    let pipes = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\n[sources.in]\ntype = \"stdin\"\n[sinks.out]\ntype = \"stdout\"\n";
+    let scratch = desk("pipes", pipes);
+    // More than a sink has room for.
+    let log = HEADER.to_owned() + &rows(0, 20_000);
+    scratch.file("log.csv", &log);
+    let served = athermal_fed(&[&"serve", &scratch.path("line.toml")], log.as_bytes()).ended(0);
+    let rows = without_revisions(&served.out);
+    assert_eq!(rows.lines().count(), 20_001);
+    assert!(rows == by_run(&scratch));
+    let graph = scratch.path("graph.toml");
+    let piped = athermal_fed(&[&"run", &graph, &"--input", &"-"], log.as_bytes()).ended(0);
+    assert!(rows == plain(&piped.out));
+}
+
+/// An hour of a simulated machine, measured by a service, replayed, evaluated, and run from the same hour as a file.
+#[test]
+fn the_ticks_of_a_simulated_live_hour_are_those_of_its_replay_its_evaluation_and_a_run() {
+    let scratch = Scratch::new("service-hour");
+    let service = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\n\
+        [sources.machine]\ntype = \"simulation\"\nmachine = \"die-tester\"\nspeed = \"fastest\"\nseed = 3\ndays = 0.0416666667\n\
+        [sinks.history]\ntype = \"csv\"\npath = \"history.csv\"\n";
+    let week = simulated(&scratch, "week.csv", "die-tester", 3.0, 2);
+    let hour = simulated(&scratch, "log.csv", "die-tester", 1.0 / 24.0, 3);
+    let model = scratch.path("model.json");
+    athermal(&[
+        &"fit",
+        &graph("die-tester"),
+        &"--data",
+        &week,
+        &"--output",
+        &model,
+    ])
+    .ended(0);
+    let machine = scratch.path("line.toml");
+    let text = format!(
+        "schema = 1\nextends = {:?}\nmodel = \"model.json\"\n{service}",
+        graph("die-tester")
+    );
+    scratch.file("line.toml", text);
+    athermal(&[&"serve", &machine]).ended(0);
+    let ran = athermal(&[&"run", &model, &"--input", &hour]).ended(0).out;
+    assert_eq!(ran.lines().count(), 361);
+    assert!(history(&scratch) == plain(&ran));
+
+    let (state, again) = (scratch.path("line.state"), scratch.path("again.csv"));
+    athermal(&[&"replay", &state, &"--check", &"--output", &again]).ended(0);
+    assert!(plain(&std::fs::read_to_string(&again).unwrap()) == plain(&ran));
+
+    let journal = format!("journal:{}", state.display());
+    let evaluated = |data: &dyn AsRef<std::ffi::OsStr>| {
+        let arguments: &[&dyn AsRef<std::ffi::OsStr>] =
+            &[&"evaluate", &model, &"--data", data, &"--format", &"json"];
+        let text = athermal(arguments).ended(0).out;
+        text.replace(&journal, "DATA")
+            .replace(&*hour.to_string_lossy(), "DATA")
+    };
+    let of_the_file = evaluated(&hour);
+    assert!(of_the_file.contains("rmse"), "{of_the_file}");
+    assert_eq!(evaluated(&journal), of_the_file);
 }
 
 #[test]
@@ -223,6 +298,25 @@ fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_tw
     athermal(&[&"replay", &state, &"--check"]).ended(0);
     println!("{kills} kills, {at_work} of them at work, {written} rows");
     assert!(at_work * 2 > kills, "{at_work}");
+}
+
+#[test]
+fn a_service_that_only_froze_between_two_runs_has_all_rows_and_reports_none_as_lost() {
+    let scratch = desk("froze", SERVICE);
+    let out = scratch.path("history.csv");
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 50)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&out, 50, &mut child);
+    end(child);
+    let mut child = serve(&scratch, &["--frozen"]);
+    let before = until_reported(&mut child, "goes on where it ended");
+    let frozen = before + &end(child);
+    scratch.file("log.csv", &(HEADER.to_owned() + &rows(0, 100)));
+    let mut child = serve(&scratch, &[]);
+    until_rows(&out, 100, &mut child);
+    let text = frozen + &end(child);
+    assert!(!text.contains("lost"), "{text}");
+    assert!(history(&scratch) == by_run(&scratch));
 }
 
 #[test]

@@ -3,7 +3,10 @@
 use std::fmt;
 use std::fs;
 use std::io;
+use std::ops::RangeBounds;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use athermal_run::live::store::write_whole;
 
@@ -87,16 +90,26 @@ impl Checkpoint {
 /// The checkpoints of a folder.
 #[derive(Debug, Clone)]
 pub struct Checkpoints {
-    folder: PathBuf,
+    pub(crate) folder: PathBuf,
     keep: usize,
+    needed: Arc<AtomicU64>,
 }
 
 impl Checkpoints {
     /// Those of a folder, of which so many are kept.
     #[must_use]
     pub fn new(folder: PathBuf, keep: usize) -> Self {
-        let keep = keep.max(1);
-        Self { folder, keep }
+        Self {
+            folder,
+            keep: keep.max(1),
+            needed: Arc::new(AtomicU64::new(u64::MAX)),
+        }
+    }
+
+    /// Up to how many ticks, beats, breaks and freezes all is put out: from there on they may be stepped again. The newest one from
+    /// before is kept beside the others.
+    pub fn need(&self, happenings: u64) {
+        self.needed.store(happenings, Ordering::Relaxed);
     }
 
     /// Saves one, and removes the oldest beyond those that are kept. It has its name once it is on the disk.
@@ -109,17 +122,20 @@ impl Checkpoints {
         let saved = saved.and_then(|()| sync_folder(&self.folder));
         saved.map_err(|error| CheckpointError::NotWritten { path, error })?;
         let files = self.files()?;
-        for (_, path) in files.iter().rev().skip(self.keep) {
-            // One that stays does no harm.
-            let _ = fs::remove_file(path);
+        let needed = self.needed.load(Ordering::Relaxed);
+        let needed = files.iter().rposition(|(of, _)| *of <= needed);
+        for nth in 0..files.len().saturating_sub(self.keep) {
+            if Some(nth) != needed {
+                let _ = fs::remove_file(&files[nth].1);
+            }
         }
         Ok(())
     }
 
-    /// Removes those taken before so many ticks, beats, breaks and freezes. One that stays does no harm.
-    pub fn forget(&self, happenings: u64) {
+    /// Removes all but those taken after so many ticks, beats, breaks and freezes. One that stays does no harm.
+    pub fn retain(&self, happenings: impl RangeBounds<u64>) {
         let files = self.files().unwrap_or_default();
-        for (_, path) in files.iter().filter(|(of, _)| *of < happenings) {
+        for (_, path) in files.iter().filter(|(of, _)| !happenings.contains(of)) {
             let _ = fs::remove_file(path);
         }
     }
@@ -136,20 +152,22 @@ impl Checkpoints {
         Ok(newest_first.map(|(_, path)| Checkpoint::read(&path)))
     }
 
-    /// Removes those that were taken after more than so many ticks, beats, breaks and freezes.
-    pub fn remove_after(&self, happenings: u64) {
-        let files = self.files().unwrap_or_default();
-        for (_, path) in files.iter().filter(|(of, _)| *of > happenings) {
-            let _ = fs::remove_file(path);
-        }
+    /// Those taken after so many ticks, beats, breaks and freezes or more that can be used, oldest first, each read when it is its
+    /// turn.
+    pub(crate) fn since(&self, happenings: u64) -> impl Iterator<Item = Checkpoint> + use<> {
+        let files = self.files().unwrap_or_default().into_iter();
+        let files = files.skip_while(move |(of, _)| *of < happenings);
+        files.filter_map(|(_, path)| Checkpoint::read(&path).ok())
     }
 
-    /// After how many ticks, beats, breaks and freezes the oldest one was taken: the journal is needed from there.
+    /// After how many ticks, beats, breaks and freezes the oldest one was taken that a start may need: the journal is needed from there.
     ///
     /// # Errors
     /// When the folder cannot be read.
     pub fn oldest(&self) -> Result<Option<u64>, CheckpointError> {
-        Ok(self.files()?.first().map(|(happenings, _)| *happenings))
+        let files = self.files()?;
+        let oldest = files.iter().nth_back(self.keep - 1).or(files.first());
+        Ok(oldest.map(|(happenings, _)| *happenings))
     }
 
     fn files(&self) -> Result<Vec<(u64, PathBuf)>, CheckpointError> {

@@ -1,17 +1,15 @@
 //! What the control thread does beside the engine: checkpoints of the replica, at intervals.
 
+use std::io;
 use std::sync::Arc;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::{Control, Notice, StageError};
 
-use crate::aside::Aside;
+use crate::aside::{Aside, PATIENCE, within};
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
 use crate::folder::FolderError;
 use crate::journal::Progress;
-
-/// How long a disk may take where somebody waits for it.
-const PATIENCE: Wait = Wait::from_secs(2);
 
 /// Takes checkpoints from the replica, so that the engine thread never serialises.
 #[derive(Debug)]
@@ -20,8 +18,6 @@ pub struct Keeper {
     checkpoints: Checkpoints,
     /// Graphs as they were when they were committed.
     swaps: Checkpoints,
-    /// Whether one is on its way to the engine thread. Until it has taken over, the replica is not what a start is to go on from.
-    is_committed: bool,
     progress: Arc<Progress>,
     /// How many ticks, beats, breaks and freezes there were before this run.
     before: u64,
@@ -30,7 +26,7 @@ pub struct Keeper {
     /// One that waits until the journal is synced up to it.
     waiting: Option<Checkpoint>,
     /// One that is being saved, on a disk that may hang.
-    saving: Aside<Result<u64, CheckpointError>>,
+    pub(crate) saving: Aside<Result<u64, CheckpointError>>,
     last: u64,
 }
 
@@ -48,7 +44,6 @@ impl Keeper {
             control,
             checkpoints,
             swaps,
-            is_committed: false,
             progress,
             before,
             every,
@@ -68,8 +63,6 @@ impl Keeper {
     /// When it cannot be written. It is tried again after `every`.
     pub fn pump(&mut self) -> Result<Vec<Notice>, CheckpointError> {
         let notices = self.control.pump();
-        let is_over = |of: &Notice| !matches!(of, Notice::Missed { .. });
-        self.is_committed &= !notices.iter().any(is_over);
         if self.waiting.is_none() && self.taken.elapsed() >= self.every {
             self.take();
         }
@@ -98,16 +91,21 @@ impl Keeper {
         which: usize,
         send: fn(&mut Control) -> Result<(), StageError>,
     ) -> Result<(), CommitError> {
+        // What is saved may have the name of the one that is on its way.
+        if self.control.is_on_the_way() {
+            return Err(StageError::Busy.into());
+        }
         let happenings = self.before + self.control.events();
         if let Some(engine) = self.control.beside()[which] {
             let (swaps, checkpoint) = (self.swaps.clone(), Checkpoint::of(engine, happenings));
-            let mut saving = Aside::default();
-            saving.start(move || swaps.save(&checkpoint));
-            saving.wait(PATIENCE).ok_or(CommitError::Hangs)??;
+            within(move || swaps.save(&checkpoint)).ok_or(CommitError::Hangs)??;
         }
-        send(&mut self.control)?;
-        self.is_committed = true;
-        Ok(())
+        let sent = send(&mut self.control);
+        if sent.is_err() {
+            let swaps = self.swaps.clone();
+            within(move || swaps.retain(..happenings));
+        }
+        Ok(sent?)
     }
 
     /// Takes a checkpoint now; it is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it
@@ -126,7 +124,7 @@ impl Keeper {
     /// Saves what the replica knows now, once the journal is synced up to it. For the end, when the journal is finished.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// When it cannot be written, also where the disk hangs.
     pub fn finish(mut self) -> Result<Control, CheckpointError> {
         self.control.pump();
         // One that is on its way is older.
@@ -136,13 +134,11 @@ impl Keeper {
         self.take();
         self.save()?;
         self.saving.wait(PATIENCE).transpose()?;
+        if !self.saving.is_free() {
+            let (path, error) = (self.checkpoints.folder, io::ErrorKind::TimedOut.into());
+            return Err(CheckpointError::NotWritten { path, error });
+        }
         Ok(self.control)
-    }
-
-    /// Whether a checkpoint is being saved.
-    #[cfg(test)]
-    pub(crate) fn is_saving(&self) -> bool {
-        self.saving.is_busy()
     }
 
     /// The checkpoints.
@@ -164,10 +160,12 @@ impl Keeper {
 
     fn take(&mut self) {
         self.taken = Clock::now();
+        // Until what is on its way has taken over, the replica is not what a start is to go on from.
+        let is_on_the_way = self.control.is_on_the_way();
         let happenings = self.before + self.control.events();
         if let Some(replica) = self.control.replica()
             && happenings > self.last
-            && !self.is_committed
+            && !is_on_the_way
             // What a node that was given up had learned is not whole: the journal goes on from before.
             && replica.panics().is_empty()
         {
@@ -179,14 +177,15 @@ impl Keeper {
         if let Some(saved) = self.saving.take() {
             self.last = saved?;
         }
+        // Where the one before is still being saved, the disk hangs, and this one waits.
         let is_safe = |of: &Checkpoint| {
-            self.progress.synced_happenings() >= of.happenings || self.progress.is_degraded()
+            let is_synced = self.progress.synced_happenings() >= of.happenings;
+            self.saving.is_free() && (is_synced || self.progress.is_degraded())
         };
         let Some(checkpoint) = self.waiting.take_if(|of| is_safe(of)) else {
             return Ok(());
         };
         let checkpoints = self.checkpoints.clone();
-        // Where the one before is still being saved, the disk hangs, and this one is as good as none.
         self.saving.start(move || {
             let saved = checkpoints.save(&checkpoint);
             saved.map(|()| checkpoint.happenings)
@@ -231,20 +230,4 @@ impl std::fmt::Display for CommitError {
 
 impl std::error::Error for CommitError {}
 
-impl From<CheckpointError> for CommitError {
-    fn from(error: CheckpointError) -> Self {
-        Self::NotSaved(error)
-    }
-}
-
-impl From<FolderError> for CommitError {
-    fn from(error: FolderError) -> Self {
-        Self::NotKept(error)
-    }
-}
-
-impl From<StageError> for CommitError {
-    fn from(error: StageError) -> Self {
-        Self::NotStaged(error)
-    }
-}
+from! { CommitError: CheckpointError => NotSaved, FolderError => NotKept, StageError => NotStaged }

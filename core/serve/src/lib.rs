@@ -25,6 +25,17 @@
 //! | [`service`] | all of it at work, with its threads |
 //! | [`companion`] | what runs beside it and asks it things |
 
+/// Makes errors of other parts into those of one.
+macro_rules! from {
+    ($into:ident: $($error:ident => $variant:ident),* $(,)?) => {
+        $(impl From<$error> for $into {
+            fn from(error: $error) -> Self {
+                Self::$variant(error)
+            }
+        })*
+    };
+}
+
 mod aside;
 pub mod checkpoint;
 pub mod companion;

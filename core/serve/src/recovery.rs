@@ -115,17 +115,7 @@ impl fmt::Display for RecoveryError {
 
 impl std::error::Error for RecoveryError {}
 
-impl From<JournalError> for RecoveryError {
-    fn from(error: JournalError) -> Self {
-        Self::Journal(error)
-    }
-}
-
-impl From<CheckpointError> for RecoveryError {
-    fn from(error: CheckpointError) -> Self {
-        Self::Checkpoints(error)
-    }
-}
+from! { RecoveryError: JournalError => Journal, CheckpointError => Checkpoints }
 
 impl Recovered {
     /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on, by the plan that
@@ -148,13 +138,14 @@ impl Recovered {
         Self::search((folder, true), checkpoints, Some(model), feed, least, look)
     }
 
-    /// Steps all that a state folder has again, from as early on as it allows, and changes nothing in it. None where it has no journal.
-    /// `look` is as for [`find`](Self::find).
+    /// Steps all that a state folder has again behind so many ticks, beats, breaks and freezes, or from as early on as it allows, and
+    /// changes nothing in it. None where it has no journal. `look` is as for [`find`](Self::find).
     ///
     /// # Errors
     /// As [`find`](Self::find).
     pub fn replay(
         folder: &StatePaths,
+        least: u64,
         look: impl FnMut(u64, &Engine),
     ) -> Result<Option<Self>, RecoveryError> {
         if Log::open(&folder.journal())?.is_empty() {
@@ -162,7 +153,7 @@ impl Recovered {
         }
         let checkpoints = Checkpoints::new(folder.checkpoints(), 1);
         let feed = |plan: &Plan| FeedNames::new(&Feed::of(plan), Vec::new());
-        Self::search((folder, false), &checkpoints, None, feed, 0, look).map(Some)
+        Self::search((folder, false), &checkpoints, None, feed, least, look).map(Some)
     }
 
     fn search(
@@ -372,17 +363,13 @@ fn committed(
     folder: &StatePaths,
     from: u64,
 ) -> std::iter::Peekable<impl Iterator<Item = (u64, Engine)>> {
-    let commits = folder.commits();
-    let all = commits.read().into_iter().flatten();
-    let mut all: Vec<_> = all.filter_map(Result::ok).collect();
-    all.retain(|of| of.happenings >= from);
-    all.reverse();
+    let commits = folder.commits().since(from);
     let folder = folder.clone();
     let engine = move |of: Checkpoint| {
-        let usable = usable(&folder, None, of, 0).ok();
-        usable.map(|(engine, _, happenings)| (happenings, engine))
+        let (engine, _, happenings) = usable(&folder, None, of, 0).ok()?;
+        Some((happenings, engine))
     };
-    all.into_iter().filter_map(engine).peekable()
+    commits.filter_map(engine).peekable()
 }
 
 /// A graph that takes over from the state of another, without a past to warm it by.

@@ -1,6 +1,6 @@
 //! `simulation`: a simulated machine, which takes corrections back.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use athermal_core::time::Instant;
@@ -113,6 +113,7 @@ impl Source for SimulationSource {
             known: wiring.channels.iter().map(|of| of.after).max(),
             pace: Pace::new(self.speed),
             values: vec![f64::NAN; wiring.channels.len()],
+            from_s: vec![f64::NAN; wiring.channels.len()],
             applied,
             axes,
         }))
@@ -132,7 +133,7 @@ enum Origin {
     /// A set point, as it is announced.
     SetPoint(Box<Announcements>),
     /// From when on that of the feed of this number applies.
-    AppliesAt,
+    AppliesAt(usize),
 }
 
 fn feeds(
@@ -154,7 +155,14 @@ fn feeds(
             (Some(nth), ..) => (Origin::Channel(nth), unit(channels[nth].unit)?),
             (None, Some(nth), _) => (Origin::Applied(nth), unit("nm")?),
             (.., Some(planned)) => (Origin::SetPoint(Box::new(planned)), unit("Cel")?),
-            _ if plans(machine, &wired.channel) => (Origin::AppliesAt, unit("s")?),
+            _ if plans(machine, &wired.channel) => {
+                let planned = name.replacen(":applies_at.", ".", 1);
+                let place = wiring
+                    .channels
+                    .iter()
+                    .position(|of| of.channel.name == planned);
+                (Origin::AppliesAt(place.unwrap_or(usize::MAX)), unit("s")?)
+            }
             _ => {
                 let known: Vec<_> = channels.iter().map(|of| of.reference()).collect();
                 return Err(ConnectorError::new(format_args!(
@@ -188,6 +196,8 @@ struct MachineInlet {
     known: Option<Instant>,
     pace: Pace,
     values: Vec<f64>,
+    /// By feed: from when on the set point of this row applies.
+    from_s: Vec<f64>,
     /// What is in force while the row is measured.
     applied: Vec<f64>,
     axes: SharedAxes,
@@ -203,17 +213,17 @@ impl Inlet for MachineInlet {
                 break;
             }
             // From when on a set point applies stands behind it.
-            let mut from_s = VecDeque::new();
-            for (value, feed) in self.values.iter_mut().zip(&mut self.feeds) {
+            let feeds = self.feeds.iter_mut().enumerate();
+            for (value, (nth, feed)) in self.values.iter_mut().zip(feeds) {
                 let measured = match &mut feed.from {
                     Origin::Channel(nth) => self.row.values[*nth],
                     Origin::Applied(nth) => self.applied[*nth],
                     Origin::SetPoint(planned) => {
                         let announced = planned.next(self.row.time_ns);
-                        from_s.push_back(announced.map_or(f64::NAN, |(_, from_s)| from_s));
+                        self.from_s[nth] = announced.map_or(f64::NAN, |(_, from_s)| from_s);
                         announced.map_or(f64::NAN, |(set_point, _)| set_point)
                     }
-                    Origin::AppliesAt => from_s.pop_front().unwrap_or(f64::NAN),
+                    Origin::AppliesAt(of) => self.from_s.get(*of).copied().unwrap_or(f64::NAN),
                 };
                 let converted = feed.machine.convert(measured, &feed.graph);
                 *value = converted.unwrap_or(f64::NAN);

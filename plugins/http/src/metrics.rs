@@ -246,7 +246,7 @@ fn connectors(page: &mut Page, service: &Service) {
         "sink",
         "athermal_sink_dropped_rows_total",
         "counter",
-        "Rows that a sink was too far behind for.",
+        "Commands that a sink was too far behind for, and rows of a log that could not be made again.",
         |of: &Sink| of.dropped.load(Ordering::Relaxed)
     );
     each!(

@@ -81,7 +81,7 @@ pub fn sinks(terminal: &Terminal, sinks: &[(String, Arc<SinkCounts>)]) {
         let dropped = counts.dropped.load(Ordering::Relaxed);
         if dropped > 0 {
             terminal.warning(format_args!(
-                "sink `{sink}`: {} dropped, because it was behind",
+                "sink `{sink}`: {} lost, because it was behind",
                 counted(dropped, "row")
             ));
         }

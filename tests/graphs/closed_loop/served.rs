@@ -160,11 +160,10 @@ enum End {
 fn session(
     fitted: &Model,
     scratch: &Scratch,
-    (name, state): (&str, &Path),
+    (name, by_rate, state): (&str, bool, &Path),
     end: End,
     prng: &mut Prng,
 ) -> usize {
-    let by_rate = name.len() % 2 == 0;
     let (model, deployment) = self::model(scratch, fitted, name, 1e5, by_rate);
     let options = ServiceOptions::new(state.to_owned());
     let (mut service, _) = Service::start(&model, deployment, &options).unwrap();
@@ -253,7 +252,9 @@ fn history(fitted: &Model, nth: usize) -> History {
     let ends = [End::Stopped, End::Killed, End::Killed, End::Lost];
     for _ in 0..3 + (prng.uniform() * 3.0) as usize {
         let end = ends[(prng.uniform() * 4.0) as usize % 4];
-        history.swaps += session(fitted, &scratch, (&name, &state), end, &mut prng);
+        // Every other machine is bounded by the rate of its sink, the others by the blend of their output.
+        let machine = (&*name, nth % 2 == 0, &*state);
+        history.swaps += session(fitted, &scratch, machine, end, &mut prng);
         history.ends += 1;
     }
     let line = line(&name);

@@ -210,12 +210,8 @@ impl Control {
             live.engine.isolate_panics();
         }
         let mut warmed = false;
-        let slots: Vec<usize> = model
-            .plan
-            .outputs
-            .iter()
-            .map(|output| output.slot)
-            .collect();
+        let outputs = model.plan.outputs.iter();
+        let slots: Vec<_> = outputs.map(|output| output.slot).collect();
         let mut gave = vec![false; slots.len()];
         self.retained.for_each(|time, samples| match time {
             Some(time) => {
@@ -336,6 +332,12 @@ impl Control {
     #[must_use]
     pub fn events(&self) -> u64 {
         self.event
+    }
+
+    /// Whether a graph is on its way to the engine thread: committed, and neither taken over nor sent back.
+    pub fn is_on_the_way(&mut self) -> bool {
+        self.catch_up();
+        self.committed.is_some()
     }
 
     /// How much of the past is retained.

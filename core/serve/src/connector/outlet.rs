@@ -64,7 +64,8 @@ pub trait Outlet: Send {
     /// Puts a row out.
     ///
     /// # Errors
-    /// When it cannot be put out, and why. The same row is given again after a while; rows wait meanwhile, as many as there is room for.
+    /// When it cannot be put out, and why. A log is given the same row again after a while; the next ones wait meanwhile, and where there
+    /// is no room for them they are made again from the journal.
     fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError>;
 
     /// Whether what it has taken can leave; otherwise why not. What waits is kept meanwhile. Asked after each row, and ten times a second.

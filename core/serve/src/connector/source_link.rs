@@ -57,10 +57,8 @@ pub struct SourceCounts {
     pub given: AtomicU64,
     /// Samples that were dropped because the engine thread was behind.
     pub dropped: AtomicU64,
-    /// How often it was started again after a failure.
+    /// How often it was started again: after a failure, or because it was connected and silent.
     pub restarts: AtomicU64,
-    /// How often it was connected and silent, and was started again for that.
-    pub silences: AtomicU64,
     /// How often it said that it is connected to something that lives.
     alive: AtomicU64,
     is_connected: AtomicBool,
@@ -150,6 +148,8 @@ pub(crate) struct SourceLink {
     ring: Consumer<Arrival>,
     counts: Arc<SourceCounts>,
     taken: u64,
+    /// Whether it is held back while nothing is taken from it.
+    pub(crate) waits: bool,
 }
 
 /// A link of a source to the engine thread, for so many arrivals at once. `places` are those of its channels in the feed.
@@ -184,6 +184,7 @@ pub(crate) fn link(
         ring: arrivals,
         counts,
         taken: 0,
+        waits: stamps == Stamps::Order,
     };
     (outflow, link)
 }

@@ -120,7 +120,7 @@ fn sink(
         Some(value) => outputs.read(value, diagnostics),
         None => (0..outputs.columns.len()).collect(),
     };
-    let rate = outputs.rates(by_hand("rate"), &columns, diagnostics);
+    let mut rate = outputs.rates(by_hand("rate"), &columns, diagnostics);
     let (kind, sink) = kind?;
     keys::report(sink.remarks(), &parameters, diagnostics);
     let parameters = sink;
@@ -130,6 +130,10 @@ fn sink(
             let kind = kind.name;
             diagnostics.report(entry.key, NotACommand { key, kind });
         }
+    }
+    // What no command is bounded by is not stated either.
+    if !is_command {
+        rate.fill(None);
     }
     let mut unbounded = columns.iter().zip(&rate).filter(|(_, rate)| rate.is_none());
     if is_command

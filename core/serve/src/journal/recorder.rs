@@ -190,6 +190,13 @@ impl Recorder {
         self.happenings
     }
 
+    /// Whether the journal thread is far behind, and gets on: whatever can wait is better held back.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        let half = self.queue.buffer().capacity() / 2;
+        self.queue.slots() < half && !self.has_gap && !self.progress.is_degraded()
+    }
+
     /// Whether records are lost at the moment.
     #[must_use]
     pub fn has_gap(&self) -> bool {

@@ -204,11 +204,14 @@ impl Writer {
         Ok(())
     }
 
-    /// Cuts the file to what is written, and syncs it.
+    /// Cuts the file to what is written, and syncs it, which stands behind it: what is damaged later is no torn end.
     fn seal(&mut self) -> io::Result<()> {
-        if let Some(open) = self.file.take() {
+        if let Some(mut open) = self.file.take() {
             open.file.set_len(open.at)?;
             open.file.sync_all()?;
+            let mut mark = Vec::new();
+            segment::append_synced(&mut mark, open.at);
+            open.file.write_all(&mark)?;
             self.progress
                 .set_synced(self.begin.event, self.begin.happenings);
         }

@@ -31,11 +31,6 @@ impl CommandGate {
         }
     }
 
-    /// Whether the machine is to be asked for what is applied before the next command.
-    pub(super) fn is_unsure(&self) -> bool {
-        self.is_unsure
-    }
-
     /// What the machine says is applied, or what was applied when the service ended; NaN where that is not known.
     pub(super) fn start_from(&mut self, applied: &[f64]) {
         let known = self.applied.iter_mut().zip(applied);
@@ -49,12 +44,22 @@ impl CommandGate {
         &self.applied
     }
 
-    /// The row as it may be put out; none where it is too old. It counts as applied once it [is put out](Self::is_put).
-    pub(super) fn pass<'a>(&'a mut self, row: &OutRow<'a>) -> Option<OutRow<'a>> {
+    /// The row as it may be put out; none where it is too old. It counts as applied once it [is put out](Self::is_put). The machine is
+    /// asked for what is applied where it may be elsewhere than is known here.
+    pub(super) fn pass<'a>(
+        &'a mut self,
+        row: &OutRow<'a>,
+        ask: impl FnOnce() -> Option<Vec<f64>>,
+    ) -> Option<OutRow<'a>> {
         let last = self.last.replace(row.at);
         if self.behind.is_some_and(|behind| row.behind > behind) {
             self.is_unsure = true;
             return None;
+        }
+        if self.is_unsure
+            && let Some(applied) = ask()
+        {
+            self.start_from(&applied);
         }
         let passed = last.map_or(Duration::ZERO, |last| row.at - last);
         // What could not be commanded for an hour is not made up for in one step.
@@ -105,7 +110,7 @@ mod tests {
 
     /// What is put out of a row; nothing fails.
     fn put(gate: &mut CommandGate, row: OutRow<'_>) -> Vec<f64> {
-        let put = gate.pass(&row).unwrap().outputs.to_vec();
+        let put = gate.pass(&row, || None).unwrap().outputs.to_vec();
         gate.is_put(true);
         put
     }
@@ -134,9 +139,12 @@ mod tests {
         let mut gate = CommandGate::new(Some(Duration::from_ns(5_000_000_000)), vec![Some(1.0)]);
         assert_eq!(put(&mut gate, row(0, 0, &[9.0])), [0.0]);
         for second in 1..60 {
-            assert!(gate.pass(&row(second, 6, &[9.0])).is_none());
+            assert!(
+                gate.pass(&row(second, 6, &[9.0]), || panic!("it is too old"))
+                    .is_none()
+            );
         }
-        assert!(gate.is_unsure());
+        assert!(gate.is_unsure);
         assert_eq!(put(&mut gate, row(60, 5, &[9.0])), [1.0]);
     }
 
@@ -147,14 +155,19 @@ mod tests {
         put(&mut gate, row(0, 0, &[99.0]));
         assert_eq!(put(&mut gate, row(3_600, 0, &[99.0])), [5.0]);
         for second in 3_601..3_700 {
-            assert_eq!(gate.pass(&row(second, 0, &[99.0])).unwrap().outputs, [6.0]);
+            assert_eq!(
+                gate.pass(&row(second, 0, &[99.0]), || None)
+                    .unwrap()
+                    .outputs,
+                [6.0]
+            );
             gate.is_put(false);
-            assert!(gate.is_unsure());
+            assert!(gate.is_unsure);
         }
         assert_eq!(gate.applied(), [5.0]);
         // It says that it took one of them.
         gate.start_from(&[6.0]);
         assert_eq!(put(&mut gate, row(3_700, 0, &[99.0])), [7.0]);
-        assert!(!gate.is_unsure());
+        assert!(!gate.is_unsure);
     }
 }

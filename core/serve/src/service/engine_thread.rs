@@ -26,6 +26,8 @@ use crate::worker::{Output, Worker};
 const BATCH: usize = 256;
 /// The longest sleep, so that a beat shows that the thread lives.
 const NAP: Wait = Wait::from_millis(100);
+/// The longest sleep where sources are held back until the journal thread has caught up.
+const HOLD: Wait = Wait::from_millis(1);
 
 /// What the control thread asks of the engine thread.
 #[derive(Debug)]
@@ -132,8 +134,11 @@ impl EngineThread {
                 }
             }
             let mut has_more = false;
+            let is_crowded = self.worker.recorder().is_crowded();
             for nth in 0..self.sources.len() {
-                has_more |= self.take(nth, &mut left)?;
+                if !is_crowded || !self.sources[nth].waits {
+                    has_more |= self.take(nth, &mut left)?;
+                }
             }
             let now = self.clock.now();
             let sinks = &mut self.sinks;
@@ -149,9 +154,10 @@ impl EngineThread {
                 continue;
             }
             let due = self.worker.due();
-            let nap = due.map_or(NAP, |due| {
+            let longest = if is_crowded { HOLD } else { NAP };
+            let nap = due.map_or(longest, |due| {
                 let ns = (due - self.clock.now()).as_ns();
-                Wait::from_nanos(ns.max(0) as u64).min(NAP)
+                Wait::from_nanos(ns.max(0) as u64).min(longest)
             });
             if !nap.is_zero() {
                 std::thread::park_timeout(nap);

@@ -73,17 +73,7 @@ impl fmt::Display for ServiceError {
 
 impl std::error::Error for ServiceError {}
 
-macro_rules! from {
-    ($($error:ident => $variant:ident),* $(,)?) => {
-        $(impl From<$error> for ServiceError {
-            fn from(error: $error) -> Self {
-                Self::$variant(error)
-            }
-        })*
-    };
-}
-
 from! {
-    FolderError => Folder, RecoveryError => Recovery, JournalError => Journal, CheckpointError => Checkpoint,
+    ServiceError: FolderError => Folder, RecoveryError => Recovery, JournalError => Journal, CheckpointError => Checkpoint,
     EngineError => Unfit, RestoreError => NoTwin,
 }

@@ -10,14 +10,14 @@ use crate::time::{Duration, Instant};
 use crate::worker::Output;
 
 /// The words before the outputs.
-const HEAD: usize = 6;
+const HEAD: usize = 7;
 
 /// What a sink counts.
 #[derive(Debug, Default)]
 pub struct SinkCounts {
     /// Rows that were put out.
     pub put: AtomicU64,
-    /// Rows that there was no room for, because the sink was behind.
+    /// Commands that there was no room for because the sink was behind, and rows of a log that could not be made again for it.
     pub dropped: AtomicU64,
     /// Commands that were not put out because they were too old.
     pub behind: AtomicU64,
@@ -26,6 +26,13 @@ pub struct SinkCounts {
     /// Rows that were handed to its thread, and those that the thread took.
     sent: AtomicU64,
     taken: AtomicU64,
+    /// Rows of so many ticks, beats, breaks and freezes, and records, had no room: a log makes them again from the journal.
+    pub(super) missed: AtomicU64,
+    pub(super) missed_records: AtomicU64,
+    /// How many ticks were stepped again for it.
+    pub(super) again: AtomicU64,
+    /// A restart needs nothing before so many ticks, beats, breaks and freezes.
+    pub(super) safe: AtomicU64,
 }
 
 impl SinkCounts {
@@ -37,18 +44,6 @@ impl SinkCounts {
     }
 }
 
-impl SinkCounts {
-    /// Counts a row that was put out, or a failure.
-    pub(super) fn count<E>(&self, put: &Result<(), E>) {
-        let counted = if put.is_ok() {
-            &self.put
-        } else {
-            &self.failures
-        };
-        counted.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
 /// The end that the engine thread holds.
 #[derive(Debug)]
 pub(super) struct FrameSender {
@@ -56,6 +51,11 @@ pub(super) struct FrameSender {
     counts: Arc<SinkCounts>,
     /// For each output of the sink, its place among those of the graph that runs.
     places: Vec<Option<usize>>,
+    /// Whether rows that there is no room for are made again.
+    is_log: bool,
+    /// The last of them, by the number of ticks, beats, breaks and freezes; and whether the next one is not sent either.
+    missed: u64,
+    is_missing: bool,
 }
 
 /// The end that the thread of a sink holds.
@@ -74,12 +74,15 @@ pub(super) struct Ticket {
     pub(super) records: u64,
     /// So many ticks, beats, breaks and freezes there are then.
     pub(super) happenings: u64,
+    /// It is put out after the rows up to this number of them, for which there was no room.
+    pub(super) after: u64,
 }
 
 /// A ring for so many rows of so many outputs.
 pub(super) fn frames(
     rows: usize,
     outputs: usize,
+    is_log: bool,
     counts: &Arc<SinkCounts>,
 ) -> (FrameSender, FrameReceiver) {
     let width = HEAD + outputs;
@@ -88,6 +91,9 @@ pub(super) fn frames(
         ring: producer,
         counts: Arc::clone(counts),
         places: vec![None; outputs],
+        is_log,
+        missed: 0,
+        is_missing: false,
     };
     let receiver = FrameReceiver {
         ring: consumer,
@@ -106,10 +112,29 @@ impl FrameSender {
         }
     }
 
-    /// Hands a row over. Where there is no room it is dropped and counted.
+    /// Hands a row over. Where there is no room a command is dropped and counted. A log has it from the journal then, with all that
+    /// follow until there is room for many: making them again is worth it.
     pub(super) fn send(&mut self, output: &Output<'_>, revision: u64) {
-        let Ok(mut chunk) = self.ring.write_chunk(HEAD + self.places.len()) else {
-            self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+        let width = HEAD + self.places.len();
+        let least = if self.is_missing {
+            self.ring.buffer().capacity() / 2
+        } else {
+            width
+        };
+        self.is_missing = self.is_log && self.ring.slots() < least;
+        let chunk = self.ring.write_chunk(width);
+        let Some(mut chunk) = chunk.ok().filter(|_| !self.is_missing) else {
+            if self.is_log {
+                self.missed = output.happenings;
+                self.counts
+                    .missed_records
+                    .store(output.records, Ordering::Relaxed);
+                self.counts
+                    .missed
+                    .store(output.happenings, Ordering::Release);
+            } else {
+                self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+            }
             return;
         };
         let head = [
@@ -119,6 +144,7 @@ impl FrameSender {
             revision,
             output.records,
             output.happenings,
+            self.missed,
         ];
         let value = |place: &Option<usize>| {
             let value = place.and_then(|place| output.stepped.outputs.get(place));
@@ -163,6 +189,7 @@ impl FrameReceiver {
         let ticket = Ticket {
             records: self.words[4],
             happenings: self.words[5],
+            after: self.words[6],
         };
         (row, ticket)
     }

@@ -13,7 +13,7 @@ pub(super) type Work = Box<dyn FnOnce(&mut Service) + Send>;
 
 /// Asks a running service, from any thread: what is handed over is done by the thread that owns the service, at its next
 /// [`pump`](Service::pump). What runs does not notice.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct ServiceHandle(SyncSender<Work>);
 
 /// Why there is no answer.
@@ -57,12 +57,6 @@ impl ServiceHandle {
             RecvTimeoutError::Timeout => NoAnswer::TooLate,
             RecvTimeoutError::Disconnected => NoAnswer::Ended,
         })
-    }
-}
-
-impl fmt::Debug for ServiceHandle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("ServiceHandle")
     }
 }
 

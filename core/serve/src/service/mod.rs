@@ -30,6 +30,7 @@ mod wiring;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration as Wait, Instant as Clock};
@@ -46,7 +47,7 @@ pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
 pub use status::Snapshot;
 
-use crate::aside::Aside;
+use crate::aside::{Aside, within};
 use crate::checkpoint::Checkpoints;
 use crate::companion::Beside;
 use crate::compile::Plan;
@@ -144,6 +145,8 @@ pub struct Service {
     /// How many nodes were given up and reported.
     given_up: usize,
     has_failed: bool,
+    /// How many rows were put out or made again when that was looked at, and since when there are as many.
+    put: (u64, Clock),
     began: Clock,
 }
 
@@ -187,32 +190,14 @@ impl Service {
             let wiring = sinks::wiring(&declared, &units, &model.plan);
             OpenSink::open(declared, wiring, &folder)
         };
-        let sinks: Result<Vec<_>, _> = sinks.into_iter().map(open).collect();
-        let mut sinks = sinks?;
-        let least = sinks.iter_mut().filter_map(OpenSink::least).min();
+        let sinks = sinks.into_iter().map(open).collect::<Result<Vec<_>, _>>()?;
         let names: Vec<_> = sources.iter().map(|of| of.name.clone()).collect();
         let given = Feed::of(&model.plan);
         let checkpoints = Checkpoints::new(folder.checkpoints(), runtime.keep.checkpoints);
         let feed = |plan: &Plan| FeedNames::new(&fed(plan, &given), names.clone());
-        let mut failed = None;
-        let recovered = Recovered::find(
-            &folder,
-            &checkpoints,
-            model,
-            feed,
-            least.unwrap_or(u64::MAX),
-            |happenings, engine| {
-                for sink in &mut sinks {
-                    let again = sink.again(happenings, engine);
-                    failed = failed.take().or(again.err());
-                }
-            },
-        )?;
-        failed.map_or(Ok(()), Err)?;
+        // What sinks lack they make again.
+        let recovered = Recovered::find(&folder, &checkpoints, model, feed, u64::MAX, |_, _| ())?;
         let happenings = recovered.happenings();
-        for sink in &mut sinks {
-            sink.settle(happenings)?;
-        }
         let journal = JournalOptions {
             sync: wait(runtime.sync),
             ..JournalOptions::default()
@@ -238,7 +223,7 @@ impl Service {
         let given = model.revision().unwrap_or_default();
         let is_another = recovered.model.revision() != model.revision();
         let differs = is_another && folder.given().as_ref() != Some(&given);
-        folder.commits().remove_after(happenings);
+        folder.commits().retain(..=happenings);
         let was_frozen = recovered.engine.frozen();
         let (stepper, mut control) = pair_from(recovered.engine, live)?;
         let observers = Observers::default();
@@ -262,7 +247,8 @@ impl Service {
         let shared = Arc::new(Shared::new(feed.len()));
         let (stop_sources, stop_sinks) = (Stop::default(), Stop::default());
         // Sinks first: nothing that comes is put out into nowhere.
-        let running = sinks::start(sinks, options.is_dry, (&progress, &stop_sinks, &tell))?;
+        let threads = (&progress, &stop_sinks, &tell);
+        let running = sinks::start(sinks, options.is_dry, (&folder, happenings), threads)?;
         let (out, sink_threads, sink_counts) = running;
         // The engine thread waits for the links of sources, which need to know it.
         let (hand_over, links) = channel();
@@ -291,11 +277,6 @@ impl Service {
             (engine_thread.thread(), &progress),
         )?;
         let _ = hand_over.send(open.links);
-        let source_threads = open.inlets.into_iter().map(|source| {
-            let (stop, tell) = (stop_sources.clone(), tell.clone());
-            spawn("source", move || source.run(&stop, &tell))
-        });
-        let source_threads = source_threads.collect::<Result<Vec<_>, _>>()?;
         let (handle, asked) = ServiceHandle::new();
         let mut service = Self {
             handle,
@@ -315,7 +296,7 @@ impl Service {
             stop_sources,
             stop_sinks,
             sources: open.counts,
-            source_threads,
+            source_threads: Vec::new(),
             watches: open.watches,
             host,
             sinks: sink_counts,
@@ -330,6 +311,7 @@ impl Service {
             is_degraded: false,
             given_up: 0,
             has_failed: false,
+            put: (0, Clock::now()),
             began: Clock::now(),
         };
         service.own.extend(service.host.first());
@@ -338,11 +320,22 @@ impl Service {
         } else if !is_another {
             service.note_given(&service.given.clone());
         }
+        // Only now: all that comes is stepped by the graph that was given.
+        for source in open.inlets {
+            let (stop, tell) = (service.stop_sources.clone(), tell.clone());
+            let thread = spawn("source", move || source.run(&stop, &tell))?;
+            service.source_threads.push(thread);
+        }
         let beside = service.beside(model, options);
         for companion in companions {
-            let running = companion.start(&beside);
-            let running = running.map_err(ServiceError::Companion)?;
-            service.companions.push(running);
+            match companion.start(&beside) {
+                Ok(running) => service.companions.push(running),
+                Err(error) => {
+                    // What else goes wrong then is no news.
+                    let _ = service.stop();
+                    return Err(ServiceError::Companion(error));
+                }
+            }
         }
         Ok((service, recovered.report))
     }
@@ -350,6 +343,17 @@ impl Service {
     /// What happened since the last call. Call it ten times a second: it also takes checkpoints.
     pub fn pump(&mut self) -> Vec<ServiceEvent> {
         let mut events = std::mem::take(&mut self.own);
+        let sinks = self.sinks.iter().map(|(_, of)| of);
+        let safe = sinks
+            .clone()
+            .map(|of| of.safe.load(Ordering::Relaxed))
+            .min();
+        self.keeper.checkpoints().need(safe.unwrap_or(u64::MAX));
+        let counts = sinks.flat_map(|of| [&of.put, &of.again]);
+        let put = counts.map(|of| of.load(Ordering::Relaxed)).sum();
+        if put != self.put.0 {
+            self.put = (put, Clock::now());
+        }
         match self.keeper.pump() {
             Ok(notices) => events.extend(notices.into_iter().map(ServiceEvent::Swap)),
             Err(error) => events.push(ServiceEvent::NoCheckpoint(error)),
@@ -396,7 +400,7 @@ impl Service {
                 let needed = checkpoints.oldest().ok().flatten().unwrap_or_default();
                 let _ = retire(&folder.journal(), keep, needed);
                 if let Ok(Some(oldest)) = oldest(&folder.journal()) {
-                    folder.commits().forget(oldest);
+                    folder.commits().retain(oldest..);
                 }
             });
         }
@@ -410,10 +414,13 @@ impl Service {
         events
     }
 
-    /// Whether all sources have come to their ends, the engine cannot go on, or the end was asked for.
+    /// Whether all sources have come to their ends and their rows are put out, the engine cannot go on, or the end was asked for. A
+    /// sink that does not get on is not waited for; it has its rows at the next start.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.is_asked_to_end || self.engine.is_finished()
+        let is_put = || self.sink_threads.iter().all(JoinHandle::is_finished);
+        self.is_asked_to_end
+            || self.engine.is_finished() && (is_put() || self.put.1.elapsed() >= ENDS)
     }
 
     /// Asks for the end: whoever runs the service stops it.
@@ -471,11 +478,12 @@ impl Service {
             events.extend(self.pump());
             std::thread::sleep(Wait::from_millis(2));
         }
+        // What came last, where the engine ended before anybody looked.
+        events.extend(self.pump());
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
         if let Some(Ok(worker)) = worker {
-            let (_, _, recorder) = worker.into_parts();
-            recorder.finish();
+            worker.into_parts().2.finish();
         } else {
             has_failed = true;
         }
@@ -524,8 +532,9 @@ impl Service {
     /// Keeps in mind that the graph that was given ran: a restart with the same one goes on with what ran last.
     fn note_given(&self, revision: &str) {
         if revision == self.given {
+            let (folder, revision) = (StatePaths::clone(&self.folder), revision.to_owned());
             // Where it cannot be written, a restart lets the given graph take over again.
-            let _ = self.folder.note_given(revision);
+            let _ = within(move || folder.note_given(&revision));
         }
     }
 

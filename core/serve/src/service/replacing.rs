@@ -4,7 +4,9 @@ use athermal_run::live::{StageError, Staged, Verdict};
 use athermal_run::model::Model;
 
 use super::{Service, ServiceEvent};
+use crate::aside::within;
 use crate::engine::Engine;
+use crate::folder::StatePaths;
 use crate::keeper::CommitError;
 use crate::time::Duration;
 
@@ -23,16 +25,14 @@ impl Service {
     /// # Errors
     /// When it cannot take over, or be kept; what runs, and what was staged before, is untouched.
     pub fn stage(&mut self, model: &Model, by: &str) -> Result<&Staged, CommitError> {
-        let revision = self
-            .keeper
-            .control()
-            .stage(model, false)?
-            .revision()
-            .to_owned();
+        // Kept before it is staged: where it cannot be, what was staged stays so. One that cannot be run is refused there.
+        if let Some(revision) = model.revision() {
+            let (folder, model) = (StatePaths::clone(&self.folder), model.clone());
+            within(move || folder.keep_model(&model, &revision)).ok_or(CommitError::Hangs)??;
+        }
+        let staged = self.keeper.control().stage(model, false)?;
+        let revision = staged.revision().to_owned();
         self.comparison = None;
-        self.folder
-            .keep_model(model, &revision)
-            .map_err(CommitError::NotKept)?;
         self.note(&format!("{by}: staged {revision}"));
         let staged = self.keeper.look().staged();
         Ok(staged.ok_or(StageError::NothingStaged)?)
@@ -136,10 +136,12 @@ impl Service {
             .map_or_else(String::new, |of| of.revision().to_owned());
         let passes = verdict.passes == Some(true);
         let ratio = verdict.ratio;
-        self.note(&format!(
-            "{by}: {revision} compared, {}",
-            if passes { "no worse" } else { "worse" }
-        ));
+        let outcome = match verdict.passes {
+            Some(true) => "no worse",
+            Some(false) => "worse",
+            None => "without anything to compare it by",
+        };
+        self.note(&format!("{by}: {revision} compared, {outcome}"));
         events.push(ServiceEvent::Compared { revision, verdict });
         if !commits {
             return;

@@ -1,5 +1,9 @@
 //! The thread of a sink: puts rows out once they are journalled, tries again after a failure, and keeps how far it is.
+//!
+//! A log is given every row, however slow it is: those that there was no room for, and those that a run before left, are made again from
+//! a checkpoint and the journal.
 
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -8,12 +12,15 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use super::ServiceEvent;
 use super::command::CommandGate;
-use super::frames::{FrameReceiver, SinkCounts, Ticket};
+use super::frames::{FrameReceiver, SinkCounts};
 use super::position::{Position, PositionFile};
+use super::sinks::made_again;
 use crate::aside::Aside;
-use crate::connector::{ConnectorError, Outlet, Stop};
+use crate::connector::{ConnectorError, OutRow, Outlet, Stop};
 use crate::diagnostic::panic_message;
+use crate::folder::StatePaths;
 use crate::journal::Progress;
+use crate::recovery::{Recovered, Start};
 
 /// How long outputs wait for the journal.
 const PATIENCE: Wait = Wait::from_millis(50);
@@ -27,181 +34,275 @@ const ENDS: Wait = Wait::from_secs(2);
 
 /// A sink at work.
 pub(super) struct SinkThread {
-    pub(super) name: String,
-    pub(super) outlet: Box<dyn Outlet>,
+    pub(super) port: Port,
     pub(super) frames: FrameReceiver,
-    pub(super) counts: Arc<SinkCounts>,
     /// None of a log.
     pub(super) gate: Option<CommandGate>,
     /// Whether nothing is put out.
     pub(super) is_dry: bool,
+    pub(super) folder: StatePaths,
+    pub(super) columns: Vec<String>,
     pub(super) position: PositionFile,
     pub(super) progress: Arc<Progress>,
-    pub(super) stop: Stop,
-    pub(super) events: Sender<ServiceEvent>,
-    pub(super) health: Health,
     /// What keeps its position, on a disk that may hang.
-    pub(super) keeping: Aside<()>,
+    pub(super) keeping: Aside<io::Result<u64>>,
+    /// It has the rows of so many ticks, beats, breaks and freezes…
+    pub(super) done: u64,
+    /// …of which so many are kept, and when that was tried last.
+    pub(super) kept: (u64, Clock),
+    /// Where a log was when a run before ended, and how many rows stand behind that place.
+    pub(super) was: Option<(Position, u64)>,
+    /// How many of these have not been made again yet.
+    pub(super) there: u64,
+}
+
+/// The way out.
+pub(super) struct Port {
+    pub(super) outlet: Box<dyn Outlet>,
+    pub(super) counts: Arc<SinkCounts>,
+    pub(super) stop: Stop,
+    pub(super) health: Health,
 }
 
 impl SinkThread {
     /// Puts rows out until no more will come.
     pub(super) fn run(mut self) {
-        let (mut is_dirty, mut kept, mut happenings) = (false, Clock::now(), None);
-        let every = if self.gate.is_some() { KEEP.1 } else { KEEP.0 };
-        loop {
-            if self.frames.take() {
-                let Some(put) = self.put() else {
-                    return;
-                };
-                happenings = Some(put);
-                is_dirty = true;
-                self.look();
-                continue;
+        let mut is_dirty = self.was.is_some();
+        self.go_on();
+        while !self.port.stop.is_asked() {
+            let is_taken = self.frames.take();
+            // In this order: what is over misses no more.
+            let is_over = !is_taken && self.frames.is_over();
+            let missed = self.port.counts.missed.load(Ordering::Acquire);
+            let is_idle = !is_taken && missed <= self.done;
+            if is_taken {
+                self.put();
+            } else if !is_idle {
+                self.make_again(missed);
+            } else if is_dirty {
+                self.port
+                    .health
+                    .report(guarded(|| self.port.outlet.flush()));
             }
-            if is_dirty {
-                let flushed = guarded(|| self.outlet.flush());
-                is_dirty = flushed.is_err();
-                self.health.report(&self.name, &self.events, flushed);
-            }
+            is_dirty = !is_idle || is_dirty && self.port.health.has_failed;
             self.look();
-            let is_over = self.frames.is_over();
-            if (is_over || kept.elapsed() >= every)
-                && let Some(happenings) = happenings.take()
-            {
-                kept = Clock::now();
-                if is_over {
-                    self.keeping.wait(ENDS);
-                }
-                self.keep(happenings);
-            }
-            if is_over {
-                self.keeping.wait(ENDS);
+            self.keep(is_idle && is_over);
+            if is_idle && is_over {
                 return;
             }
-            std::thread::park_timeout(Wait::from_millis(100));
+            if is_idle {
+                std::thread::park_timeout(Wait::from_millis(100));
+            }
         }
     }
 
-    /// Puts out the row that was taken, however often that fails, and gives how many ticks, beats, breaks and freezes there were then.
-    /// None where it is to stop meanwhile.
-    fn put(&mut self) -> Option<u64> {
-        let (
-            row,
-            Ticket {
-                records,
-                happenings,
-            },
-        ) = self.frames.row();
+    /// Goes on from where it was: what a run before left is put out, and what the journal does not know is cut off.
+    fn go_on(&mut self) {
+        let Some((was, rows)) = self.was.take() else {
+            self.keep(true);
+            return;
+        };
+        let now = self.done;
+        (self.done, self.kept.0, self.there) = (was.happenings.min(now), was.happenings, rows);
+        let is_whole = self.done >= now || self.make_again(now);
+        let unknown = std::mem::take(&mut self.there);
+        if unknown > 0
+            && is_whole
+            && let Some(kept) = self.port.outlet.kept()
+        {
+            let cut = guarded(|| kept.cut(was.end, rows - unknown));
+            self.port.health.report(cut);
+        }
+    }
+
+    /// Puts out the row that was taken: a log's however often that fails, until it is to stop.
+    fn put(&mut self) {
+        let after = self.frames.row().1.after;
+        if after > self.done {
+            self.make_again(after);
+        }
+        let (row, ticket) = self.frames.row();
         // Where the journal fails the outputs go on; that is reported elsewhere.
-        let _ = self.progress.wait_written(records, PATIENCE);
-        if let Some(gate) = &mut self.gate {
-            let applied = || self.outlet.applied();
-            if gate.is_unsure()
-                && let Ok(Some(applied)) = catch_unwind(AssertUnwindSafe(applied))
-            {
-                gate.start_from(&applied);
+        let _ = self.progress.wait_written(ticket.records, PATIENCE);
+        let Some(gate) = &mut self.gate else {
+            // One that was made again is not put out twice.
+            if ticket.happenings > self.done && self.port.put_at_last(&row) {
+                self.done = ticket.happenings;
             }
-            let Some(row) = gate.pass(&row) else {
-                self.counts.behind.fetch_add(1, Ordering::Relaxed);
-                return Some(happenings);
-            };
-            if !self.is_dry {
-                // An old command is none: where this one fails, the next tick has a newer one.
-                let put = guarded(|| self.outlet.put(&row));
-                self.counts.count(&put);
-                gate.is_put(put.is_ok());
-                self.health.report(&self.name, &self.events, put);
-            }
-            return Some(happenings);
+            return;
+        };
+        self.done = ticket.happenings;
+        let outlet = (!self.is_dry).then_some(&mut self.port.outlet);
+        let ask = || catch_unwind(AssertUnwindSafe(|| outlet?.applied()));
+        let Some(row) = gate.pass(&row, || ask().ok().flatten()) else {
+            self.port.counts.behind.fetch_add(1, Ordering::Relaxed);
+            return;
+        };
+        if !self.is_dry {
+            // An old command is none: where this one fails, the next tick has a newer one.
+            let is_put = self.port.put(&row);
+            gate.is_put(is_put);
         }
-        loop {
-            let put = guarded(|| self.outlet.put(&row));
-            let is_put = put.is_ok();
-            self.counts.count(&put);
-            self.health.report(&self.name, &self.events, put);
-            if is_put {
-                return Some(happenings);
+    }
+
+    /// Makes the rows again that it lacks, up to a number of ticks, beats, breaks and freezes, and those behind that are written: what
+    /// comes of them in the ring is passed over. Whether the journal has them all.
+    fn make_again(&mut self, missed: u64) -> bool {
+        let began = Clock::now();
+        let records = self.port.counts.missed_records.load(Ordering::Relaxed);
+        while self.progress.written() < records && began.elapsed() < ENDS {
+            std::thread::sleep(Wait::from_millis(1));
+        }
+        let (folder, mut outputs) = (self.folder.clone(), Vec::new());
+        let (before, mut looked, mut is_whole) = (self.done, 0, true);
+        let mut error = String::new();
+        // The end of the journal is being written: what is read of it may not be whole.
+        for _ in 0..3 {
+            let from = self.done;
+            let found = Recovered::replay(&folder, from, |happenings, engine| {
+                let Self { port, there, .. } = self;
+                port.counts.again.fetch_add(1, Ordering::Relaxed);
+                let is_known = happenings <= self.done || *there > 0 && happenings > missed;
+                if is_known || port.stop.is_asked() {
+                    return;
+                }
+                let row = made_again(engine, &self.columns, &mut outputs);
+                if *there > 0 || port.put_at_last(&row) {
+                    *there = there.saturating_sub(1);
+                    (self.done, looked) = (happenings, looked + 1);
+                    self.keep(false);
+                }
+            });
+            match found {
+                Ok(Some(of)) if !self.port.stop.is_asked() => {
+                    let is_later = matches!(of.report.start, Start::Checkpoint(at) if at > from);
+                    is_whole &= !is_later && of.report.gaps.is_empty();
+                    self.done = self.done.max(missed.min(of.happenings()));
+                }
+                Ok(_) => {}
+                Err(of) => error = format!(": {of}"),
             }
-            if !self.stop.wait(AGAIN) {
-                return None;
+            if self.done >= missed || self.port.stop.is_asked() {
+                break;
             }
         }
+        is_whole &= self.done >= missed;
+        let lost = missed.max(self.done) - before - looked;
+        if !is_whole && lost > 0 && !self.port.stop.is_asked() {
+            self.port.counts.dropped.fetch_add(lost, Ordering::Relaxed);
+            let words = format_args!("{lost} rows are lost: the journal does not have them{error}");
+            self.port.health.report(Err(ConnectorError::new(words)));
+            self.done = missed.max(self.done);
+        }
+        is_whole
     }
 
     /// Asks whether what was taken can leave.
     fn look(&mut self) {
         if !self.is_dry {
-            let state = guarded(|| self.outlet.state());
-            self.health.look(&self.name, &self.events, state);
+            let state = guarded(|| self.port.outlet.state());
+            self.port.health.look(state);
         }
     }
 
-    /// Keeps how far the sink is. Where that fails it is tried again; what is kept is always true.
-    fn keep(&mut self, happenings: u64) {
+    /// Keeps how far the sink is, now and then and at the end. Where that fails it is tried again; what is kept is always true.
+    fn keep(&mut self, at_once: bool) {
+        let every = if self.gate.is_some() { KEEP.1 } else { KEEP.0 };
+        let patience = if at_once { ENDS } else { Wait::ZERO };
+        self.is_kept(patience);
+        let is_early = !at_once && self.kept.1.elapsed() < every;
+        if self.kept.0 == self.done || is_early || !self.keeping.is_free() {
+            return;
+        }
+        self.kept.1 = Clock::now();
         let applied = self.gate.as_ref().map_or(&[][..], CommandGate::applied);
-        let applied = applied
-            .iter()
-            .map(|value| Some(*value).filter(|value| value.is_finite()));
-        let applied: Vec<_> = applied.collect();
-        let end = match self.outlet.kept() {
+        let finite = |value: &f64| Some(*value).filter(|value| value.is_finite());
+        let applied = applied.iter().map(finite).collect();
+        let end = match self.port.outlet.kept() {
             Some(kept) => kept.end(),
             None if self.gate.is_some() => Ok(0),
-            None => return,
+            None => {
+                self.port.counts.safe.store(self.done, Ordering::Relaxed);
+                return;
+            }
         };
         let Ok(end) = end else { return };
-        let (file, position) = (
-            self.position.clone(),
-            Position {
-                end,
-                happenings,
-                applied,
-            },
-        );
-        self.keeping.take();
-        self.keeping.start(move || drop(file.write(&position)));
+        let (file, happenings) = (self.position.clone(), self.done);
+        let position = Position {
+            end,
+            happenings,
+            applied,
+        };
+        let write = move || file.write(&position).map(|()| happenings);
+        self.keeping.start(write);
+        self.is_kept(patience);
+    }
+
+    /// Looks whether the position is on the disk, for so long.
+    fn is_kept(&mut self, patience: Wait) {
+        if let Some(Ok(kept)) = self.keeping.wait(patience) {
+            self.kept.0 = kept;
+            if self.gate.is_none() {
+                self.port.counts.safe.store(kept, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+impl Port {
+    /// Puts a row out. False where that fails.
+    fn put(&mut self, row: &OutRow<'_>) -> bool {
+        let put = guarded(|| self.outlet.put(row));
+        let is_put = put.is_ok();
+        let counted = [&self.counts.failures, &self.counts.put][usize::from(is_put)];
+        counted.fetch_add(1, Ordering::Relaxed);
+        self.health.report(put);
+        is_put
+    }
+
+    /// Puts a row out, however often that fails. False where it is to stop before.
+    fn put_at_last(&mut self, row: &OutRow<'_>) -> bool {
+        while !self.stop.is_asked() {
+            if self.put(row) {
+                return true;
+            }
+            let _ = self.stop.wait(AGAIN);
+        }
+        false
     }
 }
 
 /// Whether a sink works.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Health {
+    pub(super) sink: String,
+    pub(super) events: Sender<ServiceEvent>,
     /// Whether what it did last failed.
-    has_failed: bool,
+    pub(super) has_failed: bool,
     /// Whether it takes rows that cannot leave.
-    is_held: bool,
+    pub(super) is_held: bool,
 }
 
 impl Health {
     /// What was taken can leave, or cannot.
-    fn look(
-        &mut self,
-        name: &str,
-        events: &Sender<ServiceEvent>,
-        state: Result<(), ConnectorError>,
-    ) {
+    fn look(&mut self, state: Result<(), ConnectorError>) {
         let is_held = state.is_err();
         if std::mem::take(&mut self.is_held) || is_held {
-            self.report(name, events, state);
+            self.report(state);
             self.is_held = is_held;
         }
     }
 
     /// Reports the first failure, and the first success after one. That a row was taken is no news where none can leave.
-    fn report(
-        &mut self,
-        name: &str,
-        events: &Sender<ServiceEvent>,
-        done: Result<(), ConnectorError>,
-    ) {
-        let sink = name.to_owned();
+    fn report(&mut self, done: Result<(), ConnectorError>) {
+        let sink = self.sink.clone();
         let event = match (done, self.has_failed) {
             (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
             (Ok(()), true) if !self.is_held => ServiceEvent::SinkBack { sink },
             _ => return,
         };
         self.has_failed = !self.has_failed;
-        let _ = events.send(event);
+        let _ = self.events.send(event);
     }
 }
 

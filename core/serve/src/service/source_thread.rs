@@ -38,9 +38,15 @@ impl SourceThread {
             run.withdraw();
             let ran = catch_unwind(AssertUnwindSafe(|| inlet.run(&mut out, &either)));
             let error = match ran {
-                Ok(_) if run.is_asked() && !stop.is_asked() => ConnectorError::new(format_args!(
-                    "connected, and silent for {silent}: the connection is dropped and made anew"
-                )),
+                Ok(ended) if run.is_asked() && !stop.is_asked() => {
+                    let more = ended.map_or_else(
+                        |error| format!("; it ended with: {error}"),
+                        |()| String::new(),
+                    );
+                    ConnectorError::new(format_args!(
+                        "connected, and silent for {silent}: the connection is dropped and made anew{more}"
+                    ))
+                }
                 Ok(Ok(())) => {
                     if !stop.is_asked() {
                         let source = name.clone();

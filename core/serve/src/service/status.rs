@@ -32,9 +32,7 @@ impl Shared {
             }),
         }
     }
-}
 
-impl Shared {
     /// What was published last.
     pub(super) fn read(&self) -> Snapshot {
         let snapshot = self.snapshot.lock();

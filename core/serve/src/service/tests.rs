@@ -1,6 +1,7 @@
 //! The engine thread as a whole.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 
 use athermal_run::live::{LiveOptions, pair};
@@ -17,12 +18,36 @@ use crate::tests::{Folder, feed, model, rules};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 
-/// How often memory is asked for by an engine thread that is given so many rows and then the end, and how many rows come out.
-fn allocations(rows: usize) -> (u64, u64) {
+/// What an engine thread does that is given so many rows and then the end.
+struct Work {
+    /// How often it asks for memory, and how often it waits.
+    allocations: u64,
+    waits: u64,
+    /// How many rows come out.
+    rows: u64,
+}
+
+/// How often this thread has given the processor away to wait for something.
+fn waits() -> u64 {
+    let status = std::fs::read_to_string("/proc/thread-self/status").unwrap();
+    let count = |line: &str| {
+        line.strip_prefix("voluntary_ctxt_switches:")?
+            .trim()
+            .parse()
+            .ok()
+    };
+    status.lines().find_map(count).unwrap()
+}
+
+fn work(rows: usize) -> Work {
     let (model, folder) = (model(), Folder::new());
     let timeline = Timeline::new(3, 1, 0);
     let begin = Begin::new(feed(&model), String::new(), (0, 0), false, &timeline);
-    let recorder = Recorder::start(&folder.0, begin, JournalOptions::default()).unwrap();
+    let options = JournalOptions {
+        queue: 8 * rows,
+        ..JournalOptions::default()
+    };
+    let recorder = Recorder::start(&folder.0, begin, options).unwrap();
     let progress = Arc::clone(recorder.progress());
     let clock = MonotonicClock::start();
     let rules = Rules {
@@ -67,12 +92,13 @@ fn allocations(rows: usize) -> (u64, u64) {
         .iter()
         .map(|of| of.name.clone())
         .collect();
-    let (sender, mut receiver) = frames(rows + 8, columns.len(), &counts);
+    let (sender, mut receiver) = frames(rows + 8, columns.len(), true, &counts);
     let (_orders, orders) = RingBuffer::new(8);
     let (remarks, _remarks) = RingBuffer::new(8);
     let (events, _events) = channel();
     let mut sinks = Sinks::default();
     sinks.add(sender, columns, std::thread::current());
+    let shared = Arc::new(Shared::new(3));
     let thread = EngineThread {
         worker: Worker::new(sequencer, stepper, recorder),
         clock,
@@ -80,24 +106,50 @@ fn allocations(rows: usize) -> (u64, u64) {
         sinks,
         orders,
         remarks,
-        shared: Arc::new(Shared::new(3)),
+        shared: Arc::clone(&shared),
         events,
     };
+    // Somebody asks for its status all the time.
+    let is_over = Arc::new(AtomicBool::new(false));
+    let over = Arc::clone(&is_over);
+    let reader = std::thread::spawn(move || {
+        while !over.load(Ordering::Relaxed) {
+            std::hint::black_box(shared.read());
+        }
+    });
     let mut left = None;
+    let before = waits();
     let counted = allocation_counter::measure(|| left = Some(thread.run()));
+    let waits = waits() - before;
+    is_over.store(true, Ordering::Relaxed);
+    reader.join().unwrap();
     control.pump();
     drop(left);
     let mut came = 0;
     while receiver.take() {
         came += 1;
     }
-    (counted.count_total, came)
+    Work {
+        allocations: counted.count_total,
+        waits,
+        rows: came,
+    }
 }
 
 #[test]
 fn the_engine_thread_asks_for_no_memory_however_long_it_runs() {
-    let (few, some) = (allocations(1_000), allocations(3_000));
-    assert_eq!((few.1, some.1), (1_000, 3_000));
+    let (few, some) = (work(1_000), work(3_000));
+    assert_eq!((few.rows, some.rows), (1_000, 3_000));
     // What it asks for is for the start and the end.
-    assert_eq!(few.0, some.0);
+    assert_eq!(few.allocations, some.allocations);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_engine_thread_waits_for_nobody_in_a_burst_of_rows_while_its_status_is_read() {
+    let burst = work(10_000);
+    assert_eq!(burst.rows, 10_000);
+    println!("10,000 rows, {} waits", burst.waits);
+    // A page that is not there yet may cost one; a lock, a write or a sleep would be one for each row.
+    assert!(burst.waits <= 10, "{}", burst.waits);
 }

@@ -196,6 +196,48 @@ fn a_flipped_bit_in_the_last_file_is_refused_where_it_was_synced_and_cut_off_els
 }
 
 #[test]
+fn after_a_clean_end_a_flipped_bit_is_refused_wherever_it_is() {
+    let (model, folder) = (model(), Folder::new());
+    let options = JournalOptions {
+        file: 1 << 20,
+        ..unsynced()
+    };
+    let mut line = Line::begin(&model, &folder.0, options);
+    run(&mut line, 1, 300);
+    line.recorder.finish();
+    let path = fs::read_dir(&folder.0)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let journal = Journal {
+        records: line.records,
+        folder,
+        files: vec![path.clone()],
+    };
+    assert!(matches!(look(&journal), Found::Read(all, None) if all == journal.records.len()));
+    let bytes = fs::read(&path).unwrap();
+    // What stands last says that all before is synced.
+    let records = bytes.len() - 17;
+    let mut prng = Prng::stream(14, "serve");
+    for nth in 0..200 {
+        let mut flipped = bytes.clone();
+        let place = match nth {
+            // The last record.
+            0..17 => records - 1 - nth,
+            _ => (prng.uniform() * records as f64) as usize,
+        };
+        flipped[place] ^= 1 << (nth % 8);
+        fs::write(&path, &flipped).unwrap();
+        assert!(
+            matches!(look(&journal), Found::Refused(_)),
+            "byte {place} of {records}"
+        );
+    }
+}
+
+#[test]
 fn a_missing_file_is_named() {
     let journal = killed(10, small());
     fs::remove_file(&journal.files[1]).unwrap();
@@ -217,7 +259,9 @@ fn a_truncated_file_before_another_is_refused() {
     let bytes = fs::read(&journal.files[1]).unwrap();
     // Between two records: each by itself is right.
     let mut refused = 0;
-    for length in (bytes.len() - 200)..bytes.len() {
+    // Behind the last record stands that all is synced.
+    let records = bytes.len() - 17;
+    for length in (records - 200)..records {
         fs::write(&journal.files[1], &bytes[..length]).unwrap();
         refused += usize::from(matches!(look(&journal), Found::Refused(_)));
     }

@@ -209,6 +209,24 @@ pub(crate) fn run(line: &mut Line, seed: u64, samples: u64) {
     }
 }
 
+/// What a kill leaves of a folder.
+pub(super) fn copy_tree(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let to = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_tree(&entry.path(), &to);
+        } else {
+            // What was to become a file may have its name by now, and an old one may be gone.
+            match std::fs::copy(entry.path(), to) {
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                copied => drop(copied.unwrap()),
+            }
+        }
+    }
+}
+
 /// All records of a folder.
 pub(crate) fn read(folder: &Path) -> (Log, Vec<Record>) {
     let mut log = Log::open(folder).unwrap();

@@ -115,36 +115,17 @@ impl Service {
     }
 
     /// What a kill leaves: all that was written, and nothing else.
-    fn kill(self, path: &Path) -> (Folder, Outputs) {
+    fn kill(mut self, path: &Path) -> (Folder, Outputs) {
         let recorder = self.worker.recorder();
         assert!(
             recorder
                 .progress()
                 .wait_written(recorder.event(), Wait::from_secs(20))
         );
-        while self.keeper.is_saving() {
-            std::thread::sleep(Wait::from_millis(1));
-        }
+        self.keeper.saving.wait(Wait::from_secs(20));
         let copy = Folder::new();
         copy_tree(path, &copy.0);
         (copy, self.outputs)
-    }
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let to = to.join(entry.file_name());
-        if entry.file_type().unwrap().is_dir() {
-            copy_tree(&entry.path(), &to);
-        } else {
-            // What was to become a file may have its name by now; there is nothing in it yet.
-            match fs::copy(entry.path(), to) {
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-                copied => drop(copied.unwrap()),
-            }
-        }
     }
 }
 

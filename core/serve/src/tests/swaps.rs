@@ -1,11 +1,11 @@
 //! Graphs that take over in a running service, and what a replay makes of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::prng::Prng;
@@ -13,7 +13,7 @@ use athermal_run::model::Model;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Folder, GRAPH};
+use super::{Folder, GRAPH, copy_tree};
 use crate::companion::{Beside, Companion};
 use crate::compile::Wanted;
 use crate::connector::{
@@ -25,7 +25,7 @@ use crate::diagnostic::{Diagnostics, Sources};
 use crate::folder::StatePaths;
 use crate::journal::{Entry, Log, Record};
 use crate::recovery::Recovered;
-use crate::service::{NoAnswer, Service, ServiceEvent, ServiceOptions};
+use crate::service::{NoAnswer, Service, ServiceError, ServiceEvent, ServiceOptions};
 use crate::time::{Duration, Instant};
 
 /// A row each millisecond, with stamps 100 ms apart.
@@ -92,6 +92,73 @@ impl Outlet for LinesOut {
     }
 }
 
+/// The same, and slow.
+#[derive(Debug, Deserialize, JsonSchema)]
+struct SlowLines {}
+
+crate::register_sink!(SlowLines, "slow_lines");
+
+impl Sink for SlowLines {
+    fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError> {
+        Lines {}
+            .open(wiring)
+            .map(|lines| Box::new(Slow(lines, 0)) as _)
+    }
+}
+
+struct Slow(Box<dyn Outlet>, u32);
+
+impl Outlet for Slow {
+    fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError> {
+        self.1 += 1;
+        // Now and then it fails, too.
+        if self.1.is_multiple_of(10_007) {
+            return Err(ConnectorError::new("not now"));
+        }
+        if self.1.is_multiple_of(20) {
+            std::thread::sleep(Wait::from_millis(1));
+        }
+        self.0.put(row)
+    }
+}
+
+/// Rows as fast as they are taken, and then the end.
+#[derive(Debug, Deserialize, JsonSchema)]
+struct Burst {
+    rows: i64,
+}
+
+crate::register_source!(Burst, "burst");
+
+impl Source for Burst {
+    fn stamps(&self) -> Stamps {
+        Stamps::Order
+    }
+
+    fn ends(&self) -> bool {
+        true
+    }
+
+    fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
+        Ok(Box::new(Bursting(self.rows, wiring.channels.len())))
+    }
+}
+
+struct Bursting(i64, usize);
+
+impl Inlet for Bursting {
+    fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
+        out.connected();
+        for nth in 1..=self.0 {
+            let values = vec![(nth % 7) as f64; self.1];
+            if !out.row(stamp(nth), &values, stop) {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The outputs of an engine as the sink has them: by the columns of the graph that the machine file gave.
 fn columns(engine: &crate::engine::Engine) -> Vec<f64> {
     static GIVEN: std::sync::OnceLock<Model> = std::sync::OnceLock::new();
@@ -113,8 +180,8 @@ fn line(at: Instant, revision: u64, outputs: &[f64]) -> String {
     format!("{nth} {revision:016x} {}\n", bits.join(" "))
 }
 
-/// Whether the companion of the tests runs.
-static RUNS: AtomicBool = AtomicBool::new(false);
+/// The state folders beside whose services the companion of the tests is lit.
+static LIT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// What runs beside the services of the tests.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -122,22 +189,29 @@ static RUNS: AtomicBool = AtomicBool::new(false);
 struct Beacon {
     /// Whether it does anything.
     lit: bool,
+    /// Whether it does not start.
+    broken: bool,
 }
 
 crate::register_companion!(Beacon, "page");
 
 impl Companion for Beacon {
-    fn start(&self, _beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
-        RUNS.store(self.lit, Ordering::SeqCst);
-        Ok(Box::new(Lit))
+    fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
+        if self.broken {
+            return Err(ConnectorError::new("it is broken"));
+        }
+        if self.lit {
+            LIT.lock().unwrap().insert(beside.state.clone());
+        }
+        Ok(Box::new(Lit(beside.state.clone())))
     }
 }
 
-struct Lit;
+struct Lit(PathBuf);
 
 impl Drop for Lit {
     fn drop(&mut self) {
-        RUNS.store(false, Ordering::SeqCst);
+        LIT.lock().unwrap().remove(&self.0);
     }
 }
 
@@ -173,13 +247,17 @@ impl Bench {
     }
 
     fn start(&self, graph: &str) -> Service {
+        self.try_start(graph).unwrap()
+    }
+
+    fn try_start(&self, graph: &str) -> Result<Service, ServiceError> {
         let (model, deployment, mistakes) = self.read(graph);
         let deployment = deployment.unwrap_or_else(|| panic!("{mistakes}"));
         let options = ServiceOptions {
             machine: self.path("machine.toml"),
             ..ServiceOptions::new(self.path("state"))
         };
-        Service::start(&model, deployment, &options).unwrap().0
+        Service::start(&model, deployment, &options).map(|(service, _)| service)
     }
 
     fn model(&self, graph: &str) -> Model {
@@ -224,7 +302,7 @@ impl Bench {
             let (nth, rest) = line.trim_end().split_once(' ').unwrap();
             again.insert(nth.parse().unwrap(), rest.to_owned());
         };
-        let found = Recovered::replay(&StatePaths::new(&copy.0), &mut look).unwrap();
+        let found = Recovered::replay(&StatePaths::new(&copy.0), 0, &mut look).unwrap();
         assert_eq!(found.unwrap().report.difference, None);
         let out = self.out();
         let both = again.iter().filter(|(nth, _)| out.contains_key(nth));
@@ -232,20 +310,6 @@ impl Bench {
             assert_eq!(out[nth], *bits, "tick {nth}");
         }
         both.count()
-    }
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            copy_tree(&path, &target);
-        } else {
-            // A checkpoint may be renamed or removed meanwhile.
-            let _ = fs::copy(path, target);
-        }
     }
 }
 
@@ -444,9 +508,10 @@ fn a_companion_runs_as_long_as_its_service_and_its_section_is_checked() {
     let sections = format!("{MACHINE}[page]\nlit = true\n");
     bench.sections = sections.leak();
     let service = bench.start(GRAPH);
-    assert!(RUNS.load(Ordering::SeqCst));
+    let is_lit = || LIT.lock().unwrap().contains(&bench.path("state"));
+    assert!(is_lit());
     service.stop().unwrap();
-    assert!(!RUNS.load(Ordering::SeqCst));
+    assert!(!is_lit());
     let sections = format!("{MACHINE}[page]\nlid = 3\n");
     bench.sections = sections.leak();
     let (_, deployment, mistakes) = bench.read(GRAPH);
@@ -455,4 +520,80 @@ fn a_companion_runs_as_long_as_its_service_and_its_section_is_checked() {
         mistakes.contains("lid = 3") && mistakes.contains("lit"),
         "{mistakes}"
     );
+}
+
+#[test]
+fn a_companion_that_does_not_start_ends_the_service() {
+    let mut bench = Bench::new();
+    let sections = format!("{MACHINE}[page]\nbroken = true\n");
+    bench.sections = sections.leak();
+    let error = bench.try_start(GRAPH).unwrap_err();
+    assert!(error.to_string().contains("it is broken"), "{error}");
+    let before = bench.out();
+    std::thread::sleep(Wait::from_millis(100));
+    assert_eq!(bench.out(), before, "nothing goes on");
+    bench.sections = MACHINE;
+    let mut service = bench.start(GRAPH);
+    bench.more(&mut service, 20);
+    service.stop().unwrap();
+    assert!(bench.out().keys().copied().eq(1..=bench.out().len() as i64));
+}
+
+#[test]
+fn what_is_asked_for_while_a_graph_is_on_its_way_is_refused_and_a_replay_has_the_same_bits() {
+    let bench = Bench::new();
+    let mut service = bench.start(GRAPH);
+    bench.more(&mut service, 100);
+    let (one, other) = (bench.model(&other_windows()), bench.model(GRAPH));
+    let mut refused = 0;
+    for nth in 0..20 {
+        let next = if nth % 2 == 0 { &one } else { &other };
+        service.stage(next, "it").unwrap();
+        bench.more(&mut service, 5);
+        service.commit("it").unwrap();
+        // Unless the graph has taken over by now.
+        refused += usize::from(service.rollback("it").is_err());
+        bench.more(&mut service, 20);
+    }
+    assert!(refused > 5, "{refused}");
+    service.stop().unwrap();
+    assert!(bench.check_replay() > 500);
+}
+
+/// Rows that come as fast as they are taken, to a slow sink.
+const FLOOD: &str = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\ncheckpoint = \"50 ms\"\n\
+                     [sources.in]\ntype = \"burst\"\nrows = 50000\n[sinks.out]\ntype = \"slow_lines\"\n";
+
+#[test]
+fn a_slow_sink_has_every_row_of_a_flood_once_and_the_engine_does_not_wait_for_it() {
+    let mut bench = Bench::new();
+    bench.sections = FLOOD;
+    let mut service = bench.start(GRAPH);
+    let (began, mut most) = (Clock::now(), 0);
+    while !service.is_over() {
+        service.pump();
+        most = most.max(
+            service
+                .snapshot()
+                .happenings
+                .saturating_sub(bench.out().len() as u64),
+        );
+        assert!(
+            began.elapsed() < Wait::from_secs(120),
+            "{}",
+            bench.out().len()
+        );
+        std::thread::sleep(Wait::from_millis(100));
+    }
+    let counts = Arc::clone(&service.sinks()[0].1);
+    let (ended, _) = service.stop().unwrap();
+    assert_eq!((ended.happenings, ended.journal.lost), (50_000, 0));
+    assert_eq!(counts.dropped.load(Ordering::Relaxed), 0);
+    let written = fs::read_to_string(bench.path("out")).unwrap();
+    let numbers = written
+        .lines()
+        .map(|line| line.split_once(' ').unwrap().0.parse::<i64>().unwrap());
+    assert!(numbers.eq(1..=50_000), "each once, in order");
+    assert!(most > 20_000, "the sink was never far behind: {most}");
+    assert_eq!(bench.check_replay(), 50_000);
 }

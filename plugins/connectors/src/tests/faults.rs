@@ -80,9 +80,7 @@ fn silences(bus: &str) -> (Folder, Vec<String>, u64) {
         _ => None,
     });
     let failed = failed.collect();
-    let silences = counts.silences.load(Ordering::Relaxed);
-    assert_eq!(counts.restarts.load(Ordering::Relaxed), silences);
-    (folder, failed, silences)
+    (folder, failed, counts.restarts.load(Ordering::Relaxed))
 }
 
 #[test]
