@@ -37,3 +37,23 @@ impl BackOff {
         pause
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_double_up_to_half_a_minute_and_begin_anew_after_a_good_run() {
+        let mut back_off = BackOff::default();
+        let mut is_about = |lasted: f64, about: f64| {
+            let pause = back_off.after(Duration::from_secs_f64(lasted));
+            let share = pause.as_secs_f64() / about;
+            assert!((0.8..=1.2).contains(&share), "{pause:?} is not {about} s");
+        };
+        for about in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0] {
+            is_about(29.0, about);
+        }
+        is_about(30.0, 0.5);
+        is_about(0.0, 1.0);
+    }
+}

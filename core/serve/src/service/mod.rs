@@ -478,11 +478,12 @@ impl Service {
             events.extend(self.pump());
             std::thread::sleep(Wait::from_millis(2));
         }
+        // What came last, where the engine ended before anybody looked.
+        events.extend(self.pump());
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
         if let Some(Ok(worker)) = worker {
-            let (_, _, recorder) = worker.into_parts();
-            recorder.finish();
+            worker.into_parts().2.finish();
         } else {
             has_failed = true;
         }
