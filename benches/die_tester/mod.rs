@@ -25,7 +25,7 @@ pub fn graph() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/die-tester.toml")
 }
 
-const MACHINE: &dyn Machine = &athermal_simulation::DieTester;
+const MACHINE: &dyn Machine = athermal_simulation::MACHINES[0];
 
 fn simulation(days: f64, seed: u64) -> Box<dyn Simulation> {
     let setup = Setup {

@@ -10,10 +10,10 @@ use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal::trial::fault::FaultSpec;
 use athermal::trial::machine::{
-    ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
-    machine, machines,
+    ClosedLoop, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation, machine,
+    machines,
 };
-use athermal_simulation::{table_columns, write_set_points, write_table};
+use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_points, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -78,6 +78,12 @@ pub struct Simulate {
     /// A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…]
     #[arg(long = "fault", value_name = "SPEC", requires = "machine")]
     faults: Vec<FaultSpec>,
+    /// The world changes: `door,from=8h,for=3h,size=3`, `lamp,size=0.6 mK/s` or `loose=SENSOR,size=0.5`
+    ///
+    /// While a door stands open, the air couples to all bodies so many times as strongly. A lamp heats all of a stage. A loose sensor reads
+    /// so much of the room instead of its body.
+    #[arg(long = "disturb", value_name = "SPEC", requires = "machine")]
+    disturbances: Vec<Disturbance>,
 }
 
 impl Simulate {
@@ -90,9 +96,8 @@ impl Simulate {
             list(terminal);
             return Ok(Answer::Fine);
         };
-        let known = machine(name).map_err(|error| {
-            Failure::Request(format!("{error} (`athermal simulate` lists them all)"))
-        })?;
+        let known = machine(name)
+            .map_err(|error| refused(format!("{error} (`athermal simulate` lists them all)")))?;
         if self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::Request(format!(
                 "a recording is long; name a file for it: athermal simulate {name} -o {name}.csv"
@@ -128,12 +133,10 @@ impl Simulate {
             });
             println!("{facts:#}");
         } else {
+            let (rows, days) = (counted(rows, "row"), counted(self.days, "day"));
+            let (file, seed) = (output.display(), self.seed);
             terminal.note(format_args!(
-                "wrote {}: {}, {} of `{name}`, seed {}",
-                output.display(),
-                counted(rows, "row"),
-                counted(self.days, "day"),
-                self.seed
+                "wrote {file}: {rows}, {days} of `{name}`, seed {seed}"
             ));
         }
         Ok(Answer::Fine)
@@ -146,6 +149,8 @@ impl Simulate {
         terminal: &Terminal,
     ) -> Result<u64, Failure> {
         let setup = self.setup(machine)?;
+        let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
+        let machine = disturbed.as_deref().unwrap_or(machine);
         let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
         match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
@@ -271,7 +276,7 @@ fn take(row: &Row, truth: bool, values: &mut Vec<f64>) {
     values.extend(row.true_drift.iter().filter(|_| truth));
 }
 
-fn refused(error: MachineError) -> Failure {
+fn refused(error: impl ToString) -> Failure {
     Failure::Request(error.to_string())
 }
 

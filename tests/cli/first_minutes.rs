@@ -155,6 +155,24 @@ fn a_schedule_and_a_fault_change_a_simulation() {
 }
 
 #[test]
+fn a_disturbance_changes_a_simulation_while_it_lasts() {
+    let folder = Folder::new("disturbed");
+    let asked = ["simulate", "die-tester", "--days", "0.05", "-o", "-"];
+    let loose = ["--disturb", "loose=chuck,from=20min,for=10min,size=0.5"];
+    let (sound, _) = folder.fine(&asked);
+    let (text, _) = folder.fine(&[&asked[..], &loose].concat());
+    let others = sound.lines().zip(text.lines()).enumerate();
+    let others = others.filter(|(_, (sound, loose))| sound != loose);
+    let lines: Vec<usize> = others.map(|(line, _)| line).collect();
+    // A line of names, then rows 10 s apart.
+    assert_eq!(lines, (121..181).collect::<Vec<_>>());
+    let told = folder.refused(&[&asked[..], &["--disturb", "door,size=99"]].concat());
+    assert!(told.contains("`door,size=3`"), "{told}");
+    let told = folder.refused(&[&asked[..], &["--disturb", "loose=room,size=0.5"]].concat());
+    assert!(told.contains("these can come loose: plate1"), "{told}");
+}
+
+#[test]
 fn what_cannot_be_simulated_is_refused_with_the_next_step() {
     let folder = Folder::new("refused");
     let told = folder.refused(&["simulate", "die-teser", "-o", "-"]);

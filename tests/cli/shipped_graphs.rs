@@ -19,7 +19,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ),
         (
             "athermal-control",
-            "compensate cross_check health optical_loss safe_state settled stability uncorrected",
+            "compensate cross_check health optical_loss remeasure safe_state settled stability uncorrected",
         ),
         (
             "athermal-estimators",

@@ -369,6 +369,7 @@ fn reference_intervals_of_90_percent_hold_85_to_95_on_undisturbed_days_and_80_wh
 
 /// The virtual sensor as it was before it knew what it does not know.
 const UNAWARE: &str = r#"
+predicted = "believing"
 [nodes]
 trusted = false
 gradients.inputs.signal = "temperature"
@@ -376,6 +377,10 @@ masses.inputs.signal = "temperature"
 aligned.inputs.signal = ["temperature", "masses"]
 expansion.outside = "pass"
 creeping.outside = "pass"
+[nodes.believing]
+type = "fallback"
+each = "axis"
+inputs.voters = ["creeping.{axis}", "plain.{axis}"]
 "#;
 
 /// The numbers in a text.

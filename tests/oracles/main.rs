@@ -15,6 +15,7 @@ mod in_sample;
 mod missing_truths;
 mod novelty;
 mod planned;
+mod random_worlds;
 mod redundancy;
 mod reference_figures;
 mod scores_by_hand;

@@ -9,7 +9,7 @@ use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 
 use crate::lower::Rates;
-use crate::{ExportError, Exported, Options, c, export_c, fmu, lower, onnx, state};
+use crate::{ExportError, Exported, Options, c, export_c, fmu, lower, onnx, st, state};
 
 /// What a graph is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -20,6 +20,8 @@ enum Target {
     Fmu,
     /// ONNX, of the linear parts alone
     Onnx,
+    /// Structured Text (IEC 61131-3) with a runtime and a self test
+    St,
 }
 
 /// Write a fitted graph for a controller
@@ -28,7 +30,8 @@ enum Target {
   athermal export c model.json -o c
   athermal export c model.json -o c --rate 1s --rate position=10s --frozen
   athermal export fmu model.json -o fmu
-  athermal export onnx model.json -o onnx")]
+  athermal export onnx model.json -o onnx
+  athermal export st model.json -o st")]
 pub(crate) struct Export {
     /// As what
     target: Target,
@@ -70,6 +73,9 @@ impl Command for Export {
         };
         if self.target == Target::Onnx {
             return self.onnx(&engine, &options);
+        }
+        if self.target == Target::St {
+            return self.st(&engine, &options);
         }
         let exported = export_c(&engine, &options, self.float).map_err(failure)?;
         if self.target == Target::Fmu {
@@ -124,10 +130,27 @@ impl Export {
                 "`{option}` is for `export c`, and {} have no place for it: leave it out, or export to C",
                 match target {
                     Target::Onnx => "ONNX models",
+                    Target::St => "programs in Structured Text",
                     _ => "units for co-simulation",
                 }
             ))),
         }
+    }
+
+    /// Writes Structured Text.
+    fn st(&self, engine: &Engine, options: &Options) -> Result<Answer, Failure> {
+        let exported = st::export(engine, options).map_err(failure)?;
+        c::write(&exported.files, &self.output).map_err(failure)?;
+        let form = &exported.form;
+        println!(
+            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state",
+            self.output.display(),
+            st::block(form),
+            form.sources.len(),
+            form.outputs.len(),
+            st::state_bytes(form),
+        );
+        Ok(Answer::Fine)
     }
 
     /// Writes the linear parts.

@@ -58,6 +58,14 @@ impl Ticks {
         Ok(())
     }
 
+    /// The largest size of an output; 1 where it has none.
+    #[must_use]
+    pub fn size(&self, output: usize) -> f64 {
+        let sizes = self.outputs.iter().map(|row| row[output].abs());
+        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        if largest > 0.0 { largest } else { 1.0 }
+    }
+
     /// How many values came out.
     fn given(&self) -> usize {
         let all = self.outputs.iter().flatten();

@@ -111,6 +111,13 @@ impl Bar {
         }
     }
 
+    /// Heats all cells evenly during the next step, in K/s.
+    pub fn heat_all(&mut self, kelvin_per_s: f64) {
+        for heat in &mut self.heat_w {
+            *heat += self.capacity * kelvin_per_s;
+        }
+    }
+
     /// How much longer the bar is, in nm, than at `reference` °C throughout.
     #[must_use]
     pub fn growth_nm(&self, reference: f64) -> f64 {

@@ -3,6 +3,7 @@
 use crate::bar::{ALUMINIUM, Bar, STAINLESS, STEEL, Shape};
 use crate::chuck::{Chuck, View};
 use crate::creep::Creep;
+use crate::disturbance::World;
 use crate::motors::{Duty, Motors};
 use crate::recorder::{PERIOD_S, Plant, Recorder};
 use crate::room::{Coupling, Room, RoomShape};
@@ -19,7 +20,10 @@ use athermal_trial::machine::{
 /// motors heat the stages during alignment bursts, after which the axes creep. Z follows mostly the holder, X and Y stage and frame.
 ///
 /// By default the chuck goes through the levels of the published settle times, 20, 30 and 50 °C, four hours each.
-pub struct DieTester;
+#[derive(Debug)]
+pub struct DieTester {
+    pub(crate) world: World,
+}
 
 const CHANNELS: [Channel; 12] = [
     Channel::temperature("plate1"),
@@ -77,7 +81,7 @@ impl Machine for DieTester {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
         let own = || self.schedule(setup.seed);
         let schedule = setup.schedule.clone().or_else(own).unwrap_or_default();
-        let bodies = Bodies::settled(&schedule, setup.seed);
+        let bodies = Bodies::settled(self.world.clone(), &schedule, setup.seed);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
     }
 }
@@ -203,7 +207,7 @@ impl Side {
     }
 
     /// One step; gives the heat in W that has flowed into the frame.
-    fn step(&mut self, air: f64, chuck: &Chuck, frame: f64) -> f64 {
+    fn step(&mut self, air: f64, door: f64, chuck: &Chuck, frame: f64) -> f64 {
         let motion = self.motors.step(Bodies::STEP_S);
         let to_stage = HOLDER_TO_STAGE * (self.holder.last() - self.stage.first());
         let to_frame = STAGE_TO_FRAME * (self.stage.last() - frame);
@@ -213,7 +217,7 @@ impl Side {
         self.holder.heat_last(-to_stage);
         self.stage.heat_first(to_stage + to_stage_w);
         self.stage.heat_last(motion.heat_w - to_frame);
-        let coupling = self.coupling.step();
+        let coupling = door * self.coupling.step();
         self.holder.step(Bodies::STEP_S, air, coupling);
         self.stage.step(Bodies::STEP_S, air, coupling);
         for creep in &mut self.creep {
@@ -243,10 +247,12 @@ struct Bodies {
     chuck: Chuck,
     frame: Bar,
     sides: [Side; 2],
+    world: World,
+    time_ns: i64,
 }
 
 impl Bodies {
-    fn settled(schedule: &Schedule, seed: u64) -> Self {
+    fn settled(world: World, schedule: &Schedule, seed: u64) -> Self {
         let [chuck_track, room_track] = [CHUCK, ROOM].map(|what| schedule.track(&what));
         let (chuck, air) = (chuck_track.at(0), room_track.at(0));
         let start_s = -SETTLED_S as f64;
@@ -258,9 +264,12 @@ impl Bodies {
             chuck: Chuck::new(chuck),
             frame: Bar::new(&FRAME, air),
             sides: [0, 1].map(|side| Side::new(&SIDES[side], side + 1, air, seed)),
+            world,
+            time_ns: 0,
         };
         for _ in 0..(SETTLED_S as f64 / Self::STEP_S) as i64 {
-            bodies.step(0);
+            // Nothing changes before the recording begins.
+            bodies.step(-1);
         }
         bodies
     }
@@ -274,14 +283,17 @@ impl Plant for Bodies {
         self.chuck.step(Self::STEP_S, self.chuck_track.at(time_ns));
         // Side 1 stands at one end of the frame, side 2 at the other.
         let ends = [self.frame.first(), self.frame.last()];
+        let (door, lamp) = self.world.couples_and_heats(time_ns);
+        self.time_ns = time_ns;
         let [one, two] = &mut self.sides;
+        one.stage.heat_all(lamp);
         let heat_w = [
-            one.step(self.air, &self.chuck, ends[0]),
-            two.step(self.air, &self.chuck, ends[1]),
+            one.step(self.air, door, &self.chuck, ends[0]),
+            two.step(self.air, door, &self.chuck, ends[1]),
         ];
         self.frame.heat_first(heat_w[0]);
         self.frame.heat_last(heat_w[1]);
-        self.frame.step(Self::STEP_S, self.air, 1.0);
+        self.frame.step(Self::STEP_S, self.air, door);
     }
 
     fn temperatures(&self, into: &mut [f64]) {
@@ -294,6 +306,7 @@ impl Plant for Bodies {
             self.air,
             self.chuck.temperature(),
         ]);
+        self.world.loosen(self.time_ns, self.air, &CHANNELS, into);
     }
 
     fn positions(&self, into: &mut [f64]) {

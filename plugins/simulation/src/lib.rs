@@ -19,6 +19,7 @@ pub mod bar;
 pub mod chuck;
 pub mod creep;
 mod die_tester;
+mod disturbance;
 mod linear_axis;
 pub mod motors;
 pub mod recorder;
@@ -27,13 +28,18 @@ mod table;
 pub mod wander;
 
 pub use die_tester::DieTester;
+pub use disturbance::{Disturbance, DisturbanceError, disturbed};
 pub use linear_axis::LinearAxis;
 pub use table::{table_columns, write_set_points, write_table};
 
 use athermal_trial::machine::Machine;
+use disturbance::World;
 
 /// The machines of this crate, by name.
-pub const MACHINES: [&dyn Machine; 2] = [&DieTester, &LinearAxis];
+pub const MACHINES: [&dyn Machine; 2] = [DIE_TESTER, LINEAR_AXIS];
 
-athermal_trial::register_machine!(DieTester);
-athermal_trial::register_machine!(LinearAxis);
+const DIE_TESTER: &DieTester = &DieTester { world: World::SAME };
+const LINEAR_AXIS: &LinearAxis = &LinearAxis { world: World::SAME };
+
+athermal_trial::register_machine!(*DIE_TESTER);
+athermal_trial::register_machine!(*LINEAR_AXIS);

@@ -2,6 +2,7 @@
 
 use crate::bar::{ALUMINIUM, Bar, STEEL, Shape};
 use crate::creep::Creep;
+use crate::disturbance::World;
 use crate::motors::{Duty, Motors};
 use crate::recorder::{PERIOD_S, Plant, Recorder};
 use crate::room::{Coupling, Room, RoomShape};
@@ -16,7 +17,10 @@ use athermal_trial::machine::{
 /// Three bars, from the tool to the ground: an arm that follows the room within minutes, a slide, and a slow column. `t1` to `t3` are their
 /// temperatures and `t4` the air. The room is the only source of heat but for the motors, which heat the slide during alignment bursts,
 /// after which the axes creep.
-pub struct LinearAxis;
+#[derive(Debug)]
+pub struct LinearAxis {
+    pub(crate) world: World,
+}
 
 const CHANNELS: [Channel; 7] = [
     Channel::temperature("t1"),
@@ -59,7 +63,7 @@ impl Machine for LinearAxis {
             .schedule
             .as_ref()
             .map_or_else(|| Track::constant(ROOM.default), |s| s.track(&ROOM));
-        let bodies = Bodies::settled(room, setup.seed);
+        let bodies = Bodies::settled(self.world.clone(), room, setup.seed);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
     }
 }
@@ -129,10 +133,12 @@ struct Bodies {
     couplings: [Coupling; 3],
     motors: Motors,
     creep: [Creep; 3],
+    world: World,
+    time_ns: i64,
 }
 
 impl Bodies {
-    fn settled(room_track: Track, seed: u64) -> Self {
+    fn settled(world: World, room_track: Track, seed: u64) -> Self {
         let air = room_track.at(0);
         let stream = |label: &str| Prng::stream(seed, label);
         let coupling = |label| Coupling::new(0.18, Self::STEP_S, stream(label));
@@ -150,9 +156,12 @@ impl Bodies {
             couplings: ["coupling arm", "coupling slide", "coupling column"].map(coupling),
             motors: Motors::new(DUTY, stream("motors")),
             creep: std::array::from_fn(creep),
+            world,
+            time_ns: 0,
         };
         for _ in 0..(SETTLED_S as f64 / Self::STEP_S) as i64 {
-            bodies.step(0);
+            // Nothing changes before the recording begins.
+            bodies.step(-1);
         }
         bodies
     }
@@ -170,10 +179,14 @@ impl Plant for Bodies {
         self.slide.heat_first(to_slide + motion.heat_w);
         self.slide.heat_last(-to_column);
         self.column.heat_first(to_column);
+        let (door, lamp) = self.world.couples_and_heats(time_ns);
+        self.time_ns = time_ns;
+        self.slide.heat_all(lamp);
         let [arm, slide, column] = &mut self.couplings;
-        self.arm.step(Self::STEP_S, self.air, arm.step());
-        self.slide.step(Self::STEP_S, self.air, slide.step());
-        self.column.step(Self::STEP_S, self.air, column.step());
+        self.arm.step(Self::STEP_S, self.air, door * arm.step());
+        self.slide.step(Self::STEP_S, self.air, door * slide.step());
+        self.column
+            .step(Self::STEP_S, self.air, door * column.step());
         for creep in &mut self.creep {
             if motion.ended {
                 creep.start();
@@ -189,6 +202,7 @@ impl Plant for Bodies {
             self.column.middle(),
             self.air,
         ]);
+        self.world.loosen(self.time_ns, self.air, &CHANNELS, into);
     }
 
     fn positions(&self, into: &mut [f64]) {

@@ -303,8 +303,14 @@ inputs.loss = "loss"
 inputs.set_point = "temperature.chuck"
 below = "0.5 dB"
 change = "3 K"
+[nodes.again]
+type = "remeasure"
+inputs.std_dev = {{ from = "rate:std_dev", max_age = "1min" }}
+tolerance = "200 nm"
+longest = "1h"
 [outputs]
 side = "side"
+again = "again"
 wait = "wait"
 "#,
             graph("die-tester-compensate")

@@ -101,6 +101,7 @@ mod tests {
             correction: vec![correction],
             set_points: Vec::new(),
             begins,
+            asks: false,
         }
     }
 

@@ -15,6 +15,10 @@ pub fn text(facts: &Facts) -> String {
     }
     if let Some(worth) = &facts.worth {
         departures(&mut text, &worth.departures);
+        if let Some(realignment) = &worth.realignment {
+            text.push('\n');
+            text.push_str(&paragraph("", 0, &realignment.sentence()));
+        }
         for light in worth.lights() {
             loss(
                 &mut text,

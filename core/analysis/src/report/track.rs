@@ -18,7 +18,7 @@ use crate::diagnosis::window::measured_by;
 const INVALID: f64 = 1.0;
 
 /// What the correction was and what it acts on, for working out its worth.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Track {
     pub(super) axes: Vec<TrackAxis>,
     /// Which drifts are recomputed: first that of each axis.
@@ -30,6 +30,10 @@ pub(super) struct Track {
     pub(super) ticks: u64,
     /// Which axes have had a valid prediction: before, there is no correction to be judged.
     begun: Vec<bool>,
+    /// The first node that asks for alignments, and its tolerance.
+    pub(super) remeasures: Option<(String, String)>,
+    /// Whether it has asked since the last row.
+    asks: bool,
 }
 
 /// An axis that is corrected.
@@ -85,6 +89,8 @@ pub(super) struct TrackRow {
     pub(super) set_points: Vec<f64>,
     /// Whether another segment begins here.
     pub(super) begins: bool,
+    /// Whether an alignment has been asked for since the row before.
+    pub(super) asks: bool,
 }
 
 /// What a graph has and a report cannot judge.
@@ -105,6 +111,8 @@ pub(super) struct Places {
     /// From the unit of each correction to that of its position.
     factors: Vec<f64>,
     set_points: Vec<Option<usize>>,
+    /// Where alignments are asked for.
+    asks: Option<usize>,
 }
 
 fn of_kind<'a>(plan: &'a Plan, kind: &'static str) -> impl Iterator<Item = &'a PlannedNode> {
@@ -161,16 +169,9 @@ pub(super) fn places(plan: &Plan) -> (Places, Track, Vec<Unjudged>) {
             why: Vec::new(),
             factors: Vec::new(),
             set_points: Vec::new(),
+            asks: None,
         },
-        track: Track {
-            axes: Vec::new(),
-            drifts: Vec::new(),
-            losses: Vec::new(),
-            positions: Vec::new(),
-            rows: Vec::new(),
-            ticks: 0,
-            begun: Vec::new(),
-        },
+        track: Track::default(),
         unjudged: Vec::new(),
     };
     finder.axes();
@@ -212,6 +213,13 @@ impl Finder<'_> {
             }
         }
         self.track.begun = vec![false; self.track.axes.len()];
+        if let Some(node) = of_kind(plan, "remeasure").next() {
+            let tolerance = node.spec.parameters()["tolerance"]
+                .as_str()
+                .map(str::to_owned);
+            self.track.remeasures = tolerance.map(|tolerance| (node.instance(), tolerance));
+            self.places.asks = node.port("ask").map(|slots| slots.start);
+        }
     }
 
     /// Takes an axis, if drift can be recomputed from its corrected position.
@@ -392,6 +400,7 @@ impl Finder<'_> {
 impl Track {
     pub(super) fn look(&mut self, places: &Places, engine: &Engine, now: Instant, begins: bool) {
         self.ticks += 1;
+        self.asks |= places.asks.is_some_and(|slot| engine.value(slot) == 1.0);
         for (axis, &why) in self.axes.iter_mut().zip(&places.why) {
             if let Some(by) = held_back_by(engine.value(why)) {
                 *axis.held_back.entry(by).or_default() += 1;
@@ -434,6 +443,7 @@ impl Track {
             correction: correction.collect(),
             set_points,
             begins: false,
+            asks: std::mem::take(&mut self.asks),
         });
     }
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::change::Changes;
 use super::departure::{Departure, departures};
 use super::light::Light;
+use super::realignment::{Realignment, realignment};
 use super::recomputed::Recomputed;
 use super::track::{Track, TrackAxis, Unjudged};
 use super::{Axis, ReportError, Series};
@@ -30,6 +31,8 @@ pub struct Worth {
     pub correction_units: Vec<String>,
     /// How far each axis departs from where it was, and what held its correction back.
     pub departures: Vec<Departure>,
+    /// How often it must be aligned anew, where a `remeasure` node asks for it.
+    pub realignment: Option<Realignment>,
     /// What it does for the light of the first `optical_loss` node.
     #[serde(flatten)]
     pub light: Light,
@@ -53,6 +56,7 @@ impl Worth {
             correction: empty(),
             correction_units: track.positions[..track.axes.len()].to_vec(),
             departures: departures(track),
+            realignment: realignment(track),
             light: Light::before(losses.next()),
             others: losses.map(|loss| Light::before(Some(loss))).collect(),
         }
@@ -74,9 +78,9 @@ impl Worth {
     #[must_use]
     pub fn headlines(&self) -> Vec<String> {
         let several = !self.others.is_empty();
-        self.lights()
-            .filter_map(|light| light.headline(several))
-            .collect()
+        let lights = self.lights().filter_map(|light| light.headline(several));
+        let realignment = self.realignment.as_ref().map(Realignment::sentence);
+        lights.chain(realignment).collect()
     }
 }
 

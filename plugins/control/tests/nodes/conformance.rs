@@ -1,7 +1,8 @@
 //! Every kind of this crate through the rules that every node keeps.
 
 use athermal_control::{
-    Compensate, CrossCheck, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
+    Compensate, CrossCheck, Health, OpticalLoss, Remeasure, SafeState, Settled, Stability,
+    Uncorrected,
 };
 use athermal_testkit::conformance;
 use athermal_testkit::{Case, Rule, assert_every_kind_conforms};
@@ -115,6 +116,41 @@ conformance!(
         "#
     )
     .input("drift", 3, "nm/min"),
+);
+
+/// Why the past of a request is not asked for.
+const IS_SUMMED_UP: &str =
+    "what is uncertain sums up since the last measurement, whenever that was";
+
+conformance!(
+    Remeasure,
+    Case::new(
+        r#"
+        tolerance = "20 nm"
+        lead = "2min"
+        longest = "1h"
+        "#
+    )
+    .input("std_dev", 2, "nm/min")
+    .between("std_dev", 0.5, 8.0)
+    .speaks_without_input(&["ask", "due", "why"])
+    .except(Rule::Past, IS_SUMMED_UP)
+    .except(Rule::Memory, IS_SUMMED_UP),
+    Case::new(
+        r#"
+        tolerance = "0.1 um"
+        least = "20s"
+        longest = "10min"
+        memory = "2min"
+        sigmas = 3.0
+        "#
+    )
+    .input("std_dev", 2, "nm/min")
+    .between("std_dev", 0.5, 20.0)
+    .input("measured", 1, "nm")
+    .speaks_without_input(&["ask", "due", "why"])
+    .except(Rule::Past, IS_SUMMED_UP)
+    .except(Rule::Memory, IS_SUMMED_UP),
 );
 
 conformance!(

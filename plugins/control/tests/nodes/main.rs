@@ -7,6 +7,7 @@ mod conformance;
 mod health;
 mod loss_and_settling;
 mod machine;
+mod remeasure;
 mod safe_state;
 mod stability;
 mod uncorrected;

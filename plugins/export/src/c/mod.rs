@@ -331,11 +331,6 @@ fn source(form: &Form, ticks: &Ticks) -> String {
 
 fn self_test(form: &Form, ticks: &Ticks, text: &mut String) {
     let (name, upper) = (&form.name, form.name.to_uppercase());
-    let largest = |nth: usize| {
-        let sizes = ticks.outputs.iter().map(|row| row[nth].abs());
-        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
-        if largest > 0.0 { largest } else { 1.0 }
-    };
     text.push_str("/* The self test: instants, samples, the bits of what the engine gave, and the largest size of each output. */\n");
     let _ = writeln!(text, "static const int64_t test_times[{upper}_TICKS] = {{");
     for time in &ticks.times {
@@ -361,7 +356,7 @@ fn self_test(form: &Form, ticks: &Ticks, text: &mut String) {
         let _ = writeln!(text, "    {{ {} }},", row.join(", "));
     }
     let largest: Vec<String> = (0..form.outputs.len())
-        .map(|nth| tables::hex(largest(nth)))
+        .map(|nth| tables::hex(ticks.size(nth)))
         .collect();
     let _ = write!(
         text,

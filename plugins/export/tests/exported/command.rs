@@ -137,3 +137,21 @@ fn onnx_and_units_for_co_simulation_take_no_state_and_no_single_precision() {
         assert!(folder.join(written).exists());
     }
 }
+
+#[test]
+fn structured_text_is_written_with_its_runtime_and_takes_no_state() {
+    let scratch = Scratch::new("command-st");
+    let (path, folder) = (scratch.path("model.json"), scratch.path("out"));
+    model(&path);
+    let first = ["st", path.to_str().unwrap(), "-o", folder.to_str().unwrap()];
+    let error = export(&[&first[..], &["--state", "a"]].concat()).unwrap_err();
+    assert!(
+        error.contains("programs in Structured Text have no place for it"),
+        "{error}"
+    );
+    assert!(!folder.exists());
+    export(&[&first[..], &["--rate", "10s"]].concat()).unwrap();
+    for file in ["athermal_rt.st", "random_graph.st"] {
+        assert!(folder.join(file).exists(), "{file}");
+    }
+}

@@ -10,4 +10,5 @@ mod processors;
 mod random;
 mod refusals;
 mod shipped;
+mod st;
 mod support;

@@ -418,7 +418,7 @@ pub fn events(random: &mut Prng, plan: &Plan, ticks: usize) -> Vec<Event> {
     events
 }
 
-fn options() -> Options {
+pub fn options() -> Options {
     Options {
         rates: Rates::every(Duration::from_ns(240_000_000)),
         ..Options::default()

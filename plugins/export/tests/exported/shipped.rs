@@ -31,7 +31,7 @@ pub fn shipped(name: &str, rates: Rates) -> (Engine, Exported) {
     (engine, exported)
 }
 
-const GRAPHS: [&str; 4] = [
+pub const GRAPHS: [&str; 4] = [
     "die-tester.toml",
     "die-tester-sensor.toml",
     "die-tester-compensate.toml",

@@ -1,0 +1,120 @@
+//! Writes a lowered plan as Structured Text (IEC 61131-3): the runtime as it is, the tables of the graph, its function block and its self
+//! test. Promised are results within 1e-9 of the largest size of an output, not their bits: compilers may fuse products with sums.
+
+mod tables;
+
+use std::fmt::Write as _;
+
+use athermal_core::engine::Engine;
+
+use crate::c::File;
+use crate::error::ExportError;
+use crate::form::{Form, Port};
+use crate::ticks::{TICKS, Ticks, self_test};
+use crate::{Exported, Options, lower};
+use tables::{list, long, plain, real};
+
+/// The runtime, written by hand.
+pub const RUNTIME: &str = include_str!("../../st/athermal_rt.st");
+
+/// A graph in Structured Text.
+///
+/// # Errors
+/// As [`lower()`].
+pub fn export(engine: &Engine, options: &Options) -> Result<Exported, ExportError> {
+    let form = lower(engine, options)?;
+    let ticks = self_test(engine, &form, options.frozen)?;
+    let file = |path: &str, text: String| File {
+        path: path.to_owned(),
+        text,
+    };
+    let files = vec![
+        file("athermal_rt.st", RUNTIME.to_owned()),
+        file(&format!("{}.st", form.name), source(&form, &ticks)),
+    ];
+    Ok(Exported { form, ticks, files })
+}
+
+/// The name of the function block of a graph.
+#[must_use]
+pub fn block(form: &Form) -> String {
+    match word(&form.name).as_str() {
+        // The self test has this name already, as case does not count.
+        name if name.replace('_', "").eq_ignore_ascii_case("selftest") => {
+            "FB_Graph_SelfTest".to_owned()
+        }
+        name => format!("FB_{name}"),
+    }
+}
+
+/// Bytes of the state on a controller: of each number it is kept whether there is one.
+#[must_use]
+pub fn state_bytes(form: &Form) -> usize {
+    8 * form.layout.ints + 9 * (form.layout.reals + tables::TOTALS)
+}
+
+/// The part of an identifier behind its first: letters, digits and single underscores.
+fn word(name: &str) -> String {
+    let parts = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let parts: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
+    parts.join("_")
+}
+
+/// Constants that name channels, each once.
+fn constants(prefix: &str, ports: &[Port]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for port in ports {
+        let plain = format!("{prefix}_{}", word(&port.name).to_uppercase());
+        let mut name = plain.clone();
+        let mut nth = 2;
+        while names.contains(&name) {
+            name = format!("{plain}_{nth}");
+            nth += 1;
+        }
+        names.push(name);
+    }
+    names
+}
+
+fn source(form: &Form, ticks: &Ticks) -> String {
+    let mut text = format!(
+        "(* The graph `{}`, revision {}, as `athermal export st` wrote it: not to be changed by hand. It goes with athermal_rt.st.\n\n\
+         \x20  Nanoseconds between two ticks at least: {}. Bytes of the state: {}. *)\n\nVAR_GLOBAL CONSTANT\n",
+        plain(&form.title),
+        plain(&form.revision),
+        form.period_ns,
+        state_bytes(form),
+    );
+    text.push_str("    (* The places of channels and outputs. *)\n");
+    for (prefix, ports) in [("IN", &form.sources), ("OUT", &form.outputs)] {
+        for (nth, (name, port)) in constants(prefix, ports).iter().zip(ports).enumerate() {
+            let (own, unit) = (plain(&port.name), plain(&port.unit));
+            let _ = writeln!(text, "    {name} : DINT := {nth}; (* {own}, in {unit} *)");
+        }
+    }
+    tables::write(form, &mut text);
+    test(form, ticks, &mut text);
+    text.push_str("END_VAR\n");
+    text.push_str(&include_str!("blocks.st.in").replace("@block@", &block(form)));
+    text
+}
+
+/// What the self test compares with.
+fn test(form: &Form, ticks: &Ticks, text: &mut String) {
+    text.push_str("\n    (* The self test: instants, samples, what the engine gave, and the largest size of each output. *)\n");
+    let _ = writeln!(text, "    AT_TEST_TICKS : DINT := {TICKS};");
+    list(text, "AT_TEST_TIMES", "LINT", &ticks.times, |&time| {
+        long(time)
+    });
+    let flag = |value: &f64| if value.is_finite() { "TRUE" } else { "FALSE" }.to_owned();
+    for (values, flags, rows) in [
+        ("AT_TEST_IN", "AT_TEST_IS_NEW", &ticks.inputs),
+        ("AT_TEST_OUT", "AT_TEST_HAS", &ticks.outputs),
+    ] {
+        let all: Vec<f64> = rows.iter().flatten().copied().collect();
+        list(text, values, "LREAL", &all, |&value| real(value));
+        list(text, flags, "BOOL", &all, flag);
+    }
+    let sizes: Vec<f64> = (0..form.outputs.len()).map(|nth| ticks.size(nth)).collect();
+    list(text, "AT_TEST_SIZES", "LREAL", &sizes, |&size| real(size));
+}

@@ -1,0 +1,313 @@
+//! The tables of a plan as constants of Structured Text: structures by kind, and the lists of which they hold the first element.
+
+use std::fmt::Write as _;
+
+use crate::form::{Entry, Field, Form, Record, Step};
+
+/// Kinds with their types and tables, in the order of the numbers by which steps name them.
+const KINDS: [(&str, &str, &str); 12] = [
+    ("slope", "AT_Slope", "AT_SLOPES"),
+    ("lag", "AT_Lag", "AT_LAGS"),
+    ("first_order", "AT_FirstOrder", "AT_FIRST_ORDERS"),
+    ("linear", "AT_Linear", "AT_LINEARS"),
+    ("vote", "AT_Vote", "AT_VOTES"),
+    ("compensate", "AT_Compensate", "AT_COMPENSATES"),
+    ("stability", "AT_Stability", "AT_STABILITIES"),
+    ("safe_state", "AT_SafeState", "AT_SAFE_STATES"),
+    ("uncorrected", "AT_Uncorrected", "AT_UNCORRECTEDS"),
+    ("loss", "AT_Loss", "AT_LOSSES"),
+    ("settled", "AT_Settled", "AT_SETTLES"),
+    ("pick", "AT_Pick", "AT_PICKS"),
+];
+
+/// The step that looks whether anything of a gather is new.
+const GATHER: usize = KINDS.len();
+
+/// Fields whose names are keywords or functions in Structured Text.
+const RENAMED: [(&str, &str); 3] = [
+    ("constant", "intercept"),
+    ("limit", "tolerance"),
+    ("floor", "least_weight"),
+];
+
+/// Sums of rows, of which a slope needs three in each of four places, beside what the runtime in C has in its state.
+pub(super) const TOTALS: usize = 12;
+
+/// A number with 17 digits; the largest for what is infinite, and 0 for what is absent.
+pub(super) fn real(value: f64) -> String {
+    if value.is_nan() || value == 0.0 {
+        return "0.0".to_owned();
+    }
+    let written = format!("{:.16E}", value.clamp(f64::MIN, f64::MAX));
+    let (digits, exponent) = written.split_once('E').unwrap_or((&written, "0"));
+    let digits = digits.trim_end_matches('0');
+    let zero = if digits.ends_with('.') { "0" } else { "" };
+    match exponent {
+        "0" => format!("{digits}{zero}"),
+        _ => format!("{digits}{zero}E{exponent}"),
+    }
+}
+
+/// A whole number of 64 bits; the least one cannot be written.
+pub(super) fn long(value: i64) -> String {
+    value.max(-i64::MAX).to_string()
+}
+
+/// Text within a comment.
+pub(super) fn plain(text: &str) -> String {
+    let word = |c: char| match c {
+        c if c.is_ascii_graphic() || c == ' ' => c,
+        _ => '?',
+    };
+    let text: String = text.chars().map(word).collect();
+    text.replace("*)", "* )").replace("(*", "( *")
+}
+
+/// A list as a constant; one element that nobody reads where it is empty.
+pub(super) fn list<T>(
+    text: &mut String,
+    name: &str,
+    kind: &str,
+    values: &[T],
+    written: impl Fn(&T) -> String,
+) {
+    let last = values.len().saturating_sub(1);
+    let _ = write!(text, "    {name} : ARRAY[0..{last}] OF {kind}");
+    let mut line = String::new();
+    for (nth, value) in values.iter().enumerate() {
+        let value = written(value);
+        text.push_str(if nth == 0 { " := [\n" } else { "," });
+        if !line.is_empty() && line.len() + value.len() > 110 {
+            let _ = writeln!(text);
+            line.clear();
+        }
+        let space = if line.is_empty() { "        " } else { " " };
+        let _ = write!(text, "{space}{value}");
+        let _ = write!(line, "{space}{value},");
+    }
+    text.push_str(if values.is_empty() { ";\n" } else { "];\n" });
+}
+
+/// Lists of all nodes, one behind the other.
+#[derive(Default)]
+struct Lists {
+    indices: Vec<i64>,
+    longs: Vec<i64>,
+    numbers: Vec<f64>,
+    entries: Vec<Entry>,
+    novelties: Vec<String>,
+    limits: Vec<String>,
+}
+
+/// Puts elements at the end of a list; where the first one is.
+fn put<T: Clone>(list: &mut Vec<T>, elements: &[T]) -> i64 {
+    list.extend_from_slice(elements);
+    (list.len() - elements.len()) as i64
+}
+
+impl Lists {
+    /// A structure with its fields, whose lists are put behind the others.
+    fn structure(&mut self, form: &Form, record: &Record) -> String {
+        let mut fields = Vec::new();
+        for (name, field) in &record.fields {
+            let first = match field {
+                Field::Int(value) => *value,
+                Field::Real(value) => {
+                    fields.push((*name, real(*value)));
+                    continue;
+                }
+                Field::Inline(values) | Field::Ints(values) => put(&mut self.indices, values),
+                Field::Longs(values) => put(&mut self.longs, values),
+                Field::Reals(values, _) => put(&mut self.numbers, values),
+                Field::Entries(values) => put(&mut self.entries, values),
+                Field::Struct(None) => -1,
+                Field::Struct(Some(inner)) => {
+                    let inner = self.structure(form, inner);
+                    put(&mut self.novelties, &[inner])
+                }
+                Field::Structs(inner) => {
+                    let inner: Vec<String> =
+                        inner.iter().map(|of| self.structure(form, of)).collect();
+                    put(&mut self.limits, &inner)
+                }
+            };
+            fields.push((*name, long(first)));
+        }
+        let places = places(form, record).into_iter();
+        fields.extend(places.map(|(name, place)| (name, place.to_string())));
+        let written = fields.iter().map(|(name, value)| {
+            let renamed = RENAMED.iter().find(|(own, _)| own == name);
+            format!("{} := {value}", renamed.map_or(*name, |(_, name)| name))
+        });
+        format!("({})", written.collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// Where the parts of a node's state lie, which the runtime in C works out by itself.
+fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
+    let mut place = node.place_of("ints");
+    let mut number = node.place_of("reals");
+    let of = |name: &str| node.place_of(name);
+    let next = |place: &mut usize, count: usize| {
+        *place += count;
+        *place
+    };
+    match node.kind {
+        "slope" => vec![
+            ("heads", next(&mut place, 5 + of("blocks"))),
+            ("seen", next(&mut place, of("windows"))),
+            ("times", next(&mut place, 3 * of("channels"))),
+            ("samples", next(&mut number, of("channels"))),
+        ],
+        "vote" => {
+            let (count, judged) = form.voters(node);
+            vec![
+                ("count", count),
+                ("judged", judged),
+                ("run_times", next(&mut place, 7)),
+                ("arrived", next(&mut place, of("runs"))),
+                ("run_of", next(&mut place, of("waiting"))),
+                ("rings", next(&mut place, of("waiting"))),
+                ("error_times", next(&mut place, 2 * judged)),
+                ("truths", next(&mut number, of("runs") * count)),
+                ("squares", next(&mut number, of("waiting"))),
+                ("sums", next(&mut number, judged * of("errors"))),
+                ("means", next(&mut number, judged)),
+                ("trust", next(&mut number, judged)),
+            ]
+        }
+        "safe_state" => {
+            let holds = node
+                .reals_of("when_lost")
+                .iter()
+                .any(|value| value.is_nan());
+            vec![("holds", usize::from(holds))]
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn entry(of: &Entry) -> String {
+    format!(
+        "(slot := {}, history := {}, lag := {}, max_age := {}, factor := {})",
+        of.slot,
+        of.history.map_or(-1, |history| history as i64),
+        long(of.lag_ns),
+        long(of.max_age_ns),
+        real(of.factor)
+    )
+}
+
+fn flag(is: bool) -> &'static str {
+    if is { "TRUE" } else { "FALSE" }
+}
+
+pub(super) fn write(form: &Form, text: &mut String) {
+    sizes(form, text);
+    let mut lists = Lists::default();
+    let gathers: Vec<String> = (form.gathers.iter())
+        .map(|gather| {
+            let first = put(&mut lists.entries, &gather.entries);
+            let (count, held) = (gather.entries.len(), flag(gather.held));
+            format!("(first := {first}, count := {count}, held := {held})")
+        })
+        .collect();
+    list(text, "AT_GATHERS", "AT_Gather", &gathers, String::clone);
+    list(text, "AT_HISTORIES", "AT_History", &form.histories, |of| {
+        format!(
+            "(slot := {}, room := {}, ints := {}, reals := {}, stamped := {}, depth := {})",
+            of.slot.map_or(-1, |slot| slot as i64),
+            of.room,
+            of.ints,
+            of.reals,
+            flag(of.stamped),
+            long(of.depth_ns)
+        )
+    });
+    for (kind, name, table) in KINDS {
+        let nodes = form.nodes.iter().filter(|node| node.kind == kind);
+        let (names, nodes): (Vec<String>, Vec<String>) = nodes
+            .map(|node| (plain(&node.node), lists.structure(form, node)))
+            .unzip();
+        if !names.is_empty() {
+            let _ = writeln!(text, "    (* {} *)", names.join(", "));
+        }
+        list(text, table, name, &nodes, String::clone);
+    }
+    list(
+        text,
+        "AT_NOVELTIES",
+        "AT_Novelty",
+        &lists.novelties,
+        String::clone,
+    );
+    list(
+        text,
+        "AT_COMPENSATE_LIMITS",
+        "AT_CompensateLimits",
+        &lists.limits,
+        String::clone,
+    );
+    list(text, "AT_ENTRIES", "AT_Entry", &lists.entries, entry);
+    list(text, "AT_INDICES", "DINT", &lists.indices, i64::to_string);
+    list(text, "AT_LONGS", "LINT", &lists.longs, |&value| long(value));
+    list(text, "AT_NUMBERS", "LREAL", &lists.numbers, |&value| {
+        real(value)
+    });
+    let steps: Vec<String> = form.steps.iter().map(|of| step(form, of)).collect();
+    list(text, "AT_STEPS", "AT_Step", &steps, String::clone);
+    list(
+        text,
+        "AT_OUTPUT_SLOTS",
+        "DINT",
+        &form.output_slots,
+        usize::to_string,
+    );
+    list(text, "AT_LOWEST", "LREAL", &form.ranges, |range| {
+        real(range.0)
+    });
+    list(text, "AT_HIGHEST", "LREAL", &form.ranges, |range| {
+        real(range.1)
+    });
+}
+
+fn sizes(form: &Form, text: &mut String) {
+    let layout = form.layout;
+    let last = |count: usize| count.saturating_sub(1);
+    text.push_str("\n    (* How much there is of what, and where it lies in the state. *)\n");
+    for (name, size) in [
+        ("SOURCES", form.sources.len()),
+        ("LAST_SOURCE", last(form.sources.len())),
+        ("OUTPUTS", form.outputs.len()),
+        ("LAST_OUTPUT", last(form.outputs.len())),
+        ("SLOTS", form.slots.len()),
+        ("STEP_COUNT", form.steps.len()),
+        ("HISTORY_COUNT", form.histories.len()),
+        ("RECORDED_COUNT", form.recorded),
+        ("SLOT_INTS", layout.slot_ints),
+        ("GATHER_INTS", layout.gather_ints),
+        ("REJECTED_INTS", layout.rejected_ints),
+        ("SLOT_REALS", layout.slot_reals),
+        ("SCRATCH", layout.scratch),
+        ("TOTALS", layout.reals),
+        ("LAST_INT", last(layout.ints)),
+        ("LAST_REAL", layout.reals + TOTALS - 1),
+    ] {
+        let _ = writeln!(text, "    AT_{name} : DINT := {size};");
+    }
+    text.push_str("\n    (* The tables. *)\n");
+}
+
+/// A step: a kind, and which of that kind.
+fn step(form: &Form, of: &Step) -> String {
+    let (kind, nth) = match *of {
+        Step::Gather(gather) => (GATHER, gather),
+        Step::Run(node) => {
+            let kind = form.nodes[node].kind;
+            let before = form.nodes[..node].iter().filter(|of| of.kind == kind);
+            let number = KINDS.iter().position(|(own, ..)| *own == kind);
+            (number.unwrap_or(GATHER), before.count())
+        }
+    };
+    format!("(kind := {kind}, nth := {nth})")
+}
