@@ -166,7 +166,9 @@ fn a_disturbance_changes_a_simulation_while_it_lasts() {
     let lines: Vec<usize> = others.map(|(line, _)| line).collect();
     // A line of names, then rows 10 s apart.
     assert_eq!(lines, (121..181).collect::<Vec<_>>());
-    let told = folder.refused(&[&asked[..], &["--disturb", "door,size=99"]].concat());
+    let wide = folder.run(&[&asked[..], &["--disturb", "door,size=99"]].concat());
+    let told = String::from_utf8(wide.stderr).unwrap();
+    assert_eq!(wide.status.code(), Some(2), "{told}");
     assert!(told.contains("`door,size=3`"), "{told}");
     let told = folder.refused(&[&asked[..], &["--disturb", "loose=room,size=0.5"]].concat());
     assert!(told.contains("these can come loose: plate1"), "{told}");

@@ -124,9 +124,10 @@ impl Checkpoints {
         let files = self.files()?;
         let needed = self.needed.load(Ordering::Relaxed);
         let needed = files.iter().rposition(|(of, _)| *of <= needed);
-        for nth in 0..files.len().saturating_sub(self.keep) {
+        let old = files.len().saturating_sub(self.keep);
+        for (nth, (_, path)) in files.iter().enumerate().take(old) {
             if Some(nth) != needed {
-                let _ = fs::remove_file(&files[nth].1);
+                let _ = fs::remove_file(path);
             }
         }
         Ok(())

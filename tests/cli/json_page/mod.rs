@@ -8,6 +8,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::workbench::{Scratch, athermal, athermal_on, graph};
+use athermal::Duration;
+use athermal::serve::connector::{ConnectorError, Seen};
+use athermal::serve::deployment::Found;
 use serde_json::Value;
 
 /// What the logs here do not bring about: a sensor that cannot be tried since a node takes it for dead.
@@ -365,6 +368,7 @@ wait = "wait"
         ),
         ("show", json(&[&"show", &kinds])),
         ("check", json(&[&"check", &several, &wrong])),
+        ("check", looked_at()),
         ("nodes", json(&[&"nodes"])),
         ("nodes", json(&[&"nodes", &"csv"])),
         ("a-node-type", json(&[&"nodes", &"slope"])),
@@ -382,6 +386,26 @@ wait = "wait"
         ("explain", json(&[&"explain", &service])),
     ];
     printed.into_iter().chain(told).collect()
+}
+
+/// What `check --live` prints of sources: one that has a channel, and one that cannot be asked.
+fn looked_at() -> Value {
+    let seen = Seen {
+        channel: 0,
+        value: Some(21.0),
+        quality: "good".to_owned(),
+        stamp: Some("2026-01-01T00:00:00Z".to_owned()),
+        offset: Some(Duration::from_secs_f64(0.1).unwrap()),
+        granted: "QoS 1".to_owned(),
+    };
+    let of = |channels| Found {
+        source: "line".to_owned(),
+        channels,
+        missing: 0,
+    };
+    let there = of(Ok(vec![("plate".to_owned(), "a/b".to_owned(), seen)]));
+    let away = of(Err(ConnectorError::new("refused")));
+    serde_json::json!({ "live": [there.to_json(), away.to_json()] })
 }
 
 #[test]
