@@ -128,6 +128,12 @@ impl Worker {
         &self.recorder
     }
 
+    /// Whether the replica is far behind.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        self.stepper.is_crowded()
+    }
+
     /// What is left when the work ends.
     #[must_use]
     pub fn into_parts(self) -> (Sequencer, Stepper, Recorder) {

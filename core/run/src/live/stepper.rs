@@ -78,6 +78,12 @@ impl Stepper {
         self.missed
     }
 
+    /// Whether the control thread is far behind: what is beyond the ring is missed.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        self.ticks.slots() < self.ticks.buffer().capacity() / 2
+    }
+
     /// The engine that runs.
     #[must_use]
     pub fn engine(&self) -> &crate::engine::Engine {

@@ -19,15 +19,17 @@ use crate::diagnostic::panic_text;
 use crate::engine::EngineError;
 use crate::moment::{Moment, MonotonicClock};
 use crate::sequencer::Admission;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::worker::{Output, Worker};
 
 /// How many arrivals of a source are taken before time is looked at again.
 const BATCH: usize = 256;
 /// The longest sleep, so that a beat shows that the thread lives.
 const NAP: Wait = Wait::from_millis(100);
-/// The longest sleep where sources are held back until the journal thread has caught up.
+/// The longest sleep where sources are held back until the journal thread or the replica has caught up.
 const HOLD: Wait = Wait::from_millis(1);
+/// For how long the replica is waited for at most: the thread that has it may hang.
+const PATIENCE: Duration = Duration::from_ns(1_000_000_000);
 
 /// What the control thread asks of the engine thread.
 #[derive(Debug)]
@@ -119,7 +121,7 @@ impl EngineThread {
 
     fn work(&mut self) -> Result<(), EngineError> {
         let mut left = self.sources.len();
-        let mut published = Moment::START;
+        let (mut published, mut sound) = (Moment::START, self.clock.now());
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
             let mut is_stopped = false;
@@ -134,7 +136,11 @@ impl EngineThread {
                 }
             }
             let mut has_more = false;
-            let is_crowded = self.worker.recorder().is_crowded();
+            let now = self.clock.now();
+            let is_ahead = self.worker.is_crowded();
+            sound = if is_ahead { sound } else { now };
+            let is_crowded =
+                self.worker.recorder().is_crowded() || is_ahead && now - sound < PATIENCE;
             for nth in 0..self.sources.len() {
                 if !is_crowded || !self.sources[nth].waits {
                     has_more |= self.take(nth, &mut left)?;

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::prng::Prng;
+use athermal_run::live::Notice;
 use athermal_run::model::Model;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -571,7 +572,12 @@ fn a_slow_sink_has_every_row_of_a_flood_once_and_the_engine_does_not_wait_for_it
     let mut service = bench.start(GRAPH);
     let (began, mut most) = (Clock::now(), 0);
     while !service.is_over() {
-        service.pump();
+        let events = service.pump();
+        let is_missed = |of: &ServiceEvent| matches!(of, ServiceEvent::Swap(Notice::Missed { .. }));
+        assert!(
+            !events.iter().any(is_missed),
+            "what comes in order waits for the replica"
+        );
         most = most.max(
             service
                 .snapshot()
@@ -583,7 +589,7 @@ fn a_slow_sink_has_every_row_of_a_flood_once_and_the_engine_does_not_wait_for_it
             "{}",
             bench.out().len()
         );
-        std::thread::sleep(Wait::from_millis(100));
+        std::thread::sleep(Wait::from_millis(20));
     }
     let counts = Arc::clone(&service.sinks()[0].1);
     let (ended, _) = service.stop().unwrap();
