@@ -255,7 +255,7 @@ fn history(fitted: &Model, nth: usize) -> History {
     for _ in 0..3 + (prng.uniform() * 3.0) as usize {
         let end = ends[(prng.uniform() * 4.0) as usize % 4];
         // Every other machine is bounded by the rate of its sink, the others by the blend of their output.
-        let machine = (&*name, nth % 2 == 0, &*state);
+        let machine = (&*name, nth.is_multiple_of(2), &*state);
         history.swaps += session(fitted, &scratch, machine, end, &mut prng);
         history.ends += 1;
     }
