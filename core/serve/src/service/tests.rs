@@ -56,7 +56,12 @@ fn work(rows: usize) -> Work {
         ..rules()
     };
     let sequencer = Sequencer::new(rules, clock.now());
-    let (stepper, mut control) = pair(&model, LiveOptions::default()).unwrap();
+    // Nobody takes in what is mirrored meanwhile, and it is not waited for.
+    let live = LiveOptions {
+        mirrored: 4 * rows,
+        ..LiveOptions::default()
+    };
+    let (stepper, mut control) = pair(&model, live).unwrap();
     let wired = model.plan.sources.iter().map(|of| WiredChannel {
         mapped: None,
         unit: crate::unit::Unit::kelvin(),
