@@ -11,6 +11,7 @@ use athermal_core::unit::Unit;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
+use crate::c::write_bytes;
 use crate::form::{Form, Port};
 use crate::{ExportError, Exported};
 
@@ -36,14 +37,6 @@ pub fn write(exported: &Exported, path: &Path, compiler: &str) -> Result<Binary,
     let form = &exported.form;
     files.push(("fmu.c".to_owned(), unit(form, &token)));
     let (binary, bytes) = build(&files, compiler, path)?;
-    let write = |path: &Path, bytes: &[u8]| {
-        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-        let written = made.and_then(|()| std::fs::write(path, bytes));
-        written.map_err(|source| ExportError::Write {
-            path: path.to_owned(),
-            source,
-        })
-    };
     files.push((
         "buildDescription.xml".to_owned(),
         build_description(form, &files),
@@ -57,11 +50,13 @@ pub fn write(exported: &Exported, path: &Path, compiler: &str) -> Result<Binary,
     if let Binary::Built(platform) = &binary {
         all.push((format!("binaries/{platform}/{}.so", form.name), bytes));
     }
+    let (folder, name) = (path.parent(), path.file_name());
+    let (folder, name) = (folder.unwrap_or(Path::new("")), name.unwrap_or_default());
     let packed = packed(&all).map_err(|source| ExportError::Write {
         path: path.to_owned(),
         source,
     })?;
-    write(path, &packed)?;
+    write_bytes(folder, &name.to_string_lossy(), &packed)?;
     Ok(binary)
 }
 
@@ -263,13 +258,8 @@ fn build(
         }
     };
     let folder = Folder(path.with_extension(format!("{}.build", std::process::id())));
-    let failed = |source| ExportError::Write {
-        path: folder.0.clone(),
-        source,
-    };
-    std::fs::create_dir_all(&folder.0).map_err(failed)?;
     for (name, text) in files {
-        std::fs::write(folder.0.join(name), text).map_err(failed)?;
+        write_bytes(&folder.0, name, text.as_bytes())?;
     }
     let compiled = files.iter().filter(|(name, _)| name.ends_with(".c"));
     let program = folder.0.join("unit.so");
@@ -300,7 +290,10 @@ fn build(
             said: String::from_utf8_lossy(&built.stderr).into_owned(),
         });
     }
-    let bytes = std::fs::read(&program).map_err(failed)?;
+    let bytes = std::fs::read(&program).map_err(|source| ExportError::Write {
+        path: program.clone(),
+        source,
+    })?;
     Ok((Binary::Built(platform), bytes))
 }
 

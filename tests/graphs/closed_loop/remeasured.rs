@@ -5,42 +5,6 @@ use athermal::trial::machine::{Row, SECOND_NS, Simulation};
 use super::looped::{Looped, output};
 use crate::workbench::{Scratch, graph};
 
-/// Two estimators that know no sensor of each other, fitted on calm rows: where they part, neither is sure.
-const AGAIN: &str = r#"
-[nodes.by_holders]
-type = "linear"
-each = "axis"
-inputs.features = ["gradients.holder1@*", "gradients.holder2@*", "gradients.room@*"]
-inputs.truth = "drift.{axis}"
-ahead = "150s"
-train.abs_truth = { below = "30 nm/min" }
-solver = { type = "ridge", alpha = 1.0 }
-
-[nodes.by_others]
-type = "linear"
-each = "axis"
-inputs.features = ["gradients.plate1@*", "gradients.plate2@*", "gradients.chuck@*"]
-inputs.truth = "drift.{axis}"
-ahead = "150s"
-train.abs_truth = { below = "30 nm/min" }
-solver = { type = "ridge", alpha = 1.0 }
-
-[nodes.opinions]
-type = "mean"
-each = "axis"
-inputs.voters = ["by_holders.{axis}", "by_others.{axis}"]
-
-[nodes.again]
-type = "remeasure"
-inputs.std_dev = { from = "opinions:std_dev", max_age = "1min" }
-tolerance = "200 nm"
-lead = "75s"
-longest = "4h"
-
-[outputs]
-ask = "again"
-"#;
-
 /// An alignment that the machine could make: when, where its axes stand under correction, and whether it has been asked for one.
 struct Chance {
     at_s: f64,
@@ -74,10 +38,10 @@ fn aligned(chances: &[Chance], is_due: impl Fn(&Chance, f64) -> bool) -> (usize,
 #[test]
 fn a_machine_that_is_aligned_when_it_asks_needs_fewer_alignments_to_stay_as_near() {
     let scratch = Scratch::new("a_machine_that_is_aligned_when_it_asks");
-    let text = format!(
-        "schema = 1\nextends = {:?}\nname = \"again\"\n{AGAIN}",
-        graph("die-tester-control")
-    );
+    // What it computes, beside the correction that a closed loop needs.
+    let text = std::fs::read_to_string(graph("die-tester-realign")).unwrap();
+    let control = graph("die-tester-control").display().to_string();
+    let text = text.replace("die-tester-compensate.toml", &control);
     let looped = Looped::new(
         "die-tester",
         &scratch.file("again.toml", text),
