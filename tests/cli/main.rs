@@ -24,6 +24,7 @@ mod failing_disks;
 mod faulty_logs;
 mod first_minutes;
 mod fit_json;
+mod fleet;
 mod forms_of_logs;
 mod graph_file_page;
 mod init_refuses;
