@@ -15,7 +15,7 @@ use athermal_run::recording::{Event, Recording, pass};
 use athermal_run::score::{NoModel, PredictionTrace, Trace, TruthTrace};
 use serde::{Serialize, Serializer};
 
-use super::novelty::{NoveltyWatch, ask_for_novelty};
+use super::excursions::{NoveltyWatch, ask_for_novelty};
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
 use super::track::{Track, Unjudged, places, reads_drift};
 use super::{ReportError, Series};
