@@ -106,6 +106,9 @@ pub struct Contradiction {
 /// A larger share of the time outside is worth a word on a terminal.
 const MANY: f64 = 0.005;
 
+/// Errors of so few truths are chance, and none is worth a word on a terminal.
+const FEWEST: usize = 20;
+
 /// The plan in which nothing goes by novelty.
 fn unheeding(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
@@ -182,11 +185,10 @@ impl Novelty {
                 .max_by(|one, other| share(one).total_cmp(&share(other)))?;
             Some(most.sentence(hours, all.len()))
         });
-        let changed = self.effects.iter().map(Effect::sentence);
-        let any = !of_nodes.is_empty();
+        let changed = self.effects.iter().filter(|of| of.errors.n >= FEWEST);
         contradictions
             .chain(nodes)
-            .chain(changed.filter(|_| any))
+            .chain(changed.map(Effect::sentence))
             .collect()
     }
 }
