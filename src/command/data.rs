@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fs::Metadata;
+use std::hash::Hasher as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use athermal::core::compile::Plan;
-use athermal::files::{Dataset, FileError, Format, Options, Report, recordings_in};
+use athermal::core::engine::Fnv1a;
+use athermal::files::{Dataset, FileError, Format, Options, Report, is_in_memory, recordings_in};
 use athermal::run::model::DataCard;
+use athermal::run::recording::{Event, Recording, Samples, SourceError};
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
 use clap::Args;
@@ -18,7 +21,7 @@ use super::refused;
 use crate::invocation::{program, quoted};
 use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::{Failure, Terminal, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
 
 /// Recorded data.
@@ -255,14 +258,18 @@ impl Data {
         }
     }
 
-    /// The files for a model's card.
+    /// The files for a model's card; of tables in memory their rows, as a graph reads them.
     ///
     /// # Errors
     /// When a file cannot be read.
-    pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
+    pub fn cards(&self, plan: &Plan, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
         let reports = dataset.reports();
         let card = |path: &Path| {
             let name = path.display().to_string();
+            if is_in_memory(path) {
+                let rows = self.others(vec![path.to_owned()]).dataset();
+                return rows_card(&rows, plan).map_err(outside);
+            }
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
             let card = match journal_of(path) {
@@ -282,6 +289,36 @@ impl Data {
         };
         self.paths().map(card).collect()
     }
+}
+
+/// The rows of a recording for a model's card, which names no file.
+fn rows_card(recording: &dyn Recording, plan: &Plan) -> Result<DataCard, SourceError> {
+    let (mut source, mut samples) = (recording.open(plan)?, Samples::default());
+    let (mut hash, mut rows, mut bytes) = (Fnv1a::default(), 0, 0);
+    let mut add = |piece: &[u8]| {
+        hash.write(piece);
+        bytes += piece.len() as u64;
+    };
+    while let Some(event) = source.next(&mut samples)? {
+        match event {
+            Event::Segment => add(&[1]),
+            Event::Row(time) => {
+                rows += 1;
+                add(&[0]);
+                add(&time.as_ns().to_le_bytes());
+                for &value in &samples.values {
+                    let value = if value.is_nan() { f64::NAN } else { value };
+                    add(&value.to_le_bytes());
+                }
+            }
+        }
+    }
+    Ok(DataCard {
+        path: String::new(),
+        rows,
+        bytes,
+        hash: format!("{:016x}", hash.finish()),
+    })
 }
 
 /// What scores on the data of a fit show.

@@ -14,19 +14,19 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use crate::rows::{Column, Rows, Wanted};
 
 /// So many rows are decoded at a time: the numbers of a wide table then stay in the second cache.
-const BATCH: usize = 2048;
+pub(crate) const BATCH: usize = 2048;
 
 /// Batches, one after the other.
 pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
 
 /// A file whose batches have a schema.
-struct Batched {
-    schema: SchemaRef,
+pub(crate) struct Batched {
+    pub schema: SchemaRef,
     /// What the folders on its path say.
-    keys: Vec<(String, String)>,
+    pub keys: Vec<(String, String)>,
     /// Its batches, of these columns at least, and where among theirs each of the file's stands.
     #[allow(clippy::type_complexity)] // it is this once
-    read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
+    pub read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
 }
 
 impl TypedFile for Batched {
