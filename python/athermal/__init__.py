@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from datetime import datetime, timezone
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Union
 
@@ -335,12 +335,8 @@ class Engine:
 
     def _ns(self, time: Any) -> int:
         if isinstance(time, datetime):
-            if time.tzinfo is None and self._engine.zone is not None:
-                from zoneinfo import ZoneInfo
-
-                time = time.replace(tzinfo=ZoneInfo(self._engine.zone))
-            elif time.tzinfo is None:
-                time = time.replace(tzinfo=timezone.utc)
+            if time.tzinfo is None:
+                time = time.replace(tzinfo=_frames.zone_of(self._engine.zone))
             return _frames.ns_of(time)
         if hasattr(time, "__index__"):
             return int(time.__index__())

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from datetime import datetime, timezone
+from datetime import datetime, timezone, tzinfo
 from typing import Any
+from zoneinfo import ZoneInfo
 
 from athermal._athermal import Table
 
@@ -117,9 +118,9 @@ def _of_pandas(frame: Any, columns: list[Any]) -> Table:
 
     def array(of: Any) -> Any:
         series = frame[of]
-        if series.dtype.kind in "fiu":
+        if module_of(series.dtype) == "numpy" and series.dtype.kind in "fiu":
             # Without a look at what is NaN, which is absent here as null is.
-            return pyarrow.array(series.array, from_pandas=False)
+            return pyarrow.array(series.to_numpy())
         try:
             return pyarrow.array(series, from_pandas=True)
         except (pyarrow.ArrowInvalid, pyarrow.ArrowTypeError, pyarrow.ArrowNotImplementedError):
@@ -184,6 +185,15 @@ def ns_of(at: datetime) -> int:
     return ns + getattr(at, "nanosecond", 0)
 
 
+def zone_of(name: str | None) -> tzinfo:
+    """The zone of a graph, such as `Europe/Berlin` or `+01:00`; UTC where it has none."""
+    if name is None:
+        return timezone.utc
+    if name.startswith(("+", "-")):
+        return datetime.fromisoformat(f"2000-01-01T00:00:00{name}").tzinfo or timezone.utc
+    return ZoneInfo(name)
+
+
 def like(given: Any, made: Table) -> Any:
     """A table as the library has it that the data came from."""
     if isinstance(given, (list, tuple)):
@@ -201,17 +211,8 @@ def like(given: Any, made: Table) -> Any:
             return whole.to_batches()[0]
         return whole
     if library in ("duckdb", "_duckdb"):
-        duckdb = sys.modules["duckdb"]
-        return duckdb.from_arrow(_stream_for_duckdb(made))
+        return sys.modules["duckdb"].from_arrow(made)
     return made
-
-
-def _stream_for_duckdb(made: Table) -> Any:
-    try:
-        import pyarrow
-    except ImportError:
-        return made
-    return pyarrow.table(made)
 
 
 def to_pandas(made: Table, given: Any = None) -> Any:

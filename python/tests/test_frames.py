@@ -138,12 +138,14 @@ def test_absent_is_nan_and_null(graph, columns):
     assert parts(graph.fit(pyarrow.table(with_nan))) == parts(graph.fit(pyarrow.table(columns)))
 
 
+ROWS = 400
+
+
 def small(**columns):
     """Rows of the small graph, with some columns otherwise."""
-    rows = 40
-    base = {"time_s": [30.0 * nth for nth in range(rows)]}
-    for name in ["plate1_degC", "plate2_degC", "room_degC", "Z1_nm", "Z2_nm"]:
-        base[name] = [20.0 + 0.01 * nth for nth in range(rows)]
+    base = {"time_s": [30.0 * nth for nth in range(ROWS)]}
+    for phase, name in enumerate(["plate1_degC", "plate2_degC", "room_degC", "Z1_nm", "Z2_nm"]):
+        base[name] = [20 + math.sin(nth / (11 + phase)) + math.cos(nth * nth + phase) / 50 for nth in range(ROWS)]
     return {**base, **columns}
 
 
@@ -223,7 +225,7 @@ def test_numbers_of_other_types_are_numbers(graph):
 def test_a_categorical_column_is_read_by_its_texts(graph):
     pandas = pytest.importorskip("pandas")
     polars = pytest.importorskip("polars")
-    texts = [f"{20 + 0.1 * (nth % 3):.1f}" for nth in range(40)]
+    texts = [f"{20 + 0.1 * (nth % 3):.1f}" for nth in range(ROWS)]
     expected = parts(graph.fit(small(room_degC=[float(of) for of in texts])))
     assert parts(graph.fit(pandas.DataFrame(small()).assign(room_degC=pandas.Categorical(texts)))) == expected
     of_polars = polars.DataFrame(small()).with_columns(room_degC=polars.Series(texts, dtype=polars.Categorical))
@@ -231,7 +233,7 @@ def test_a_categorical_column_is_read_by_its_texts(graph):
 
 
 def test_truth_values_are_one_and_zero_as_in_a_file(graph):
-    flags = [nth % 2 == 0 for nth in range(40)]
+    flags = [nth % 2 == 0 for nth in range(ROWS)]
     expected = parts(graph.fit(small(room_degC=[float(of) for of in flags])))
     for name, frame in frames_of(small(room_degC=flags)).items():
         assert parts(graph.fit(frame)) == expected, name
@@ -239,7 +241,7 @@ def test_truth_values_are_one_and_zero_as_in_a_file(graph):
 
 def test_objects_of_several_kinds_are_read_as_a_file_would_have_them(graph):
     pandas = pytest.importorskip("pandas")
-    mixed = [20.0 if nth % 2 else f"{20 + nth / 100}" for nth in range(40)]
+    mixed = [20.0 if nth % 2 else f"{20 + nth / 100}" for nth in range(ROWS)]
     expected = parts(graph.fit(small(room_degC=[float(of) for of in mixed])))
     frame = pandas.DataFrame(small())
     frame["room_degC"] = pandas.Series(mixed, dtype=object)

@@ -46,7 +46,10 @@ struct Given {
 
 impl From<PathBuf> for Given {
     fn from(name: PathBuf) -> Self {
-        let mut files = recordings_in(&name);
+        let mut files = match is_in_memory(&name) {
+            true => Vec::new(),
+            false => recordings_in(&name),
+        };
         if files.is_empty() {
             files.push(name.clone());
         }
