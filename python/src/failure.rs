@@ -1,6 +1,6 @@
 //! Failures as Python exceptions, whose texts are those of the command line.
 
-use athermal::core::diagnostic::{Diagnostics, Sources, codes};
+use athermal::core::diagnostic::{Diagnostics, Sources, explain};
 use athermal::run::model::ModelError;
 use athermal_command::Failure;
 use pyo3::prelude::*;
@@ -43,7 +43,7 @@ fn graph(py: Python<'_>, diagnostics: &Diagnostics, sources: &Sources) -> PyErr 
     let all = facts["diagnostics"].as_array();
     let all = all.into_iter().flatten().map(|of| {
         let mut of = of.clone();
-        let title = of["code"].as_str().and_then(codes::explain);
+        let title = of["code"].as_str().and_then(explain);
         of["title"] = title.map_or(Value::Null, |code| code.title.into());
         to_python(py, &of)
     });

@@ -7,7 +7,7 @@ use arrow_array::types::{
     ArrowTimestampType, TimestampMicrosecondType, TimestampMillisecondType,
     TimestampNanosecondType, TimestampSecondType,
 };
-use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, PrimitiveArray, StringArray};
+use arrow_array::{ArrayRef, Float64Array, Int64Array, PrimitiveArray, StringArray};
 use arrow_schema::{DataType, TimeUnit};
 use athermal::Instant;
 

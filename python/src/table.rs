@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::ffi_stream::ArrowArrayStreamReader;
+use arrow_array::ffi_stream::RecordBatchStreamReader;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{
@@ -71,7 +71,7 @@ impl Table {
     #[staticmethod]
     fn from_arrow(py: Python<'_>, of: &Bound<'_, PyAny>) -> PyResult<Self> {
         if of.hasattr("__arrow_c_stream__")? {
-            let mut reader = ArrowArrayStreamReader::from_pyarrow_bound(of)?;
+            let mut reader = RecordBatchStreamReader::from_pyarrow_bound(of)?;
             // Whoever makes the stream may need Python, on whatever thread.
             let read = py.detach(move || {
                 let schema = reader.schema();
@@ -209,7 +209,7 @@ impl Table {
         let batches: Vec<_> = self.batches.iter().cloned().map(Ok).collect();
         let reader = RecordBatchIterator::new(batches, Arc::clone(&self.schema));
         let stream = FFI_ArrowArrayStream::new(Box::new(reader));
-        PyCapsule::new(py, stream, Some(STREAM.to_owned()))
+        PyCapsule::new_with_value(py, stream, STREAM)
     }
 }
 
