@@ -8,6 +8,7 @@ use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
 use crate::command::Command;
+use crate::invocation;
 use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 
 const EXAMPLES: &str = "\
@@ -30,6 +31,9 @@ pub fn command_line() -> ExitCode {
 
 /// The same with these words, of which the first is the name of the program: its exit status.
 pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let name = words.first().map(|name| name.to_string_lossy());
+    invocation::called(name.unwrap_or_default().into_owned());
     let arguments = whole().get_matches_from(words);
     let options = Options::from_arg_matches(&arguments);
     let options = options.unwrap_or_else(|error| error.exit());

@@ -94,9 +94,6 @@ impl Diagnose {
             write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
         }
         if terminal.format == Format::Table {
-            if self.of.is_empty() {
-                note_others(terminal, &model.plan, &diagnosis);
-            }
             let tables = Tables::new(&diagnosis, &self.of);
             if let Some(next) = self.next(&tables, &model, window::any(&model.plan)) {
                 terminal.note(format_args!("\n{next}"));
@@ -157,6 +154,9 @@ impl Diagnose {
             terminal.warning(message);
         }
         self.report(terminal, &diagnosis);
+        if self.of.is_empty() && terminal.format == Format::Table {
+            note_others(terminal, &model.plan, &diagnosis);
+        }
         warn_empty(terminal, &model.plan, &diagnosis, &observation);
         if self.window && !window::any(&model.plan) {
             terminal.note("--window shows nothing, since no truth is a slope");
