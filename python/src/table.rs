@@ -5,10 +5,6 @@ use std::ffi::CStr;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-<<<<<<< Updated upstream
-=======
-use arrow_array::ffi_stream::RecordBatchStreamReader;
->>>>>>> Stashed changes
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::ffi_stream::RecordBatchStreamReader;
 use arrow_array::types::{Float64Type, Int64Type};

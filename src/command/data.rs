@@ -2,15 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs::Metadata;
-use std::hash::Hasher as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use athermal::core::compile::Plan;
-use athermal::core::engine::Fnv1a;
 use athermal::files::{Dataset, FileError, Format, Options, Report, is_in_memory, recordings_in};
 use athermal::run::model::DataCard;
-use athermal::run::recording::{Event, Recording, Samples, SourceError};
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
 use clap::Args;
@@ -23,6 +20,7 @@ use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
+use athermal_fleet::RowsId;
 
 /// Recorded data.
 #[derive(Debug, Args)]
@@ -271,7 +269,8 @@ impl Data {
             let name = path.display().to_string();
             if is_in_memory(path) {
                 let rows = self.others(vec![path.to_owned()]).dataset();
-                return rows_card(&rows, plan).map_err(outside);
+                let rows = RowsId::of(&rows, plan).map_err(outside)?;
+                return Ok(rows.card());
             }
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
@@ -292,36 +291,6 @@ impl Data {
         };
         self.paths().map(card).collect()
     }
-}
-
-/// The rows of a recording for a model's card, which names no file.
-fn rows_card(recording: &dyn Recording, plan: &Plan) -> Result<DataCard, SourceError> {
-    let (mut source, mut samples) = (recording.open(plan)?, Samples::default());
-    let (mut hash, mut rows, mut bytes) = (Fnv1a::default(), 0, 0);
-    let mut add = |piece: &[u8]| {
-        hash.write(piece);
-        bytes += piece.len() as u64;
-    };
-    while let Some(event) = source.next(&mut samples)? {
-        match event {
-            Event::Segment => add(&[1]),
-            Event::Row(time) => {
-                rows += 1;
-                add(&[0]);
-                add(&time.as_ns().to_le_bytes());
-                for &value in &samples.values {
-                    let value = if value.is_nan() { f64::NAN } else { value };
-                    add(&value.to_le_bytes());
-                }
-            }
-        }
-    }
-    Ok(DataCard {
-        path: String::new(),
-        rows,
-        bytes,
-        hash: format!("{:016x}", hash.finish()),
-    })
 }
 
 /// What scores on the data of a fit show.
