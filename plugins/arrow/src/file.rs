@@ -20,13 +20,13 @@ pub(crate) const BATCH: usize = 2048;
 pub type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
 
 /// A file whose batches have a schema.
-pub(crate) struct Batched {
-    pub schema: SchemaRef,
+struct Batched {
+    schema: SchemaRef,
     /// What the folders on its path say.
-    pub keys: Vec<(String, String)>,
+    keys: Vec<(String, String)>,
     /// Its batches, of these columns at least, and where among theirs each of the file's stands.
     #[allow(clippy::type_complexity)] // it is this once
-    pub read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
+    read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
 }
 
 impl TypedFile for Batched {
