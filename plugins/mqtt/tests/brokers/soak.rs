@@ -1,5 +1,6 @@
-//! A minute of a thousand ticks a second (ten in the long mode, or as many as `ATHERMAL_SOAK` says), with swaps and outages: nothing is lost that the broker kept, memory
-//! is flat, and a message is an output `wait` and a few milliseconds after it was sent, beside a bare client that sleeps as long.
+//! A minute of a thousand ticks a second (ten in the long mode, or as many as `ATHERMAL_SOAK` says), with swaps and outages: nothing is
+//! lost that the broker kept, memory is flat, and a message is an output `wait` and a few milliseconds after it was sent, beside a bare
+//! client that sleeps as long.
 
 use std::fs;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
