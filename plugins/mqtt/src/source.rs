@@ -169,8 +169,15 @@ impl MqttSource {
                     sequence: None,
                     quality: None,
                     values: Values::Plain(channel),
+                    instants: Box::default(),
                 },
             });
+        }
+        let instants = channels.iter().enumerate();
+        let instants = instants.filter(|(_, of)| of.channel.is_instant);
+        let instants: Box<[usize]> = instants.map(|(nth, _)| nth).collect();
+        for route in &mut routes {
+            route.form.instants.clone_from(&instants);
         }
         routes
     }
