@@ -73,7 +73,7 @@ fn a_compensation_once_a_second_takes_less_than_200_kb_where_positions_come_each
     let (_, exported) = shipped("die-tester-compensate.toml", second_and_ten);
     let bytes = exported.form.layout.bytes(8);
     println!("die-tester-compensate at 1 s, positions each 10 s: {bytes} bytes");
-    assert!(bytes < 200_000, "{bytes}");
+    assert!(bytes < 200 * 1024, "{bytes}");
     let (_, every) = shipped("die-tester-compensate.toml", Rates::every(second(1.0)));
     println!("all at 1 s: {} bytes", every.form.layout.bytes(8));
     assert!(every.form.layout.bytes(8) > bytes);
