@@ -44,6 +44,7 @@ mod parquet;
 mod plugin_crates;
 mod report;
 mod report_graphs;
+mod report_novelty;
 mod restarted_pipes;
 mod schema;
 mod services;
