@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
+use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::prior::{Met, Wanted};
 use crate::selection::Selection;
@@ -181,6 +182,11 @@ impl LinearTrainer {
         Some(self.range.as_ref()?.of(columns))
     }
 
+    /// How far rows are from those of a fit.
+    pub(crate) fn novelty_of(&self, found: &Found) -> Option<Novelty> {
+        novelty_of(&self.blocks, &found.standard, &found.fit.columns)
+    }
+
     /// How many rows it was given.
     pub(crate) fn rows(&self) -> u64 {
         self.blocks.count()
@@ -210,7 +216,7 @@ impl LinearTrainer {
             };
             return Ok((model, None));
         }
-        let novelty = novelty_of(&self.blocks, &found.standard, &found.fit.columns);
+        let novelty = self.novelty_of(&found);
         match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => {
                 let model = LinearPredictor {
@@ -285,7 +291,7 @@ impl LinearTrainer {
             coefficients,
             intercept: sgd.intercept() + mean - shift,
             variance: None,
-            novelty,
+            novelty: novelty.clone(),
         };
         let squared = rows.iter().map(|(x, y, _)| {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
@@ -298,7 +304,7 @@ impl LinearTrainer {
         report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
-            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse))
+            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse), novelty)
         });
         Ok((model, online))
     }
@@ -350,15 +356,6 @@ impl Trainer for LinearTrainer {
         };
         Ok(Trained { predictor, report })
     }
-}
-
-/// How far rows are from those of a fit by some of their columns, where its rows were kept and say so.
-pub(crate) fn novelty_of(
-    blocks: &GramBlocks,
-    standard: &Standardization,
-    columns: &[usize],
-) -> Option<Novelty> {
-    Novelty::of(&blocks.total(), standard, columns, blocks.rows()?)
 }
 
 /// Why stochastic gradients gave no model: their steps grew without bound.
@@ -447,10 +444,7 @@ impl Predictor for LinearPredictor {
                 mistakes.push(Mistake::at("rows", message));
             }
         }
-        if let Some(novelty) = &self.novelty {
-            let lists = [("novelty.means", novelty.width())];
-            mistakes.extend(Mistake::of_lengths(width, &lists));
-        }
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         mistakes
     }
 
@@ -463,8 +457,7 @@ impl Predictor for LinearPredictor {
     }
 
     fn novelty(&self, regressors: &[f64]) -> f64 {
-        let novelty = self.novelty.as_ref();
-        novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
+        novelty_at(self.novelty.as_ref(), regressors)
     }
 
     fn centre(&self) -> f64 {
