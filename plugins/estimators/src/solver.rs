@@ -26,8 +26,9 @@ pub enum Solver {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<String>")]
         prior: Option<Prior>,
-        /// How many times as much the prior counts as was best over the machines of the fleet, above 0. More is nearer to the mean.
-        #[serde(default = "as_it_is")]
+        /// How many times as much the prior counts as was best over the machines of the fleet, above 0, 1 by default. More is
+        /// nearer to the mean.
+        #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         prior_weight: f64,
     },
@@ -62,6 +63,11 @@ pub(crate) const PRIOR: &str = "solver.prior";
 
 fn as_it_is() -> f64 {
     1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_as_it_is(weight: &f64) -> bool {
+    *weight == as_it_is()
 }
 
 fn one() -> Penalty {
