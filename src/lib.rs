@@ -69,6 +69,8 @@ use athermal_estimators as _;
 #[cfg(feature = "cli")]
 use athermal_export as _;
 use athermal_features as _;
+#[cfg(feature = "cli")]
+use athermal_fleet as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_http as _;
 use athermal_kinematics as _;

@@ -12,6 +12,8 @@ mod parquet_sink;
 mod rows;
 mod stamp;
 
+pub use file::{Batches, batches};
+
 use athermal_files::{FileKind, register_file_kind};
 
 register_file_kind!(FileKind {

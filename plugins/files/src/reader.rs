@@ -159,8 +159,11 @@ impl Reader {
         Ok(Self::of_rows(rows, separator, layout, table, &options))
     }
 
-    /// Reads a file that is no text.
-    fn from_typed(
+    /// Reads columns that are no text, such as those of a data frame; the path stands for them in messages.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`].
+    pub fn from_typed(
         path: &Path,
         file: Box<dyn TypedFile>,
         layout: Layout,

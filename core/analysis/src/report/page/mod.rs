@@ -231,10 +231,11 @@ fn card(html: &mut String, facts: &Facts) {
     }
     html.push_str(".</p><ul>");
     for data in &card.data {
+        let path = Some(&*data.path).filter(|path| !path.is_empty());
         let _ = write!(
             html,
             "<li>{}: {} rows, {} bytes, checksum {}</li>",
-            escaped(&data.path),
+            escaped(path.unwrap_or("rows from elsewhere")),
             data.rows,
             data.bytes,
             escaped(&data.hash)
