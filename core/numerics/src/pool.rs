@@ -274,9 +274,10 @@ mod tests {
 
     /// So many machines whose coefficients differ in one direction only, with 600 rows each and stretches of 20.
     fn fleet(machines: u64, apart: f64) -> Vec<MachineRows> {
+        let mut of_machine = draws::normal(77);
         let machine = |seed| {
             let mut normal = draws::normal(seed);
-            let along = apart * normal();
+            let along = apart * of_machine();
             let slopes = [2.0 + along, -1.0 + along, 0.5];
             let mut rows = MachineRows {
                 total: Gram::new(3),
@@ -298,23 +299,25 @@ mod tests {
 
     #[test]
     fn a_prior_of_machines_is_better_than_their_mean_and_than_no_prior() {
-        let pooled = pool(&fleet(24, 1.0), 1.0, &VARIANCES).unwrap();
+        let pooled = pool(&fleet(24, 2.0), 1.0, &VARIANCES).unwrap();
         let best = pooled.errors[pooled.place];
         // The noise of the rows is 3, its variance 9; rows are independent, so that is the right penalty.
         assert_eq!(pooled.place, 2, "{:?}", pooled.errors);
         assert!((pooled.penalty - 9.0).abs() < 0.5, "{}", pooled.penalty);
         assert!(best < 3.15, "{best}");
         assert!(
-            pooled.error_of_mean > 1.05 * best,
+            pooled.error_of_mean > 1.15 * best,
             "{}",
             pooled.error_of_mean
         );
         assert!(pooled.errors[0] > 1.03 * best, "{:?}", pooled.errors);
         // So large a penalty leaves the mean.
         assert!((pooled.errors[6] / pooled.error_of_mean - 1.0).abs() < 1e-3);
-        for (found, expected) in pooled.prior.mean.iter().zip([5.0, 2.0, -1.0, 0.5]) {
-            assert!((found - expected).abs() < 0.7, "{found} for {expected}");
-        }
+        // The first two differ from machine to machine, by the same.
+        let mean = &pooled.prior.mean;
+        assert!((mean[0] - 5.0).abs() < 0.1, "{mean:?}");
+        assert!((mean[1] - mean[2] - 3.0).abs() < 0.15, "{mean:?}");
+        assert!((mean[3] - 0.5).abs() < 0.1, "{mean:?}");
     }
 
     #[test]
