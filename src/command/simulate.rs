@@ -172,14 +172,42 @@ impl Simulate {
         output: &Path,
         terminal: &Terminal,
     ) -> Result<u64, Failure> {
-        let setup = self.setup(machine)?;
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
-        let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
+        let recording = self.recording(machine)?;
         match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
             Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
         }
+    }
+
+    fn recording<'a>(&self, machine: &'a dyn Machine) -> Result<Simulated<'a>, Failure> {
+        let setup = self.setup(machine)?;
+        Ok(Simulated::new(machine, setup).with_faults(self.faults.clone()))
+    }
+
+    /// Simulates a machine by its own: each row with its time in ns goes to `put`. Gives the names of the columns behind the time.
+    ///
+    /// # Errors
+    /// When there is no such machine, or the schedule or a fault does not fit it.
+    pub fn rows(
+        &self,
+        terminal: &Terminal,
+        put: &mut dyn FnMut(i64, &[f64]),
+    ) -> Result<Vec<String>, Failure> {
+        let name = self.machine.as_deref().unwrap_or_default();
+        let machine = machine(name).map_err(refused)?.machine;
+        let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
+        let machine = disturbed.as_deref().unwrap_or(machine);
+        let mut simulation = Watched::start(&self.recording(machine)?, terminal)?;
+        let channels = machine.channels();
+        let (mut row, mut values) = (Row::empty(channels), Vec::new());
+        while simulation.next(&mut row) {
+            values.clear();
+            take(&row, self.truth, &mut values);
+            put(row.time_ns, &values);
+        }
+        Ok(table_columns(channels, self.truth))
     }
 
     /// Writes a recording of the machine under the correction of a graph.

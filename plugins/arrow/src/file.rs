@@ -14,7 +14,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use crate::rows::{Column, Rows, Wanted};
 
 /// So many rows are decoded at a time: the numbers of a wide table then stay in the second cache.
-const BATCH: usize = 2048;
+pub(crate) const BATCH: usize = 2048;
 
 /// Batches, one after the other.
 pub type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
