@@ -41,9 +41,9 @@ mod other_processors;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plugin_crates;
-mod priors;
 mod report;
 mod report_graphs;
+mod report_novelty;
 mod restarted_pipes;
 mod schema;
 mod services;
