@@ -7,11 +7,13 @@ use athermal_analysis::figures::counted;
 use athermal_command::{Answer, Failure, Format, Terminal, numbers, println};
 use athermal_core::compile::Wanted;
 use athermal_core::diagnostic::{Diagnostics, Sources};
+use athermal_core::time::Duration;
 use athermal_run::live::store::{FileLock, write_whole};
 use athermal_run::model::Model;
 use clap::Args;
 use serde_json::json;
 
+use super::pooled::Pooled;
 use super::table::{self, remark};
 use super::{Files, PoolFailure, Workers, few, largest_first, model_of, warn_died, warn_failed};
 use crate::figure::{Figure, standings};
@@ -32,7 +34,8 @@ use crate::pool::{Event, run};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fleet fit graph.toml --data 'logs/machine=*/*.csv' -o models\n  \
-                        athermal fleet fit graph.toml --data 'logs/{machine}-*.csv' -o models --jobs 4"
+                        athermal fleet fit graph.toml --data 'logs/{machine}-*.csv' -o models --jobs 4\n  \
+                        athermal fleet fit graph.toml --data 'logs/machine=*/*.csv' --pooled -o type.json"
 )]
 pub(crate) struct Fit {
     /// The graph, or a model whose graph is fitted anew
@@ -43,7 +46,7 @@ pub(crate) struct Fit {
     data: Vec<String>,
     #[command(flatten)]
     files: Files,
-    /// The folder that the models go into
+    /// The folder that the models go into; with `--pooled` the file of the prior
     #[arg(long, short, value_name = "FOLDER")]
     output: PathBuf,
     #[command(flatten)]
@@ -60,6 +63,22 @@ pub(crate) struct Fit {
     /// The date on the models, as RFC 3339 writes it; else the present time, or that of a fit that is gone on with
     #[arg(long, value_name = "DATE", value_parser = date)]
     date: Option<String>,
+    /// Find what the machines have in common instead, as a prior for a new one: its file is `--output`
+    ///
+    /// Of each `linear`, `ar` and `arx` with the solver `ridge` the prior has mean and covariance of the coefficients over the machines. A
+    /// graph whose solver is `{ type = "ridge", prior = "type.json" }` is fitted towards it. The table shows the error of a machine that was
+    /// left out, after a short stretch of its own data: with the prior, of its mean alone, and without it. Machines are fitted one after
+    /// the other, in this process.
+    #[arg(long, conflicts_with_all = ["date", "all"])]
+    pooled: bool,
+    /// How long the data of a new machine are, for which the prior is made
+    #[arg(
+        long,
+        value_name = "DURATION",
+        default_value = "2h",
+        requires = "pooled"
+    )]
+    stretch: Duration,
     /// Show all machines, not the worst 20 alone
     #[arg(long)]
     all: bool,
@@ -87,6 +106,18 @@ impl Fit {
     /// When the graph has mistakes, files are of no machine, or models cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let machines = self.files.machines(&self.data)?;
+        if self.pooled {
+            let pooled = Pooled {
+                graph: &self.graph,
+                machines: &machines,
+                reading: &self.files.reading,
+                output: &self.output,
+                stretch: self.stretch,
+                memory: self.memory.saturating_mul(1 << 20),
+                threads: self.workers.count(),
+            };
+            return pooled.run(terminal);
+        }
         let hash = self.checked_graph(terminal)?;
         std::fs::create_dir_all(&self.output).map_err(|error| {
             Failure::Outside(format!("cannot make {}: {error}", self.output.display()))

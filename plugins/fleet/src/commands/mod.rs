@@ -3,6 +3,7 @@
 mod compare;
 mod evaluate;
 mod fit;
+mod pooled;
 mod report;
 mod table;
 
