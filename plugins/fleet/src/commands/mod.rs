@@ -140,7 +140,7 @@ fn largest_first(machines: &Machines) -> Vec<&String> {
         .iter()
         .map(|(name, files)| (bytes(files), name))
         .collect();
-    sizes.sort_by(|one, other| other.0.cmp(&one.0));
+    sizes.sort_by_key(|of| std::cmp::Reverse(of.0));
     sizes.into_iter().map(|(_, name)| name).collect()
 }
 
