@@ -101,7 +101,7 @@ z = "linear"
         let mut at = [20.0, 20.0];
         let row = |nth: u32| {
             at = at.map(|of| of + 0.1 * random.normal());
-            let z = if nth % 3 == 0 {
+            let z = if nth.is_multiple_of(3) {
                 40.0 * (at[0] - at[1]) + random.normal()
             } else {
                 f64::NAN
