@@ -45,6 +45,7 @@ fn what_was_simulated_is_told_to_programs_too() {
     let lines = std::fs::read_to_string(&output).unwrap().lines().count();
     let expected = json!({
         "output": output, "rows": lines - 1, "machine": "linear-axis", "days": 0.01, "seed": 3,
+        "spread": 0.0, "machine_seed": 1,
     });
     assert_eq!(told, expected);
 }

@@ -63,7 +63,7 @@ fn a_graph_in_the_loop_knows_the_recipe_of_the_machine_ahead() {
     for pair in seen.windows(2) {
         changes += usize::from(pair[0].1[1] != pair[1].1[1]);
     }
-    assert!(changes > 2, "the chuck changed {changes} times");
+    assert!(changes >= 2, "the chuck changed {changes} times");
     assert!(simulation.applied().iter().any(|nm| nm.abs() > 10.0));
 }
 
