@@ -8,6 +8,7 @@ const GRAPH: &str = r#"
 schema = 1
 [time]
 column = "time"
+unit = "rfc3339"
 
 [signals.set_point]
 unit = "Cel"

@@ -290,6 +290,7 @@ impl Fit {
             }
         };
         machines.insert(job.machine.clone(), entry);
+        writing.is_new = true;
         writing
             .write_soon()
             .map_err(|error| self.not_written(&error))
