@@ -8,9 +8,13 @@
 
 mod column;
 mod file;
+mod memory;
 mod parquet_sink;
 mod rows;
 mod stamp;
+
+pub use file::{Batches, batches};
+pub use memory::table;
 
 use athermal_files::{FileKind, register_file_kind};
 

@@ -1,7 +1,7 @@
 //! The exogenous estimator: drift from temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+    Estimator, InputPort, Learns, Mistake, PlannedRow, Regressors, Trainer, TrainingSetup,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ use crate::solver::Solver;
 /// thousand lay. Larger values in a direction in which they varied in the fit hardly count, a new direction does: with the
 /// standardised features `z` of `p` columns, `n` rows and the eigenvectors `v` and eigenvalues `λ` of `ZᵀZ / n` above 0.05, at most
 /// twelve, it is the root of `(‖z‖² − Σ λ / (λ + 0.001) (vᵀz)²) / (‖z‖² + p)` over its 99.9 % quantile. A fit whose rows do not fit in memory
-/// has none, nor has an estimator that goes on learning.
+/// has none.
 ///
 /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
 /// newest truth, in the numbers of `rls`.
@@ -60,6 +60,14 @@ impl Estimator for Linear {
         self.solver.learns()
     }
 
+    fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
+        self.solver.mistakes_of_row(row)
+    }
+
+    fn needs_constants(&self) -> bool {
+        self.solver.prior().is_some()
+    }
+
     fn has_novelty(&self) -> bool {
         true
     }
@@ -73,7 +81,11 @@ impl Estimator for Linear {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(LinearTrainer::new(setup, self.solver, self.selection))
+        Box::new(LinearTrainer::new(
+            setup,
+            self.solver.clone(),
+            self.selection,
+        ))
     }
 }
 

@@ -11,10 +11,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FEATURES_AND_TRUTH, present_features};
+use crate::novelty::novelty_mistakes;
 use crate::regression::LinearTrainer;
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::selection::Selection;
-use crate::solver::Solver;
+use crate::solver::{PRIOR, Solver};
 
 /// More terms would take the memory of many rows, and no machine has been seen that needs them.
 const MOST_TERMS: usize = 500;
@@ -57,7 +58,12 @@ impl Estimator for Polynomial {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        self.solver.mistakes()
+        let mut mistakes = self.solver.mistakes();
+        if self.solver.prior().is_some() {
+            let message = "a prior is for regressors as they are, and not for their products";
+            mistakes.push(Mistake::at(PRIOR, message).help("leave `prior` out"));
+        }
+        mistakes
     }
 
     fn has_novelty(&self) -> bool {
@@ -89,7 +95,7 @@ impl Estimator for Polynomial {
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(PolynomialTrainer {
             terms: self.terms(setup.regressors.len()),
-            solver: self.solver,
+            solver: self.solver.clone(),
             selection: self.selection,
             running: Standardizer::new(setup.regressors.len()),
             setup: TrainingSetup {
@@ -207,7 +213,7 @@ impl PolynomialTrainer {
             found_from: self.waiting.len() / (features.len() + 1),
             centres: standard.means,
             scales: standard.scales,
-            trainer: LinearTrainer::new(&setup, self.solver, Some(self.selection)),
+            trainer: LinearTrainer::new(&setup, self.solver.clone(), Some(self.selection)),
             z: Vec::new(),
             row: Vec::new(),
         };
@@ -321,10 +327,7 @@ impl Predictor for PolynomialPredictor {
         mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
         let features = self.terms.iter().flat_map(|term| [Some(term.0), term.1]);
         mistakes.extend(term_mistake(width, features.flatten()));
-        if let Some(novelty) = &self.novelty {
-            let lists = [("novelty.means", novelty.width())];
-            mistakes.extend(Mistake::of_lengths(self.terms.len(), &lists));
-        }
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), self.terms.len()));
         mistakes
     }
 

@@ -5,6 +5,7 @@ use athermal_core::node::{
     TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::node::{number, numbers};
+use athermal_core::unit::Unit;
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, Novelty, PredictionVariance,
     Sgd, SgdOptions, Standardization,
@@ -13,7 +14,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
+use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 use crate::online::{Frame, OnlinePredictor, Recursion};
+use crate::prior::{Met, Wanted};
 use crate::selection::Selection;
 use crate::solver::Solver;
 use crate::unsolved::unsolved;
@@ -23,6 +26,8 @@ use crate::unsolved::unsolved;
 pub(crate) struct LinearTrainer {
     regressors: Vec<Regressor>,
     solver: Solver,
+    /// The prior as these rows meet it, or why it does not.
+    prior: Option<Result<Met, String>>,
     selection: Option<Selection>,
     order: Option<LagOrder>,
     blocks: GramBlocks,
@@ -37,16 +42,31 @@ pub(crate) struct Found {
     pub(crate) standard: Standardization,
     pub(crate) squares: LeastSquares,
     pub(crate) fit: LinearFit,
+    /// Where the fit is one towards a prior.
+    of_prior: Option<OfPrior>,
 }
+
+/// What says of a fit towards a prior how far its predictions may be off, and its regressors from those of the fleet.
+type OfPrior = (Option<PredictionVariance>, Option<Novelty>);
 
 impl LinearTrainer {
     pub(crate) fn new(setup: &TrainingSetup, solver: Solver, selection: Option<Selection>) -> Self {
         let blocks = GramBlocks::with_row_memory(setup.regressors.len(), setup.memory);
+        let prior = solver.prior().map(|(prior, _)| {
+            let unit = Unit::parse(&setup.error_unit).map_err(|error| error.to_string())?;
+            prior.meet(Wanted {
+                instance: &setup.instance,
+                regressors: &setup.regressors,
+                unit: &unit,
+                ahead: setup.ahead,
+            })
+        });
         let of_selection = selection.as_ref().map_or(1, Selection::parts);
         let parts = of_selection.max(solver.penalty().parts());
         Self {
             regressors: setup.regressors.clone(),
             solver,
+            prior,
             selection,
             order: None,
             blocks: blocks.cut_into(parts),
@@ -105,7 +125,8 @@ impl LinearTrainer {
         let (chosen, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
         let solved = squares.solve(&gram, &chosen, &standard.scales, self.blocks.rows());
-        let fit = solved.map_err(unsolved)?;
+        let mut fit = solved.map_err(unsolved)?;
+        let of_prior = self.towards_prior(&gram, &standard.scales, alpha, &mut fit, report)?;
         report.condition = Some(fit.condition);
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         let of_all = self.selection.as_ref().and_then(|_| {
@@ -124,12 +145,46 @@ impl LinearTrainer {
             standard,
             squares,
             fit,
+            of_prior,
         })
+    }
+
+    /// Pulls a fit towards the prior, where there is one; gives what says how far its predictions may be off.
+    fn towards_prior(
+        &self,
+        gram: &Gram,
+        scales: &[f64],
+        alpha: f64,
+        fit: &mut LinearFit,
+        report: &mut TrainingReport,
+    ) -> Result<Option<OfPrior>, TrainingError> {
+        let (Some(prior), Some((_, weight))) = (&self.prior, self.solver.prior()) else {
+            return Ok(None);
+        };
+        let prior = prior.as_ref().map_err(|reason| TrainingError::Unsolvable {
+            reason: reason.clone(),
+        })?;
+        let pull = prior.pull(weight, alpha);
+        let columns = prior.columns(&fit.columns);
+        let solved = prior.coefficients.fit(gram, &columns, scales, pull);
+        let solved = solved.map_err(unsolved)?;
+        fit.coefficients = solved.coefficients;
+        fit.intercept = solved.intercept;
+        fit.residual_sum_of_squares = solved.residual_sum_of_squares;
+        // What is said of how least squares were solved is not of this fit.
+        fit.method = Method::Cholesky;
+        prior.tell(pull, &self.regressors, &fit.columns, report);
+        Ok(Some((solved.variance, prior.novelty(&fit.columns))))
     }
 
     /// The range of some of the regressors, where it was kept.
     pub(crate) fn range_of(&self, columns: &[usize]) -> Option<TrainedRange> {
         Some(self.range.as_ref()?.of(columns))
+    }
+
+    /// How far rows are from those of a fit.
+    pub(crate) fn novelty_of(&self, found: &Found) -> Option<Novelty> {
+        novelty_of(&self.blocks, &found.standard, &found.fit.columns)
     }
 
     /// How many rows it was given.
@@ -150,8 +205,18 @@ impl LinearTrainer {
         &self,
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
-        let found = self.find(report)?;
-        let novelty = novelty_of(&self.blocks, &found.standard, &found.fit.columns);
+        let mut found = self.find(report)?;
+        if let Some((variance, novelty)) = found.of_prior.take() {
+            let model = LinearPredictor {
+                variance,
+                regressors: found.names,
+                coefficients: found.fit.coefficients,
+                intercept: found.fit.intercept,
+                novelty,
+            };
+            return Ok((model, None));
+        }
+        let novelty = self.novelty_of(&found);
         match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => {
                 let model = LinearPredictor {
@@ -226,7 +291,7 @@ impl LinearTrainer {
             coefficients,
             intercept: sgd.intercept() + mean - shift,
             variance: None,
-            novelty,
+            novelty: novelty.clone(),
         };
         let squared = rows.iter().map(|(x, y, _)| {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
@@ -239,7 +304,7 @@ impl LinearTrainer {
         report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
-            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse))
+            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse), novelty)
         });
         Ok((model, online))
     }
@@ -291,15 +356,6 @@ impl Trainer for LinearTrainer {
         };
         Ok(Trained { predictor, report })
     }
-}
-
-/// How far rows are from those of a fit by some of their columns, where its rows were kept and say so.
-pub(crate) fn novelty_of(
-    blocks: &GramBlocks,
-    standard: &Standardization,
-    columns: &[usize],
-) -> Option<Novelty> {
-    Novelty::of(&blocks.total(), standard, columns, blocks.rows()?)
 }
 
 /// Why stochastic gradients gave no model: their steps grew without bound.
@@ -388,10 +444,7 @@ impl Predictor for LinearPredictor {
                 mistakes.push(Mistake::at("rows", message));
             }
         }
-        if let Some(novelty) = &self.novelty {
-            let lists = [("novelty.means", novelty.width())];
-            mistakes.extend(Mistake::of_lengths(width, &lists));
-        }
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         mistakes
     }
 
@@ -404,8 +457,7 @@ impl Predictor for LinearPredictor {
     }
 
     fn novelty(&self, regressors: &[f64]) -> f64 {
-        let novelty = self.novelty.as_ref();
-        novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
+        novelty_at(self.novelty.as_ref(), regressors)
     }
 
     fn centre(&self) -> f64 {

@@ -29,7 +29,7 @@ impl Looped {
         let setup = Setup {
             days: 3.0,
             seed: 1,
-            schedule: None,
+            ..Setup::default()
         };
         let recording = Simulated::new(machine, setup);
         model.fitted = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {})
@@ -56,14 +56,16 @@ impl Looped {
             days,
             seed,
             schedule: schedule.cloned(),
+            ..Setup::default()
         };
         let faults = fault.iter().flat_map(|faults| faults.split(' '));
         let faults = faults.map(|fault| fault.parse().unwrap()).collect();
-        let simulation = Simulated::new(self.machine, setup)
+        let simulation = Simulated::new(self.machine, setup.clone())
             .with_faults(faults)
             .start()
             .unwrap();
-        ClosedLoop::new(self.machine, simulation, self.model.engine().unwrap()).unwrap()
+        let engine = self.model.engine().unwrap();
+        ClosedLoop::new(self.machine, &setup, simulation, engine).unwrap()
     }
 
     /// A day under correction, with sensor faults as the command line takes them, one after the other.

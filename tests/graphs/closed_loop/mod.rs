@@ -1,6 +1,7 @@
 //! A correction on a simulated machine, as a loop: bounded, still where it knows nothing, and as good as before once a fault is over.
 
 mod looped;
+mod recipe;
 mod remeasured;
 mod served;
 
@@ -161,7 +162,7 @@ fn a_correction_that_the_axis_clips_fools_nobody() {
     let setup = Setup {
         days: 0.5,
         seed: 3,
-        schedule: None,
+        ..Setup::default()
     };
     let mut alone = Simulated::new(looped.machine, setup).start().unwrap();
     let mut as_alone = looped.model.engine().unwrap();

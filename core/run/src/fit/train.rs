@@ -119,6 +119,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
     let mut kept = trainee.validity.kept();
     kept.retain(|candidate| !constant.contains(candidate));
     let setup = TrainingSetup {
+        instance: node.instance(),
         regressors: kept
             .iter()
             .map(|&candidate| regressors[candidate].clone())

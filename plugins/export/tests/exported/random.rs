@@ -170,16 +170,18 @@ ahead = "{ahead}s"
 
 fn votes(random: &mut Prng, state: &str, text: &mut String) {
     let voters = r#"["thermal.{axis}", "motion.{axis}", "both.{axis}", "masses_too.{axis}"]"#;
+    // A memory, and how many truths it holds at most.
     let memory = |random: &mut Prng| {
         let truths = 1 + random.between(0.0, 30.0) as u64;
         let seconds = 5 + random.between(0.0, 200.0) as u64;
         match random.between(0.0, 3.0) as u64 {
-            0 => format!("{{ truths = {truths} }}"),
-            1 => format!("{{ half_life = \"{seconds}s\" }}"),
-            _ => format!("\"{seconds}s\""),
+            0 => (format!("{{ truths = {truths} }}"), truths),
+            1 => (format!("{{ half_life = \"{seconds}s\" }}"), u64::MAX),
+            _ => (format!("\"{seconds}s\""), u64::MAX),
         }
     };
-    let (weighted, best, guard) = (memory(random), memory(random), memory(random));
+    let ((weighted, _), (best, _), (guard, held)) =
+        (memory(random), memory(random), memory(random));
     let weights = one_of(random, &["inverse_power", "as_printed", "as_printed_raw"]);
     let power = match weights {
         "inverse_power" => one_of(
@@ -271,7 +273,7 @@ dwell = "{}s"
         10 + random.between(0.0, 100.0) as u64,
         one_of(random, &["0.0", "0.0", "0.1"]),
         one_of(random, &["0.0", "0.2", "0.3", "0.49"]),
-        1 + random.between(0.0, 6.0) as u64,
+        held.min(1 + random.between(0.0, 6.0) as u64),
         one_of(random, &["1.0", "1.5", "3.0"]),
         random.between(0.0, 20.0) as u64,
     );
