@@ -1,6 +1,7 @@
 //! Training rows as Gram matrices of blocks, in their order. Decides how many rows make a block and when rows are no longer
 //! kept; does not decide what is fitted on them.
 
+use crate::folds::Edges;
 use crate::gram::triangle;
 use crate::{FoldRows, Folds, Gram, NumericsError, Split};
 use std::ops::Range;
@@ -30,9 +31,11 @@ pub struct GramBlocks {
     width: usize,
     row_memory: usize,
     most_blocks: usize,
-    /// Rows per closed block: [`BLOCK_ROWS`] times a power of two.
+    /// Rows per closed block: [`BLOCK_ROWS`] times a power of two. Not of stretches.
     block_rows: usize,
     closed: Vec<Gram>,
+    /// Where each closed block ends, where blocks are [stretches](GramBlocks::in_stretches).
+    ends: Option<Vec<u64>>,
     /// The block being filled, whole chunks only.
     open: Gram,
     /// The rows that do not make a whole chunk yet.
@@ -74,6 +77,7 @@ impl GramBlocks {
             most_blocks: (BLOCK_MEMORY / block_bytes).clamp(FEWEST_BLOCKS, MOST_BLOCKS),
             block_rows: BLOCK_ROWS,
             closed: Vec::new(),
+            ends: None,
             open: Gram::new(width),
             pending: Chunk::default(),
             kept: (row_memory > 0).then(Vec::new),
@@ -91,6 +95,55 @@ impl GramBlocks {
             most_blocks: self.most_blocks.max(needed),
             ..self
         }
+    }
+
+    /// The same with blocks that [`GramBlocks::end_stretch`] ends, and no rows kept. Only before the first row.
+    #[must_use]
+    pub fn in_stretches(self) -> Self {
+        Self {
+            ends: Some(Vec::new()),
+            kept: None,
+            row_memory: 0,
+            ..self
+        }
+    }
+
+    /// Whether blocks are stretches, which folds do not cut.
+    pub fn is_in_stretches(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// Adds the rows of `gram` to the stretch that is open; those added one by one come before them.
+    ///
+    /// # Errors
+    /// [`NumericsError::Width`] when the widths differ.
+    pub fn merge(&mut self, gram: &Gram) -> Result<(), NumericsError> {
+        self.add_pending();
+        self.open.merge(gram)
+    }
+
+    /// Ends a stretch: the next row begins another, and a fold may begin with it. Does nothing without rows, nor where blocks are no
+    /// stretches. Of more than 1,024 stretches, or fewer wide ones, neighbours are put together.
+    pub fn end_stretch(&mut self) {
+        if self.ends.is_none() || self.open.count() + self.pending_rows() as u64 == 0 {
+            return;
+        }
+        self.add_pending();
+        let end = self.pending_start();
+        let next = self.open.emptied();
+        self.closed.push(std::mem::replace(&mut self.open, next));
+        self.ends.iter_mut().for_each(|ends| ends.push(end));
+        if self.closed.len() > self.most_blocks {
+            self.halve_blocks();
+        }
+    }
+
+    /// Adds the rows that do not make a whole chunk to the open block.
+    fn add_pending(&mut self) {
+        let (values, weights) = self.pending.part(0..self.pending_rows(), self.width + 1);
+        self.open.add_rows(values, weights, &mut self.scratch);
+        self.pending.values.clear();
+        self.pending.weights.clear();
     }
 
     /// The number of regressors.
@@ -157,7 +210,7 @@ impl GramBlocks {
         let order = self.width + 1;
         let (values, weights) = self.pending.part(0..BLOCK_ROWS, order);
         self.open.add_rows(values, weights, &mut self.scratch);
-        if self.open.count() == self.block_rows as u64 {
+        if self.ends.is_none() && self.open.count() == self.block_rows as u64 {
             let next = self.open.emptied();
             self.closed.push(std::mem::replace(&mut self.open, next));
             if self.closed.len() > self.most_blocks {
@@ -178,6 +231,13 @@ impl GramBlocks {
     }
 
     fn halve_blocks(&mut self) {
+        if let Some(ends) = &mut self.ends {
+            let (mut nth, last) = (0, ends.len() - 1);
+            ends.retain(|_| {
+                nth += 1;
+                nth % 2 == 0 || nth - 1 == last
+            });
+        }
         let mut blocks = std::mem::take(&mut self.closed).into_iter();
         while let Some(mut first) = blocks.next() {
             match blocks.next() {
@@ -185,6 +245,7 @@ impl GramBlocks {
                     first.add_same_shift(&second);
                     self.closed.push(first);
                 }
+                None if self.ends.is_some() => self.closed.push(first),
                 None => self.open = first,
             }
         }
@@ -192,7 +253,10 @@ impl GramBlocks {
     }
 
     fn closed_rows(&self) -> u64 {
-        (self.closed.len() * self.block_rows) as u64
+        match &self.ends {
+            Some(ends) => ends.last().copied().unwrap_or(0),
+            None => (self.closed.len() * self.block_rows) as u64,
+        }
     }
 
     fn pending_start(&self) -> u64 {
@@ -231,13 +295,13 @@ impl GramBlocks {
     /// # Errors
     /// [`NumericsError::Folds`] for fewer than two folds or too few rows or blocks to fill them.
     pub fn splits(&self, folds: &Folds) -> Result<Vec<Split>, NumericsError> {
-        let size = if self.exact_folds() {
-            1
-        } else {
-            self.block_rows as u64
-        };
         let count = folds.count();
-        let folds = folds.of_blocks(self.count(), size, &self.starts)?;
+        let edges = match &self.ends {
+            Some(ends) => Edges::At(ends),
+            None if self.exact_folds() => Edges::Every(1),
+            None => Edges::Every(self.block_rows as u64),
+        };
+        let folds = folds.of_blocks(self.count(), edges, &self.starts)?;
         if folds.iter().any(|fold| fold.test.end - fold.test.start < 2) {
             let rows = self.count();
             return Err(NumericsError::FoldOfOneRow { folds: count, rows });
@@ -307,10 +371,13 @@ impl GramBlocks {
     }
 
     fn block_span(&self, rows: Range<u64>) -> Gram {
-        let size = self.block_rows as u64;
         let mut gram = self.open.emptied();
-        let whole =
-            (rows.start / size) as usize..(rows.end.min(self.closed_rows()) / size) as usize;
+        // How many blocks end at a row or before it.
+        let until = |row: u64| match &self.ends {
+            Some(ends) => ends.partition_point(|end| *end <= row),
+            None => (row / self.block_rows as u64) as usize,
+        };
+        let whole = until(rows.start)..until(rows.end.min(self.closed_rows()));
         for block in &self.closed[whole] {
             gram.add_same_shift(block);
         }
@@ -517,5 +584,52 @@ mod tests {
         let rows: Vec<_> = blocks.rows().unwrap().iter().collect();
         assert_eq!(rows, [(&[1.0][..], 2.0, 1.0), (&[3.0][..], 4.0, 0.5)]);
         assert_eq!(blocks.total().weight(), 1.5);
+    }
+
+    #[test]
+    fn stretches_of_sums_are_those_of_their_rows_and_are_not_cut() {
+        let mut stretches = GramBlocks::new(2).in_stretches();
+        let ends = [0, 300, 420, 900, 1000];
+        for pair in ends.windows(2) {
+            let middle = pair[0] + 7;
+            for i in pair[0]..middle {
+                let (x, y) = row(i);
+                stretches.push(&x, y);
+            }
+            let (x, y) = row(pair[1]);
+            // About a shift of its own.
+            let mut sums = Gram::with_shift(vec![x[0], x[1], y]).unwrap();
+            for i in middle..pair[1] {
+                let (x, y) = row(i);
+                sums.push(&x, y);
+            }
+            stretches.merge(&sums).unwrap();
+            stretches.end_stretch();
+            stretches.end_stretch();
+        }
+        assert_eq!((stretches.count(), stretches.blocks()), (1000, 4));
+        assert!(stretches.rows().is_none() && !stretches.exact_folds());
+        assert_near(&stretches.total(), &direct(0..1000));
+        let splits = stretches.splits(&Folds::contiguous(2)).unwrap();
+        assert_near(&splits[0].test, &direct(0..420));
+        assert_near(&splits[0].train, &direct(420..1000));
+    }
+
+    #[test]
+    fn of_more_stretches_than_are_kept_neighbours_are_one() {
+        let mut stretches = GramBlocks::new(1).in_stretches();
+        for i in 0..3000_u32 {
+            stretches.push(&[f64::from(i % 7)], f64::from(i % 3));
+            stretches.end_stretch();
+        }
+        assert!(stretches.blocks() <= MOST_BLOCKS + 1);
+        assert_eq!(stretches.count(), 3000);
+        assert_eq!(stretches.total().count(), 3000);
+        let thirds = stretches.splits(&Folds::contiguous(3)).unwrap();
+        assert!(
+            thirds
+                .iter()
+                .all(|split| split.test.count().abs_diff(1000) <= 8)
+        );
     }
 }
