@@ -15,6 +15,7 @@ mod evaluate;
 mod explain;
 mod faults;
 mod fit;
+mod fit_blocks;
 mod init;
 mod model;
 mod new;
