@@ -11,7 +11,7 @@ use std::time::{Duration, Instant as Clock};
 
 use athermal::Model;
 use die_tester::by_hand::{Dense, Learning, Shipped};
-use die_tester::{Tick, dense, has_truth, model, ticks};
+use die_tester::{Tick, dense, has_truth, model, passing, ticks};
 
 fn main() {
     println!("{:<52}{:>14}{:>14}", "", "measured", "budget");
@@ -19,16 +19,19 @@ fn main() {
     let mut by_hand = Shipped::new(&shipped);
     let mut step = |tick: &Tick| by_hand.step(tick);
     live("selected slopes", &shipped, ticks(9.0, 2), &mut step);
+    novelty(&shipped, ticks(9.0, 2));
     let all = dense::model();
     let mut by_hand = Dense::new(&all);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of_all = dense::ticks(9.0, 2);
     live("all of 64 slopes", &all, of_all.clone(), &mut step);
+    novelty(&all, of_all.clone());
     let learning = dense::learning();
     let mut by_hand = Learning::new(&learning);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of = "all of 64 slopes that go on learning";
-    live(of, &learning, of_all, &mut step);
+    live(of, &learning, of_all.clone(), &mut step);
+    novelty(&learning, of_all);
     program();
 }
 
@@ -78,6 +81,46 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, by_hand: ByHand<'_>) {
         &format!("{rate:.0}"),
         "500000",
     );
+}
+
+/// What it costs to know how far regressors are outside, tick by tick beside an engine that does not.
+fn novelty(model: &Model, mut warm: Vec<Tick>) {
+    let measured = warm.split_off(17_280);
+    let mut engines = [model, &passing(model)].map(|model| {
+        let mut engine = model.engine().expect("the fit belongs to the graph");
+        for tick in &warm {
+            engine.step(tick.0, &tick.1).expect("ticks are in order");
+        }
+        engine
+    });
+    let mut all = [Vec::new(), Vec::new()];
+    for (nth, tick) in measured.iter().enumerate() {
+        // In turn, so that neither has the other's caches for itself.
+        for which in [nth % 2, 1 - nth % 2] {
+            let start = Clock::now();
+            let outputs = engines[which].step(tick.0, &tick.1);
+            std::hint::black_box(outputs.expect("ticks are in order"));
+            all[which].push(start.elapsed());
+        }
+    }
+    for (name, truth) in [
+        ("a tick that carries truth", true),
+        ("a tick without truth", false),
+    ] {
+        let [with, without] =
+            [&all[0], &all[1]].map(|times| Quantiles::of(times, &measured, truth));
+        print_line(
+            &format!("{name}, `outside = \"pass\"`"),
+            &us(without.median),
+            "",
+        );
+        let ratio = with.median.as_secs_f64() / without.median.as_secs_f64();
+        print_line(
+            &format!("{name}, \"shrink\" by \"pass\""),
+            &format!("{ratio:.2}"),
+            "1.20",
+        );
+    }
 }
 
 fn times(ticks: &[Tick], mut step: impl FnMut(&Tick)) -> Vec<Duration> {

@@ -8,7 +8,7 @@ pub mod dense;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use athermal::core::compile::{Wanted, compile};
+use athermal::core::compile::{Outside, PlannedRole, Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Disk, declare, load_text};
 use athermal::run::fit::{FitOptions, fit};
@@ -102,6 +102,26 @@ fn remove(json: &mut serde_json::Value) {
     if let Some(object) = json.as_object_mut() {
         object.remove("novelty");
         object.values_mut().for_each(remove);
+    }
+}
+
+/// The model with `outside = "pass"`, in which nobody reads a novelty, so that none is worked out.
+pub fn passing(model: &Model) -> Model {
+    let mut plan = (*model.plan).clone();
+    for node in &mut plan.nodes {
+        match &mut node.role {
+            PlannedRole::Estimator {
+                outside, novelty, ..
+            } => (*outside, *novelty) = (Outside::Pass, None),
+            PlannedRole::Combiner { beside, .. } => beside.novelties = None,
+            PlannedRole::Feature { .. } => {}
+        }
+    }
+    Model {
+        plan: Arc::new(plan),
+        graph: model.graph.clone(),
+        fitted: model.fitted.clone(),
+        card: None,
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use athermal::Model;
 use athermal::core::compile::{Outside, PlannedRole, Wanted};
 use athermal::core::diagnostic::{Diagnostics, Sources, listed};
+use athermal::core::node::Role;
 use athermal::core::quantity::Quantity;
 use athermal::run::model::ModelError;
 
@@ -76,22 +77,49 @@ pub fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
     }
 }
 
-/// Warns of a model that was fitted before fits kept where their edge is: what it predicts outside stays as it is.
+/// Warns of estimators that do not know where the edge of their fit is: what they predict outside stays as it is. These are fits of
+/// before fits kept it, or on rows that do not say, and kinds that never know.
 pub fn warn_without_novelty(terminal: &Terminal, model: &Model, path: &Path) {
-    let mut known = model.plan.nodes.iter().filter_map(|node| {
-        let PlannedRole::Estimator { outside, .. } = &node.role else {
-            return None;
+    let (mut unknown, mut never) = (Vec::new(), Vec::new());
+    for node in &model.plan.nodes {
+        let (
+            Role::Estimator(estimator),
+            PlannedRole::Estimator {
+                outside, novelty, ..
+            },
+        ) = (node.spec.role(), &node.role)
+        else {
+            continue;
         };
-        let fit = model.fitted.get(&node.instance())?;
+        let Some(fit) = model.fitted.get(&node.instance()) else {
+            continue;
+        };
         let row = vec![0.0; fit.uses().len()];
-        let heeded = *outside != Outside::Pass && !row.is_empty();
-        heeded.then(|| !fit.novelty(&row).is_nan())
-    });
-    let first = known.next();
-    if first == Some(false) && !known.any(|known| known) {
+        if row.is_empty() {
+            continue;
+        }
+        if !estimator.has_novelty() {
+            never.push(format!("{} ({})", node.instance(), node.kind.name));
+        } else if (novelty.is_some() || *outside != Outside::Pass) && fit.novelty(&row).is_nan() {
+            unknown.push(node.instance());
+        }
+    }
+    let of = |nodes: &[String], verbs: [&'static str; 2]| verbs[usize::from(nodes.len() > 1)];
+    if !unknown.is_empty() {
         terminal.warning(format_args!(
-            "{}: its fits do not say where their edge is, so predictions outside of them pass as they are; a new fit does",
-            path.display()
+            "{}: {} {} no `novelty`, since the fit kept no second moments of the regressors, so predictions outside of it pass as they are; \
+             fit again, on more rows than regressors and with all of them in `--memory`",
+            path.display(),
+            few(&unknown),
+            of(&unknown, ["has", "have"]),
+        ));
+    }
+    if !never.is_empty() {
+        terminal.note(format_args!(
+            "{}: {} {} no `novelty`, since the kind has none, so predictions outside of the fit pass as they are; put a `guard` behind",
+            path.display(),
+            few(&never),
+            of(&never, ["has", "have"]),
         ));
     }
 }

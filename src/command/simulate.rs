@@ -169,7 +169,9 @@ impl Simulate {
     ) -> Result<u64, Failure> {
         let engine = load_fitted(model, Wanted::default(), terminal)?.engine()?;
         let simulation = Box::new(Watched::start(recording, terminal)?);
-        let mut simulation = ClosedLoop::new(machine, simulation, engine).map_err(refused)?;
+        let setup = recording.setup();
+        let mut simulation =
+            ClosedLoop::new(machine, setup, simulation, engine).map_err(refused)?;
         let channels = machine.channels();
         let axes = channels.iter().filter(|channel| channel.is_axis());
         let mut columns = table_columns(channels, self.truth);

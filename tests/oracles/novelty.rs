@@ -184,14 +184,6 @@ memory = "15min"
 
 #[test]
 fn outside_is_refused_where_it_would_do_nothing() {
-    let told = problems(&graph(
-        "outside = \"pass\"\nsolver = { type = \"sgd\" }\nlearn = true",
-        "",
-    ));
-    assert!(
-        told.contains("`outside` would do nothing: it goes on learning"),
-        "{told}"
-    );
     let told = problems(
         &graph("outside = \"pass\"", "")
             .replace("\"linear\"", "\"persistence\"")

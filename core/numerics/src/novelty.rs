@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// So many directions are told apart at most: more cost more at a tick and find no more.
 const DIRECTIONS: usize = 12;
+/// So many directions are gone along at once: numbers of them between are filled up with zeros.
+const LANES: usize = 2;
 /// The variance below which rows hardly take a direction, in that of a regressor.
 const HARDLY: f64 = 0.05;
 /// The variance of noise in any direction, in that of a regressor: what weighs directions that rows do take.
@@ -26,8 +28,10 @@ const INSIDE: f64 = 0.999;
 #[serde(try_from = "StoredNovelty", into = "StoredNovelty")]
 pub struct Novelty {
     columns: Box<[Column]>,
-    /// How many directions there are; the others are zeros.
+    /// How many directions there are.
     directions: usize,
+    /// Of each column its part in each direction, `√(λ / (λ + 0.001)) v`, for the standardised regressor; filled up to whole lanes.
+    along: Box<[f64]>,
     edge: f64,
 }
 
@@ -38,8 +42,6 @@ struct Column {
     scale: f64,
     /// `1 / scale`.
     inverse: f64,
-    /// Its part in each direction, `√(λ / (λ + 0.001)) v`, for the standardised regressor.
-    along: [f64; DIRECTIONS],
 }
 
 /// The same as models hold it.
@@ -60,7 +62,6 @@ impl Column {
             mean,
             scale,
             inverse: 1.0 / scale,
-            along: [0.0; DIRECTIONS],
         }
     }
 }
@@ -68,7 +69,8 @@ impl Column {
 impl From<Novelty> for StoredNovelty {
     fn from(novelty: Novelty) -> Self {
         let columns = || novelty.columns.iter();
-        let parts = |nth: usize| columns().map(move |column| column.along[nth]);
+        let along = &novelty.along;
+        let parts = |nth: usize| along.iter().skip(nth).step_by(novelty.lanes()).copied();
         Self {
             edge: novelty.edge,
             means: columns().map(|column| column.mean).collect(),
@@ -103,23 +105,38 @@ impl TryFrom<StoredNovelty> for Novelty {
             return Err("`novelty` must have finite values, and scales and an edge above 0");
         }
         let both = stored.means.iter().zip(&stored.scales);
-        let mut columns: Box<[Column]> = both
-            .map(|(&mean, &scale)| Column::new(mean, scale))
-            .collect();
+        let columns = both.map(|(&mean, &scale)| Column::new(mean, scale));
+        let mut novelty = Self::new(columns.collect(), directions);
+        let lanes = novelty.lanes();
         for (nth, direction) in stored.directions.chunks_exact(width).enumerate() {
-            for (column, part) in columns.iter_mut().zip(direction) {
-                column.along[nth] = *part;
-            }
+            let places = novelty.along.iter_mut().skip(nth).step_by(lanes);
+            places
+                .zip(direction)
+                .for_each(|(place, part)| *place = *part);
         }
-        Ok(Self {
-            columns,
-            directions,
-            edge: stored.edge,
-        })
+        novelty.edge = stored.edge;
+        Ok(novelty)
     }
 }
 
 impl Novelty {
+    /// Of columns whose parts in so many directions are still zeros.
+    fn new(columns: Box<[Column]>, directions: usize) -> Self {
+        let mut novelty = Self {
+            columns,
+            directions,
+            along: Box::default(),
+            edge: 1.0,
+        };
+        novelty.along = vec![0.0; novelty.columns.len() * novelty.lanes()].into();
+        novelty
+    }
+
+    /// How many parts a column has, zeros among them.
+    fn lanes(&self) -> usize {
+        self.directions.max(1).next_multiple_of(LANES)
+    }
+
     /// That of some columns of rows; none where these rows do not say what is usual: where there are no more of them than columns, or
     /// where they never leave the directions that they vary in.
     #[must_use]
@@ -137,23 +154,19 @@ impl Novelty {
         let eigen = problem.gram.self_adjoint_eigen(Side::Lower).ok()?;
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
         let order = problem.active.len();
-        let mut novelty = Self {
-            columns: columns
-                .iter()
-                .map(|&column| Column::new(standard.means[column], standard.scales[column]))
-                .collect(),
-            directions: (0..order.min(DIRECTIONS))
-                .take_while(|nth| values[order - 1 - nth] > HARDLY * count)
-                .count(),
-            edge: 1.0,
-        };
+        let of = |&column: &usize| Column::new(standard.means[column], standard.scales[column]);
+        let directions = (0..order.min(DIRECTIONS))
+            .take_while(|nth| values[order - 1 - nth] > HARDLY * count)
+            .count();
+        let mut novelty = Self::new(columns.iter().map(of).collect(), directions);
+        let lanes = novelty.lanes();
         for nth in 0..novelty.directions {
             // They come from the smallest to the largest.
             let from = order - 1 - nth;
             let variance = values[from] / count;
             let share = (variance / (variance + NOISE)).sqrt();
             for (i, &column) in problem.active.iter().enumerate() {
-                novelty.columns[column].along[nth] = share * vectors[(i, from)];
+                novelty.along[column * lanes + nth] = share * vectors[(i, from)];
             }
         }
         let mut row = vec![0.0; columns.len()];
@@ -175,7 +188,11 @@ impl Novelty {
 
     /// What a linear form of the columns gives in their middle.
     #[must_use]
-    pub fn centre(&self, intercept: f64, coefficients: &[f64]) -> f64 {
+    pub fn centre<'a>(
+        &self,
+        intercept: f64,
+        coefficients: impl IntoIterator<Item = &'a f64>,
+    ) -> f64 {
         let columns = self.columns.iter().zip(coefficients);
         intercept + columns.map(|(column, b)| b * column.mean).sum::<f64>()
     }
@@ -204,11 +221,25 @@ impl Novelty {
     /// Numerator and denominator of `d`.
     #[inline]
     fn parts(&self, x: impl Iterator<Item = f64>) -> (f64, f64) {
-        let (mut size, mut along) = (0.0, [0.0; DIRECTIONS]);
-        for (column, x) in self.columns.iter().zip(x) {
+        // The same sums, of as many zeros as there must be.
+        match self.lanes() {
+            2 => self.parts_of::<2>(x),
+            4 => self.parts_of::<4>(x),
+            6 => self.parts_of::<6>(x),
+            8 => self.parts_of::<8>(x),
+            10 => self.parts_of::<10>(x),
+            _ => self.parts_of::<DIRECTIONS>(x),
+        }
+    }
+
+    #[inline]
+    fn parts_of<const LANES: usize>(&self, x: impl Iterator<Item = f64>) -> (f64, f64) {
+        let (mut size, mut along) = (0.0, [0.0; LANES]);
+        let (parts, _) = self.along.as_chunks::<LANES>();
+        for ((column, parts), x) in self.columns.iter().zip(parts).zip(x) {
             let z = (x - column.mean) * column.inverse;
             size += z * z;
-            along = std::array::from_fn(|nth| along[nth] + column.along[nth] * z);
+            along = std::array::from_fn(|nth| along[nth] + parts[nth] * z);
         }
         let known: f64 = along.iter().map(|part| part * part).sum();
         ((size - known).max(0.0), size + self.columns.len() as f64)

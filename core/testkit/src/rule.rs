@@ -47,6 +47,8 @@ pub enum Rule {
     Votes,
     /// A promised standard deviation is present and not negative; an interval stands about the prediction.
     Uncertainty,
+    /// A promised novelty is hardly ever above 1 on the data of the fit, above 1 far from them, and up to 1 changes no prediction.
+    Novelty,
     /// An answer that is asked for leaves no trace.
     NoTrace,
     /// A fit is the same with any number of threads; data that allow none are an error in words.
@@ -156,6 +158,10 @@ impl Rule {
                 "give NaN where no deviation or interval is known; else a deviation of 0 or more, and the lower end before the upper, \
                  with the combination between them. An estimator that says `has_std_dev` gives one in `Predictor::std_dev`, and in \
                  `Learner::std_dev` if it learns"
+            }
+            Self::Novelty => {
+                "keep in the fit what says how far regressors are outside of its rows, give it in `Predictor::novelty`, and in \
+                 `Learner::novelty` if it learns, 1 being where one row of a thousand lies beyond"
             }
             Self::NoTrace => {
                 "let `predict` and `combine` change nothing, not even behind a `Cell`, that later answers depend on"

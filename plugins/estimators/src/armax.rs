@@ -29,6 +29,8 @@ use crate::order::Order;
 /// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Where rows tell
 /// the level less well than one of them does by itself, it is taken to be their mean, which the fit reports. Since the answer
 /// changes with time alone, the node runs at every tick.
+///
+/// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Armax {

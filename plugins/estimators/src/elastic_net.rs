@@ -13,8 +13,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 use crate::folds::{Folds, tell_moved, tell_quiet};
+use crate::novelty::novelty_of;
 use crate::penalty::{best_of, means};
-use crate::regression::{LinearPredictor, novelty_of};
+use crate::regression::LinearPredictor;
 use crate::summed::{add_sums, sums_of};
 use crate::unsolved::unsolved;
 

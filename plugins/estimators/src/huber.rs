@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
-use crate::regression::{LinearPredictor, novelty_of, rows_gone};
+use crate::novelty::novelty_of;
+use crate::regression::{LinearPredictor, rows_gone};
 use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.

@@ -20,6 +20,7 @@ mod lags;
 mod lasso;
 mod linear;
 mod narx;
+mod novelty;
 mod oe;
 mod online;
 mod order;

@@ -28,7 +28,7 @@ use crate::solver::Solver;
 /// thousand lay. Larger values in a direction in which they varied in the fit hardly count, a new direction does: with the
 /// standardised features `z` of `p` columns, `n` rows and the eigenvectors `v` and eigenvalues `λ` of `ZᵀZ / n` above 0.05, at most
 /// twelve, it is the root of `(‖z‖² − Σ λ / (λ + 0.001) (vᵀz)²) / (‖z‖² + p)` over its 99.9 % quantile. A fit whose rows do not fit in memory
-/// has none, nor has an estimator that goes on learning.
+/// has none.
 ///
 /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
 /// newest truth, in the numbers of `rls`.

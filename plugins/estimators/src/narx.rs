@@ -7,11 +7,12 @@ use athermal_core::node::{
 };
 use athermal_core::node::{number, numbers};
 use athermal_core::time::Duration;
-use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
+use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Novelty, Standardizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lags::{now, repeated};
+use crate::novelty::{novelty_mistakes, novelty_of_rows};
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::unsolved::unsolved;
 
@@ -27,7 +28,8 @@ const MOST_TERMS: usize = 500;
 /// 1989), which the fit prints and keeps for every term. Coefficients are least squares.
 ///
 /// Outside the range of the fit powers grow without bound: there a variable counts in products as at the edge of the range,
-/// and alone as it is. Like `arx` it takes the lags as they are stated, and predicts `ahead` directly; the answer changes with
+/// and alone as it is. The port `novelty` shows where that is: that of `linear`, of the terms as they are without an edge. A fit whose
+/// rows do not fit in memory has none. Like `arx` it takes the lags as they are stated, and predicts `ahead` directly; the answer changes with
 /// time alone, so the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -82,6 +84,10 @@ impl Estimator for Narx {
             every_tick: true,
             ..Regressors::default()
         }
+    }
+
+    fn has_novelty(&self) -> bool {
+        true
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
@@ -173,6 +179,7 @@ struct NarxTrainer {
     memory: usize,
     running: Standardizer,
     range: Vec<(f64, f64)>,
+    /// The rows, while they fit in memory.
     waiting: Vec<f64>,
     expanding: Option<Expanding>,
 }
@@ -214,7 +221,7 @@ impl NarxTrainer {
         }
         let width = self.regressors.len();
         let standard = self.running.standardization();
-        let waiting = std::mem::take(&mut self.waiting);
+        let waiting = &self.waiting;
         let truths = waiting.chunks_exact(width + 1).map(|row| row[width]);
         let mean = truths.sum::<f64>() / (waiting.len() / (width + 1)).max(1) as f64;
         let mut expanding = Expanding {
@@ -285,6 +292,7 @@ impl Trainer for NarxTrainer {
         self.waiting.push(truth);
         if self.waiting.len() * size_of::<f64>() > self.memory {
             self.expand();
+            self.waiting = Vec::new();
         }
     }
 
@@ -313,7 +321,7 @@ impl Trainer for NarxTrainer {
         used.dedup();
         let place = |variable: &usize| used.binary_search(variable).unwrap_or(0);
         let edge = |j: usize, value: f64| (value - expanding.centres[j]) / expanding.scales[j];
-        let predictor = NarxPredictor {
+        let mut predictor = NarxPredictor {
             regressors: used
                 .iter()
                 .map(|&j| self.regressors[j].name.clone())
@@ -329,7 +337,18 @@ impl Trainer for NarxTrainer {
                 .collect(),
             coefficients: found.coefficients.clone(),
             mean: expanding.mean,
+            novelty: None,
         };
+        let mut row = vec![0.0; used.len()];
+        let mut rows = Vec::new();
+        for whole in self.waiting.chunks_exact(self.regressors.len() + 1) {
+            row.iter_mut()
+                .zip(&used)
+                .for_each(|(to, &j)| *to = whole[j]);
+            rows.extend(predictor.moving(&row));
+        }
+        let moving = predictor.terms.iter().filter(|term| !term.0.is_empty());
+        predictor.novelty = novelty_of_rows(moving.count(), &rows);
         let (found_from, rows) = (expanding.found_from, expanding.gram.count());
         let mut report = self.report(&found);
         report.in_sample_rmse = Some(mean_square.sqrt());
@@ -360,6 +379,18 @@ pub struct NarxPredictor {
     coefficients: Vec<f64>,
     #[serde(with = "number")]
     mean: f64,
+    /// How far terms beside the constant are from those of the fit, where its rows say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    novelty: Option<Novelty>,
+}
+
+impl NarxPredictor {
+    /// The terms beside the constant, none of them held at an edge.
+    fn moving<'a>(&'a self, variables: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        let z = |j: usize| (variables[j] - self.centres[j]) / self.scales[j];
+        let moving = self.terms.iter().filter(|term| !term.0.is_empty());
+        moving.map(move |term| term.of(z))
+    }
 }
 
 impl Predictor for NarxPredictor {
@@ -380,7 +411,23 @@ impl Predictor for NarxPredictor {
         mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
         let variables = self.terms.iter().flat_map(|term| &term.0);
         mistakes.extend(term_mistake(width, variables.copied()));
+        let moving = self.terms.iter().filter(|term| !term.0.is_empty());
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), moving.count()));
         mistakes
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        let novelty = self.novelty.as_ref();
+        novelty.map_or(f64::NAN, |of| of.at_each(self.moving(regressors)))
+    }
+
+    fn centre(&self) -> f64 {
+        let all = || self.terms.iter().zip(&self.coefficients);
+        let constants = all().filter(|(term, _)| term.0.is_empty());
+        let constant = constants.fold(self.mean, |sum, (_, b)| sum + b);
+        let moving = all().filter(|(term, _)| !term.0.is_empty());
+        let novelty = self.novelty.as_ref();
+        novelty.map_or(constant, |of| of.centre(constant, moving.map(|(_, b)| b)))
     }
 
     fn coefficients(&self) -> Option<Coefficients> {

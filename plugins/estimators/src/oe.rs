@@ -32,6 +32,8 @@ use crate::order::Order;
 /// are. It goes by the errors that are left in the fit: where noise is coloured and pieces are short, what filters gave before takes
 /// slow noise up too, and the deviation is too small. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer
 /// changes with time alone, the node runs at every tick.
+///
+/// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Oe {

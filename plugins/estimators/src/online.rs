@@ -5,9 +5,10 @@ use athermal_core::node::{
 };
 use athermal_core::node::{number, number_or_none, numbers};
 use athermal_core::time::Instant;
-use athermal_numerics::{Rls, Sgd, Standardization};
+use athermal_numerics::{Novelty, Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
 
+use crate::novelty::{after_learning, novelty_at, novelty_mistakes};
 use crate::scaling::scale_mistakes;
 
 /// A truth that misses by more than so many deviations is a leap of the constant: it would move all coefficients by more than a
@@ -101,11 +102,20 @@ impl Frame {
         let Recursion::Rls { rls, noise } = recursion else {
             return f64::NAN;
         };
-        let spread = rls.spread(|i| match regressors.get(i) {
+        noise * (1.0 + self.spread(rls, regressors)).sqrt()
+    }
+
+    /// `zᵀPz`: what is not known of the coefficients, in units of the noise.
+    fn spread(&self, rls: &Rls, regressors: &[f64]) -> f64 {
+        rls.spread(|i| match regressors.get(i) {
             Some(x) => (x - self.means[i]) / self.scales[i],
             None => 1.0,
-        });
-        noise * (1.0 + spread).sqrt()
+        })
+    }
+
+    /// What is predicted in the middle of the rows of the fit.
+    fn centre(&self, recursion: &Recursion) -> f64 {
+        recursion.weights().1 + self.level
     }
 
     /// The standard errors of the intercept and of the coefficients on the scale of the data; none where the recursion knows
@@ -183,6 +193,9 @@ pub struct OnlinePredictor {
         skip_serializing_if = "Option::is_none"
     )]
     rmse: Option<f64>,
+    /// How far regressors are from those of the fit, where its rows say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    novelty: Option<Novelty>,
 }
 
 impl OnlinePredictor {
@@ -191,6 +204,7 @@ impl OnlinePredictor {
         recursion: Recursion,
         range: TrainedRange,
         rmse: Option<f64>,
+        novelty: Option<Novelty>,
     ) -> Self {
         let mut coefficients = vec![0.0; frame.regressors.len()];
         let intercept = frame.unscaled(&recursion, &mut coefficients);
@@ -201,6 +215,7 @@ impl OnlinePredictor {
             recursion,
             range,
             rmse,
+            novelty,
         }
     }
 }
@@ -217,6 +232,7 @@ impl Predictor for OnlinePredictor {
         mistakes.extend(self.frame.mistakes());
         mistakes.extend(self.recursion.mistakes(width));
         mistakes.extend(self.range.mistakes(width));
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         mistakes
     }
 
@@ -232,6 +248,14 @@ impl Predictor for OnlinePredictor {
         self.frame.std_dev(&self.recursion, regressors)
     }
 
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        novelty_at(self.novelty.as_ref(), regressors)
+    }
+
+    fn centre(&self) -> f64 {
+        self.frame.centre(&self.recursion)
+    }
+
     fn coefficients(&self) -> Option<Coefficients> {
         let errors = self.frame.errors(&self.recursion);
         let (constant, values) = (self.intercept, &self.coefficients);
@@ -243,7 +267,15 @@ impl Predictor for OnlinePredictor {
             frame: self.frame.clone(),
             recursion: self.recursion.clone(),
         };
-        Some(Box::new(OnlineLearner::new(state, self.rmse)))
+        let fit = OfFit {
+            rmse: self.rmse,
+            novelty: self.novelty.clone(),
+            rls: match &self.recursion {
+                Recursion::Rls { rls, .. } if self.novelty.is_some() => Some(rls.clone()),
+                _ => None,
+            },
+        };
+        Some(Box::new(OnlineLearner::new(state, fit)))
     }
 
     fn trained_range(&self) -> Option<&TrainedRange> {
@@ -270,17 +302,26 @@ struct OnlineLearner {
     coefficients: Vec<f64>,
     intercept: f64,
     row: Vec<f64>,
+    fit: OfFit,
+}
+
+/// What a learner goes by that stays as the fit found it.
+#[derive(Debug)]
+struct OfFit {
     rmse: Option<f64>,
+    novelty: Option<Novelty>,
+    /// Where the recursion began, where there is a novelty.
+    rls: Option<Rls>,
 }
 
 impl OnlineLearner {
-    fn new(state: OnlineState, rmse: Option<f64>) -> Self {
+    fn new(state: OnlineState, fit: OfFit) -> Self {
         let width = state.frame.regressors.len();
         let mut learner = Self {
             coefficients: vec![0.0; width],
             intercept: 0.0,
             row: vec![1.0; width + 1],
-            rmse,
+            fit,
             state,
         };
         learner.refresh();
@@ -329,8 +370,23 @@ impl Learner for OnlineLearner {
         frame.std_dev(recursion, regressors)
     }
 
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        let novelty = novelty_at(self.fit.novelty.as_ref(), regressors);
+        let OnlineState { frame, recursion } = &self.state;
+        match (recursion, &self.fit.rls) {
+            (Recursion::Rls { rls, .. }, Some(of_fit)) => after_learning(novelty, || {
+                [rls, of_fit].map(|rls| frame.spread(rls, regressors))
+            }),
+            _ => novelty,
+        }
+    }
+
+    fn centre(&self, _of: Instant) -> f64 {
+        self.state.frame.centre(&self.state.recursion)
+    }
+
     fn usual_error(&self) -> f64 {
-        self.rmse.unwrap_or(f64::NAN)
+        self.fit.rmse.unwrap_or(f64::NAN)
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -378,7 +434,8 @@ impl Learner for OnlineLearner {
             },
             _ => return Restored::cold("it learned by another recursion"),
         };
-        *self = Self::new(known, self.rmse);
+        self.state = known;
+        self.refresh();
         Restored::Accepted
     }
 }

@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FEATURES_AND_TRUTH, present_features};
+use crate::novelty::novelty_mistakes;
 use crate::regression::LinearTrainer;
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::selection::Selection;
@@ -321,10 +322,7 @@ impl Predictor for PolynomialPredictor {
         mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
         let features = self.terms.iter().flat_map(|term| [Some(term.0), term.1]);
         mistakes.extend(term_mistake(width, features.flatten()));
-        if let Some(novelty) = &self.novelty {
-            let lists = [("novelty.means", novelty.width())];
-            mistakes.extend(Mistake::of_lengths(self.terms.len(), &lists));
-        }
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), self.terms.len()));
         mistakes
     }
 

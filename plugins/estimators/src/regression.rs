@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
+use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -133,6 +134,11 @@ impl LinearTrainer {
         Some(self.range.as_ref()?.of(columns))
     }
 
+    /// How far rows are from those of a fit.
+    pub(crate) fn novelty_of(&self, found: &Found) -> Option<Novelty> {
+        novelty_of(&self.blocks, &found.standard, &found.fit.columns)
+    }
+
     /// How many rows it was given.
     pub(crate) fn rows(&self) -> u64 {
         self.blocks.count()
@@ -152,7 +158,7 @@ impl LinearTrainer {
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
         let found = self.find(report)?;
-        let novelty = novelty_of(&self.blocks, &found.standard, &found.fit.columns);
+        let novelty = self.novelty_of(&found);
         match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => {
                 let model = LinearPredictor {
@@ -227,7 +233,7 @@ impl LinearTrainer {
             coefficients,
             intercept: sgd.intercept() + mean - shift,
             variance: None,
-            novelty,
+            novelty: novelty.clone(),
         };
         let squared = rows.iter().map(|(x, y, _)| {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
@@ -240,7 +246,7 @@ impl LinearTrainer {
         report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
-            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse))
+            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse), novelty)
         });
         Ok((model, online))
     }
@@ -315,15 +321,6 @@ impl Summed for LinearTrainer {
     fn end_stretch(&mut self) {
         self.blocks.end_stretch();
     }
-}
-
-/// How far rows are from those of a fit by some of their columns, where its rows were kept and say so.
-pub(crate) fn novelty_of(
-    blocks: &GramBlocks,
-    standard: &Standardization,
-    columns: &[usize],
-) -> Option<Novelty> {
-    Novelty::of(&blocks.total(), standard, columns, blocks.rows()?)
 }
 
 /// Why stochastic gradients gave no model: their steps grew without bound.
@@ -412,10 +409,7 @@ impl Predictor for LinearPredictor {
                 mistakes.push(Mistake::at("rows", message));
             }
         }
-        if let Some(novelty) = &self.novelty {
-            let lists = [("novelty.means", novelty.width())];
-            mistakes.extend(Mistake::of_lengths(width, &lists));
-        }
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         mistakes
     }
 
@@ -428,8 +422,7 @@ impl Predictor for LinearPredictor {
     }
 
     fn novelty(&self, regressors: &[f64]) -> f64 {
-        let novelty = self.novelty.as_ref();
-        novelty.map_or(f64::NAN, |novelty| novelty.at(regressors))
+        novelty_at(self.novelty.as_ref(), regressors)
     }
 
     fn centre(&self) -> f64 {

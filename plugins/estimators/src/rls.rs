@@ -33,7 +33,8 @@ use crate::unsolved::unsolved;
 ///
 /// The port `learning` tells what became of the newest truth: 0 learned from, 1 frozen on command, 2 frozen by a channel, 3
 /// an outlier, 4 a regressor outside the range of the fit, 5 outside `train.abs_truth`, 6 no complete row. The port
-/// `std_dev` is the standard deviation of the truth about the prediction, `s √(1 + xᵀPx)`.
+/// `std_dev` is the standard deviation of the truth about the prediction, `s √(1 + xᵀPx)`. The port `novelty` is that of `linear`, and
+/// less where it has learned since: of what lies beyond the edge of the fit counts `√(xᵀPx / xᵀP₀x)`, `P₀` the `P` of the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rls {
@@ -146,6 +147,10 @@ impl Estimator for Rls {
         true
     }
 
+    fn has_novelty(&self) -> bool {
+        true
+    }
+
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
         too_many(features, 1)
     }
@@ -214,11 +219,13 @@ impl RlsTrainer {
         let rls = athermal_numerics::Rls::starting_at(coefficients, covariance, options)
             .map_err(unsolved)?;
         let range = self.rows.range_of(columns).unwrap_or_default();
+        let novelty = self.rows.novelty_of(&found);
         Ok(OnlinePredictor::new(
             frame,
             Recursion::Rls { rls, noise },
             range,
             None,
+            novelty,
         ))
     }
 }

@@ -5,11 +5,14 @@ use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, InputPort, Mistake, Of, Predictor, Regressors, Term,
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_numerics::{Gram, GramBlocks, NumericsError, non_negative_least_squares};
+use athermal_numerics::{
+    Gram, GramBlocks, Novelty, NumericsError, Standardization, non_negative_least_squares,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::features::{present_features, too_many_at};
+use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 
 /// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
 ///
@@ -25,6 +28,9 @@ use crate::features::{present_features, too_many_at};
 /// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over.
 /// Where all weights are 0 there is no prediction. Only rows with
 /// all predictions take part in the fit, and a voter that lacks more than a tenth of them is left out. At most 10 voters.
+///
+/// The port `novelty` shows how far predictions are outside of those of the fit, as that of `linear` does of features: voters that
+/// disagree as they never did. There is none while a voter is absent, nor where the rows of the fit do not fit in memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stack {}
@@ -56,6 +62,10 @@ impl Estimator for Stack {
         true
     }
 
+    fn has_novelty(&self) -> bool {
+        true
+    }
+
     fn mistakes_for(&self, voters: usize) -> Vec<Mistake> {
         too_many_at("inputs.voters", voters, 1)
     }
@@ -64,7 +74,7 @@ impl Estimator for Stack {
         let names = setup.regressors.iter();
         let names: Vec<String> = names.map(|voter| voter.name.clone()).collect();
         Box::new(Stacking {
-            blocks: GramBlocks::with_row_memory(names.len(), 0),
+            blocks: GramBlocks::with_row_memory(names.len(), setup.memory),
             names,
         })
     }
@@ -89,7 +99,9 @@ impl Trainer for Stacking {
         }
         let total = self.blocks.total();
         let sums = Sums::of(&total);
-        let saved = sums.saved(self.names);
+        let all: Vec<usize> = (0..voters).collect();
+        let novelty = novelty_of(&self.blocks, &Standardization::of(&total), &all);
+        let saved = sums.saved(self.names, novelty);
         let stacked = Stacked::try_from(saved).map_err(|error| TrainingError::Unsolvable {
             reason: error.to_string(),
         })?;
@@ -156,7 +168,7 @@ impl Sums {
     }
 
     /// What weights follow from.
-    fn saved(&self, regressors: Vec<String>) -> Saved {
+    fn saved(&self, regressors: Vec<String>, novelty: Option<Novelty>) -> Saved {
         let voters = regressors.len();
         let (mut products, mut with_truth) = (self.products.clone(), self.with_truth.clone());
         if self.of_errors {
@@ -173,6 +185,7 @@ impl Sums {
             products,
             with_truth,
             adds_to_one: self.of_errors,
+            novelty,
         }
     }
 
@@ -210,6 +223,9 @@ struct Saved {
     /// Whether the products are those of their errors, and weights are scaled to add up to one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     adds_to_one: bool,
+    /// How far votes are from those of the fit, where its rows say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    novelty: Option<Novelty>,
 }
 
 impl From<Stacked> for Saved {
@@ -271,6 +287,20 @@ impl Stacked {
 impl Predictor for Stacked {
     fn uses(&self) -> &[String] {
         &self.saved.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        novelty_mistakes(self.saved.novelty.as_ref(), self.saved.regressors.len())
+    }
+
+    fn novelty(&self, votes: &[f64]) -> f64 {
+        novelty_at(self.saved.novelty.as_ref(), votes)
+    }
+
+    fn centre(&self) -> f64 {
+        let weights = self.weights((1 << self.saved.regressors.len()) - 1);
+        let novelty = self.saved.novelty.as_ref();
+        novelty.map_or(0.0, |of| of.centre(0.0, weights))
     }
 
     fn predict(&self, votes: &[f64]) -> f64 {

@@ -45,6 +45,8 @@ const LARGEST_PAST: usize = 1000;
 /// back where that is more; with `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the
 /// truth about its prediction, larger after truths that are missing. Features that are missing are taken for the last ones,
 /// and what that adds to the error is not in it. Since the answer changes with time alone, the node runs at every tick.
+///
+/// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {

@@ -361,6 +361,7 @@ impl Messages {
                 good: of.good.clone(),
             }),
             values,
+            instants: Box::default(),
         }
     }
 

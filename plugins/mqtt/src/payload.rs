@@ -11,6 +11,7 @@ use serde_json::{Number, Value};
 pub const LONGEST: usize = 1 << 20;
 /// JSON that is nested deeper is not looked at.
 const DEEPEST: usize = 128;
+const SECOND_NS: i64 = 1_000_000_000;
 
 /// Where and how a message says what.
 #[derive(Debug, Clone)]
@@ -23,6 +24,8 @@ pub struct Form {
     pub quality: Option<Quality>,
     /// Its values.
     pub values: Values,
+    /// The channels, by their numbers, that say from when on a planned value applies: written as the time is, read in seconds.
+    pub instants: Box<[usize]>,
 }
 
 /// Where the time of a value stands.
@@ -198,25 +201,27 @@ impl Form {
                 let stamp = self.stamp(&message, &message, arrival)?;
                 into.newest = Some(stamp);
                 self.is_good(&message, &message)?;
-                let value = number_at(&message, at)?;
                 let channel = *channel;
-                into.given.push(Reading {
-                    channel,
-                    stamp,
-                    value,
-                });
+                if let Some(value) = self.value_at(&message, at, channel)? {
+                    into.given.push(Reading {
+                        channel,
+                        stamp,
+                        value,
+                    });
+                }
             }
             Values::Fields(fields) => {
                 let stamp = self.stamp(&message, &message, arrival)?;
                 into.newest = Some(stamp);
                 self.is_good(&message, &message)?;
                 for (at, channel) in fields {
-                    match number_at(&message, at) {
-                        Ok(value) => into.given.push(Reading {
+                    match self.value_at(&message, at, *channel) {
+                        Ok(Some(value)) => into.given.push(Reading {
                             channel: *channel,
                             stamp,
                             value,
                         }),
+                        Ok(None) => {}
                         Err(left_out) => into.left_out.push(left_out),
                     }
                 }
@@ -228,7 +233,7 @@ impl Form {
                 };
                 for item in items {
                     match self.item(item, &message, arrival, &mut into.newest) {
-                        Ok(reading) => into.given.push(reading),
+                        Ok(reading) => into.given.extend(reading),
                         Err(left_out) => into.left_out.push(left_out),
                     }
                 }
@@ -244,7 +249,7 @@ impl Form {
         message: &Value,
         arrival: Instant,
         newest: &mut Option<Instant>,
-    ) -> Result<Reading, LeftOut> {
+    ) -> Result<Option<Reading>, LeftOut> {
         let Values::Each {
             name,
             value,
@@ -268,11 +273,31 @@ impl Form {
         let stamp = self.stamp(item, message, arrival)?;
         *newest = (*newest).max(Some(stamp));
         self.is_good(item, message)?;
-        Ok(Reading {
+        let value = self.value_at(item, value, channel)?;
+        Ok(value.map(|value| Reading {
             channel,
             stamp,
-            value: number_at(item, value)?,
-        })
+            value,
+        }))
+    }
+
+    /// The value of a channel in a part of a message. An instant from which on a planned value applies may be missing: it then applies
+    /// at once.
+    fn value_at(&self, part: &Value, at: &str, channel: usize) -> Result<Option<f64>, LeftOut> {
+        if !self.instants.contains(&channel) {
+            return number_at(part, at).map(Some);
+        }
+        let Some(found) = part.pointer(at).filter(|found| !found.is_null()) else {
+            return Ok(None);
+        };
+        let ns = match &self.time {
+            Time::At(_, unit) => ns_of(found, *unit),
+            // Nothing says how times are written.
+            Time::Arrival => ns_of(found, None).or_else(|| ns_of(found, Some(SECOND_NS))),
+        };
+        let instant = ns.map(|ns| (Instant::from_ns(ns) - Instant::from_ns(0)).secs());
+        let instant = instant.ok_or_else(|| LeftOut::new(Reason::WrongTime, found));
+        instant.map(Some)
     }
 
     /// The time of a part of a message: its own, or that of the message.
@@ -285,13 +310,7 @@ impl Form {
             let what = format_args!("nothing at \"{at}\"");
             return Err(LeftOut::new(Reason::NoTime, what));
         };
-        let ns = match (found, unit) {
-            (Value::Number(number), Some(unit)) => ns_of_number(number, *unit),
-            (Value::String(text), Some(unit)) => exact_ns(text.trim(), *unit),
-            (Value::String(text), None) => ns_of_text(text),
-            _ => None,
-        };
-        let stamp = ns.map(Instant::from_ns);
+        let stamp = ns_of(found, *unit).map(Instant::from_ns);
         stamp.ok_or_else(|| LeftOut::new(Reason::WrongTime, found))
     }
 
@@ -381,6 +400,16 @@ fn finite(value: f64, what: impl fmt::Display) -> Result<f64, LeftOut> {
     is_finite
         .then_some(value)
         .ok_or_else(|| LeftOut::new(Reason::NotFinite, what))
+}
+
+/// The nanoseconds that a time says: a number of units, or in words without one.
+fn ns_of(found: &Value, unit: Option<i64>) -> Option<i64> {
+    match (found, unit) {
+        (Value::Number(number), Some(unit)) => ns_of_number(number, unit),
+        (Value::String(text), Some(unit)) => exact_ns(text.trim(), unit),
+        (Value::String(text), None) => ns_of_text(text),
+        _ => None,
+    }
 }
 
 fn ns_of_number(number: &Number, unit: i64) -> Option<i64> {

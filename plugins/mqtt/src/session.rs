@@ -131,12 +131,6 @@ impl<'a> Session<'a> {
                 self.was_connected = true;
                 self.inlet.gaps.connected();
                 self.out.connected();
-                match std::mem::take(&mut self.inlet.unstamped) {
-                    0 => {}
-                    count => self.out.remarks().report(format_args!(
-                        "{count} of `channels` have the time of their arrival: what the broker sends again after an outage cannot be known from what is new; `messages` say where a time stands"
-                    )),
-                }
                 if was_kept && !session_present {
                     let (broker, id) =
                         (&self.inlet.settings.broker, &self.inlet.settings.client_id);

@@ -121,6 +121,26 @@ impl MqttSource {
         })
     }
 
+    /// Messages whose values have the time of their arrival: doubtful, and a mistake where retained ones are taken.
+    fn without_time(&self, at: Vec<String>, help: &str) -> ParameterRemark {
+        let (is_mistake, words) = match self.retained {
+            Retained::Ignore => (
+                false,
+                "what the broker sends again after an outage cannot be told apart from what is new",
+            ),
+            Retained::Take => (
+                true,
+                "a retained message without a time would be taken for a fresh one",
+            ),
+        };
+        ParameterRemark {
+            at,
+            is_mistake,
+            words: words.to_owned(),
+            help: help.to_owned(),
+        }
+    }
+
     /// Its routes, for these channels.
     fn routes(&self, channels: &[WiredChannel]) -> Vec<Route> {
         let mut routes = Vec::new();
@@ -149,8 +169,15 @@ impl MqttSource {
                     sequence: None,
                     quality: None,
                     values: Values::Plain(channel),
+                    instants: Box::default(),
                 },
             });
+        }
+        let instants = channels.iter().enumerate();
+        let instants = instants.filter(|(_, of)| of.channel.is_instant);
+        let instants: Box<[usize]> = instants.map(|(nth, _)| nth).collect();
+        for route in &mut routes {
+            route.form.instants.clone_from(&instants);
         }
         routes
     }
@@ -166,7 +193,7 @@ impl Source for MqttSource {
         messages.flat_map(|(nth, of)| of.mappings(nth)).collect()
     }
 
-    fn remarks(&self) -> Vec<ParameterRemark> {
+    fn remarks(&self, addressed: usize) -> Vec<ParameterRemark> {
         let time = self.time.as_ref();
         let remark = |at: Vec<String>, is_mistake, words: String, help: &str| ParameterRemark {
             at,
@@ -186,19 +213,14 @@ impl Source for MqttSource {
                 all.push(remark([&own[..], &key].concat(), true, why, help));
             }
             if messages.is_stamped_at_arrival(time) {
-                let words = match self.retained {
-                    Retained::Ignore => {
-                        "what the broker sends again after an outage cannot be told apart from what is new"
-                    }
-                    Retained::Take => {
-                        "a retained message without a time would be taken for a fresh one"
-                    }
-                };
                 let help = "let the publisher add a time, and write where it stands: `time = { at = \"/time\" }`";
-                let is_mistake = self.retained == Retained::Take;
                 let at = [&own[..], &["time".to_owned()]].concat();
-                all.push(remark(at, is_mistake, words.to_owned(), help));
+                all.push(self.without_time(at, help));
             }
+        }
+        if addressed > 0 {
+            let help = "the messages of `channels` are numbers without a time: let the publisher add one, and name them in `messages`";
+            all.push(self.without_time(vec!["channels".to_owned()], help));
         }
         all
     }
@@ -215,12 +237,6 @@ impl Source for MqttSource {
         // That it cannot speak to such a broker is known before anything runs.
         crate::client::Connection::new(&settings).map_err(ConnectorError::new)?;
         let routes = self.routes(&wiring.channels);
-        let unmapped = wiring.channels.iter().filter(|of| of.mapped.is_none());
-        let unstamped = unmapped.count();
-        if unstamped > 0 && self.retained == Retained::Take {
-            let words = "`channels` has topics whose messages are numbers without a time, and a retained one would be taken for a fresh one: name them in `messages`, or leave `retained` out";
-            return Err(ConnectorError::new(words));
-        }
         let wanted: BTreeSet<_> = routes
             .iter()
             .map(|of| of.topic.filter().to_owned())
@@ -234,7 +250,6 @@ impl Source for MqttSource {
             retained: self.retained,
             channels: wiring.channels.len(),
             routes,
-            unstamped,
             gaps: GapWatch::after(newest.filter(|of| *of > Instant::MIN)),
             left_out: LeftOutCounts::default(),
             take_overs: VecDeque::new(),
@@ -253,8 +268,6 @@ pub(crate) struct MqttInlet {
     pub(crate) retained: Retained,
     pub(crate) channels: usize,
     pub(crate) routes: Vec<Route>,
-    /// How many channels have the time of their arrival, since `channels` names topics of numbers: reported once.
-    pub(crate) unstamped: usize,
     pub(crate) subscriptions: Subscriptions,
     pub(crate) gaps: GapWatch,
     pub(crate) left_out: LeftOutCounts,

@@ -127,7 +127,8 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         if outputs.iter().any(|(port, _)| *port == "novelty") {
             line(
                 "outside (\"shrink\", \"absent\" or \"pass\") – what becomes of predictions where `novelty` is above 1: their distance from \
-                 the mean of the fit is divided by it, which is the default, there are none, or they stay; not with `learn`",
+                 the middle of the fit is divided by it, which is the default, there are none, or they stay, which is the default with \
+                 `learn`",
             );
         }
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {

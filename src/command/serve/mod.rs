@@ -105,6 +105,7 @@ impl Serve {
         terminal.doubts(&doubts, &sources);
         check_fitted(&model, &self.machine)?;
         super::model::warn_unfitted(terminal, &model, &self.machine);
+        super::model::warn_without_novelty(terminal, &model, &self.machine);
         Ok((model, deployment))
     }
 }

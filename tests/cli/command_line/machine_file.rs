@@ -68,3 +68,23 @@ fn what_refers_to_a_node_that_is_removed_is_told_so_and_how_to_remove_it_too() {
         .ended(2)
         .tells(&["there is no node or signal `some`"]);
 }
+
+#[test]
+#[cfg(feature = "mqtt")]
+fn behaviour_21_numbers_without_a_time_are_doubtful_and_a_retained_one_is_refused() {
+    let scratch = Scratch::new("command-line-arrival");
+    let machine = |retained: &str| {
+        let text = format!(
+            "schema = 1\n[signals.t]\nunit = \"Cel\"\nchannels = [\"room\"]\nmax_age = \"1min\"\n[outputs]\nroom = \"t\"\n\
+             [sources.line]\ntype = \"mqtt\"\nbroker = \"mqtt://localhost\"\n{retained}channels = {{ \"t.room\" = \"plant/room\" }}\n"
+        );
+        scratch.file("machine.toml", text)
+    };
+    athermal(&[&"check", &machine("")]).ended(0).tells(&[
+        "warning[A213]: what the broker sends again after an outage cannot be told apart from what is new",
+        "channels = ",
+    ]);
+    athermal(&[&"check", &machine("retained = \"take\"\n")])
+        .ended(2)
+        .tells(&["error[A212]: a retained message without a time would be taken for a fresh one"]);
+}

@@ -14,6 +14,7 @@ mod mistakes_in_tests;
 mod next;
 mod numbers;
 mod older;
+mod planned;
 mod programs;
 mod references;
 mod requests;

@@ -19,7 +19,7 @@ fn without(value: &mut Value, key: &str) {
 
 #[test]
 fn a_model_whose_fits_do_not_know_their_edge_runs_and_is_warned_of_once() {
-    const WARNING: &str = "its fits do not say where their edge is";
+    const WARNING: &str = "no `novelty`, since the fit kept no second moments of the regressors";
     let (scratch, _, data, model) = desk("older");
     let run = |model: &std::path::PathBuf| athermal(&[&"run", model, &"--input", &data]).ended(0);
     let new = run(&model);

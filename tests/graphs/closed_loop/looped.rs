@@ -59,11 +59,12 @@ impl Looped {
         };
         let faults = fault.iter().flat_map(|faults| faults.split(' '));
         let faults = faults.map(|fault| fault.parse().unwrap()).collect();
-        let simulation = Simulated::new(self.machine, setup)
+        let simulation = Simulated::new(self.machine, setup.clone())
             .with_faults(faults)
             .start()
             .unwrap();
-        ClosedLoop::new(self.machine, simulation, self.model.engine().unwrap()).unwrap()
+        let engine = self.model.engine().unwrap();
+        ClosedLoop::new(self.machine, &setup, simulation, engine).unwrap()
     }
 
     /// A day under correction, with sensor faults as the command line takes them, one after the other.

@@ -168,17 +168,15 @@ impl Resolver<'_> {
             Learns::OnRequest => learn.is_some_and(|learn| learn != Learn::Switch(false)),
             Learns::ByDefault => learn != Some(Learn::Switch(false)),
         };
-        let why = match outside {
-            _ if estimator.has_novelty() && !learns => {
-                return Some(outside.unwrap_or(Outside::Shrink));
-            }
-            None => return Some(Outside::Pass),
-            Some(_) if learns => {
-                "it goes on learning, and what it has learned since the fit lies outside of that"
-            }
-            Some(_) => "its fit does not say how far regressors are outside of it",
-        };
-        let message = format!("`outside` would do nothing: {why}");
+        match outside {
+            Some(outside) if estimator.has_novelty() => return Some(outside),
+            // What it has learned since the fit may lie outside of that.
+            None if learns || !estimator.has_novelty() => return Some(Outside::Pass),
+            None => return Some(Outside::Shrink),
+            Some(_) => {}
+        }
+        let message =
+            "`outside` would do nothing: its fit does not say how far regressors are outside of it";
         let mistake = Mistake::at("outside", message).help("leave `outside` out");
         self.mistakes(instance, vec![mistake]);
         None

@@ -25,12 +25,12 @@ pub struct EstimatorKeys {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outside {
-    /// Their distance from the mean of the truths of the fit is divided by the novelty, which is the default. The standard deviation
-    /// `σ` becomes `√((novelty · σ)² + d²)`, `d` being how far the prediction has moved.
+    /// Their distance from what is predicted in the middle of the rows of the fit is divided by the novelty, which is the default unless
+    /// it goes on learning. The standard deviation `σ` becomes `√((novelty · σ)² + d²)`, `d` being how far the prediction has moved.
     Shrink,
     /// There is none.
     Absent,
-    /// They stay as they are.
+    /// They stay as they are, which is the default where it goes on learning.
     Pass,
 }
 

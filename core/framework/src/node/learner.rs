@@ -102,6 +102,20 @@ pub trait Learner: Debug + Send {
         f64::NAN
     }
 
+    /// How far these regressors are outside of what it knows, of the rows of the fit and of what it has learned since: 1 at the edge,
+    /// more outside, NaN where it is not known. Only asked of kinds that say
+    /// [`Estimator::has_novelty`](super::Estimator::has_novelty).
+    fn novelty(&self, _regressors: &[f64]) -> f64 {
+        f64::NAN
+    }
+
+    /// What it predicts of the truth that will be measured at `of` from regressors in the middle of the rows of the fit: where a
+    /// prediction goes that is not trusted. Only asked of kinds that say
+    /// [`Estimator::has_novelty`](super::Estimator::has_novelty).
+    fn centre(&self, _of: Instant) -> f64 {
+        0.0
+    }
+
     /// The root mean square by which the truths of the fit missed their predictions, for a kind without a standard deviation; NaN where
     /// it is not known. The first truths that miss by much more are not handed over.
     fn usual_error(&self) -> f64 {

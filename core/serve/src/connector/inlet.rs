@@ -28,8 +28,9 @@ pub trait Source: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// What is wrong with its parameters, or doubtful, beyond their types and ranges; it is reported at their places.
-    fn remarks(&self) -> Vec<ParameterRemark> {
+    /// What is wrong with its parameters, or doubtful, beyond their types and ranges; it is reported at their places. `addressed` is the
+    /// number of channels that `channels` gives it by an address.
+    fn remarks(&self, _addressed: usize) -> Vec<ParameterRemark> {
         Vec::new()
     }
 

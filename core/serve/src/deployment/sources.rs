@@ -198,8 +198,9 @@ fn part<'a>(
     let role = ("source", name);
     let kind = of_kind(role, entry, &parameters, all_sources(), &KEYS, diagnostics);
     let mut claims = named.map(|value| channels.read(value, diagnostics));
-    let remarks = kind.as_ref().map(|(_, source)| source.remarks());
-    keys::report(remarks.unwrap_or_default(), &parameters, diagnostics);
+    let addressed = claims.as_ref().map_or(0, Vec::len);
+    let remarks = kind.as_ref().map(|(_, source)| source.remarks(addressed));
+    keys::report(remarks.unwrap_or_default(), &entry.value, diagnostics);
     let mappings = kind.as_ref().map(|(_, source)| source.mappings());
     for (nth, mapping) in mappings.iter().flatten().enumerate() {
         let own = channels.own(nth, mapping, &parameters, diagnostics);

@@ -8,6 +8,7 @@ mod explained;
 mod fitting;
 mod memory;
 mod names;
+mod novelty;
 mod parameters;
 mod past;
 mod repeat;
@@ -59,7 +60,7 @@ pub(super) enum Check {
 }
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 25] = [
+pub(super) const ALL: [(Rule, Check); 26] = [
     (Rule::Names, Alone(names::names)),
     (Rule::Answers, Among(answers::answers)),
     (Rule::ReadsBack, Alone(parameters::read_back)),
@@ -80,6 +81,7 @@ pub(super) const ALL: [(Rule, Check); 25] = [
     (Rule::Allocation, Alone(allocation::allocation)),
     (Rule::Votes, Alone(votes::votes)),
     (Rule::Uncertainty, Alone(votes::uncertainty)),
+    (Rule::Novelty, Alone(novelty::novelty)),
     (Rule::NoTrace, Alone(traces::no_trace)),
     (Rule::Fits, Alone(fitting::fits)),
     (Rule::Models, Alone(fitting::models)),

@@ -1,7 +1,8 @@
 //! A graph that corrects a simulated machine: what it sees, what it asks for, when that acts.
 
+use super::planned::Announced;
 use super::recording::unit_of;
-use super::{Machine, MachineError, Row, Simulation};
+use super::{Machine, MachineError, Row, Setup, Simulation, plans};
 use crate::engine::Engine;
 use crate::recording::{Event, Samples, Steps};
 use crate::time::Instant;
@@ -11,7 +12,8 @@ use crate::unit::Unit;
 ///
 /// At every row the graph sees what was measured and, as the signal `applied`, the correction that was in force while it
 /// was. Its outputs `correction.AXIS` are then asked of the machine, which may clip them; what it applies acts until
-/// the next row. An axis without such an output keeps its correction.
+/// the next row. An axis without such an output keeps its correction. A planned channel `set_point.chuck` is the set point of that name,
+/// each step of the schedule announced as long before as it is known.
 pub struct ClosedLoop {
     simulation: Box<dyn Simulation>,
     engine: Engine,
@@ -19,6 +21,7 @@ pub struct ClosedLoop {
     feeds: Vec<Option<Feed>>,
     /// Which output asks for which axis, and how many nm its unit has.
     asks: Vec<(usize, usize, f64)>,
+    announced: Vec<Announced>,
     samples: Samples,
     asked: Vec<f64>,
     /// In force while the last row was measured, and from then on.
@@ -38,12 +41,13 @@ enum Origin {
 }
 
 impl ClosedLoop {
-    /// `simulation`, which is one of `machine`, corrected by the graph of `engine`.
+    /// `simulation`, which is one of `machine` set up so, corrected by the graph of `engine`.
     ///
     /// # Errors
     /// A channel of the graph that the machine lacks, or a graph that asks for no correction of an axis.
     pub fn new(
         machine: &dyn Machine,
+        setup: &Setup,
         simulation: Box<dyn Simulation>,
         engine: Engine,
     ) -> Result<Self, MachineError> {
@@ -56,7 +60,14 @@ impl ClosedLoop {
         let nm = unit_of("nm")?;
         let plan = engine.plan();
         let (mut feeds, mut missing) = (Vec::new(), Vec::new());
+        let mut announced = Vec::new();
         for (source, planned) in plan.sources.iter().zip(&plan.channels) {
+            let of = (feeds.len(), source);
+            announced.extend(Announced::of(machine, setup, of, &planned.channel.unit)?);
+            if plans(machine, source) {
+                feeds.push(None);
+                continue;
+            }
             let measured = channels
                 .iter()
                 .position(|channel| channel.reference() == source.name);
@@ -110,6 +121,7 @@ impl ClosedLoop {
         Ok(Self {
             simulation,
             samples: Samples::default(),
+            announced,
             feeds,
             asks,
             engine,
@@ -154,6 +166,9 @@ impl Simulation for ClosedLoop {
         };
         self.samples.values.clear();
         self.samples.values.extend(self.feeds.iter().map(sample));
+        for plan in &mut self.announced {
+            plan.put(row.time_ns, &mut self.samples.values);
+        }
         let event = Event::Row(Instant::from_ns(row.time_ns));
         // A row that the engine refuses leaves everything as it is, as on a machine.
         if let Ok(true) = self.engine.take(event, &self.samples) {

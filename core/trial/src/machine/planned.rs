@@ -1,9 +1,10 @@
 //! A schedule as a plan: its steps, each announced before it applies.
 
 use super::schedule::Track;
-use super::{Machine, SECOND_NS, Setup};
+use super::{Machine, MachineError, SECOND_NS, Setup, recording::unit_of};
 use crate::compile::SourceChannel;
 use crate::time::Duration;
+use crate::unit::Unit;
 
 /// The signal of a graph whose channels are the set points of a machine, as `set_point.chuck`.
 const SET_POINTS: &str = "set_point";
@@ -65,5 +66,50 @@ impl Announcements {
             self.announced_ns = Some(at_ns);
             (value, at_ns as f64 / SECOND_NS as f64)
         })
+    }
+}
+
+/// A planned channel of a graph whose set points a machine announces: where they and their instants go, and the units of both sides.
+pub(super) struct Announced {
+    set_points: Announcements,
+    to: [usize; 2],
+    units: (Unit, Unit),
+}
+
+impl Announced {
+    /// A source of a graph, of a number, in the unit of the graph; none where the machine has no such set point.
+    pub(super) fn of(
+        machine: &dyn Machine,
+        setup: &Setup,
+        (number, source): (usize, &SourceChannel),
+        graph: &Unit,
+    ) -> Result<Option<Self>, MachineError> {
+        let Some(set_points) = Announcements::of(machine, setup, source) else {
+            return Ok(None);
+        };
+        let from = unit_of("Cel")?;
+        if !from.measures_same(graph) {
+            return Err(MachineError::Unit {
+                channel: source.name.clone(),
+                machine: Box::new(from),
+                graph: Box::new(graph.clone()),
+            });
+        }
+        let applies_at = source.planned.map_or(number, |of| of.applies_at);
+        Ok(Some(Self {
+            set_points,
+            to: [number, applies_at],
+            units: (from, graph.clone()),
+        }))
+    }
+
+    /// Puts what a row at an instant announces in its places, where it announces anything.
+    pub(super) fn put(&mut self, now_ns: i64, values: &mut [f64]) {
+        if let Some((set_point, from_s)) = self.set_points.next(now_ns) {
+            let (machine, graph) = &self.units;
+            let [value, applies_at] = self.to;
+            values[value] = machine.convert(set_point, graph).unwrap_or(f64::NAN);
+            values[applies_at] = from_s;
+        }
     }
 }

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use super::{Announcements, Faulty, Machine, Row, Setup, SetupError, Simulation, plans};
-use crate::compile::{Plan, SourceChannel};
+use super::planned::Announced;
+use super::{Faulty, Machine, Row, Setup, SetupError, Simulation, plans};
+use crate::compile::Plan;
 use crate::fault::{FaultError, FaultSpec, Faults};
 use crate::recording::{Event, Recording, Samples, Source, SourceError};
 use crate::time::Instant;
@@ -76,18 +77,9 @@ impl Recording for Simulated<'_> {
         let mut missing = Vec::new();
         let mut announced = Vec::new();
         for (source, planned) in plan.sources.iter().zip(&plan.channels) {
-            if let Some(set_points) = Announcements::of(self.machine, &self.setup, source) {
-                let applies_at = source.planned.map_or(picks.len(), |of| of.applies_at);
-                let from = unit_of("Cel")?;
-                if !from.measures_same(&planned.channel.unit) {
-                    return Err(other_unit(source, from, &planned.channel.unit));
-                }
-                announced.push(Announced {
-                    set_points,
-                    to: [picks.len(), applies_at],
-                    units: (from, planned.channel.unit.clone()),
-                });
-            }
+            let of = (picks.len(), source);
+            let plan = Announced::of(self.machine, &self.setup, of, &planned.channel.unit)?;
+            announced.extend(plan);
             if plans(self.machine, source) {
                 picks.push(None);
                 continue;
@@ -104,7 +96,11 @@ impl Recording for Simulated<'_> {
             };
             let from = unit_of(channels[index].unit)?;
             if !from.measures_same(&planned.channel.unit) {
-                return Err(other_unit(source, from, &planned.channel.unit));
+                return Err(Box::new(MachineError::Unit {
+                    channel: source.name.clone(),
+                    machine: Box::new(from),
+                    graph: Box::new(planned.channel.unit.clone()),
+                }));
             }
             picks.push(Some((index, from, planned.channel.unit.clone())));
         }
@@ -124,14 +120,6 @@ impl Recording for Simulated<'_> {
     }
 }
 
-fn other_unit(source: &SourceChannel, machine: Unit, graph: &Unit) -> SourceError {
-    Box::new(MachineError::Unit {
-        channel: source.name.clone(),
-        machine: Box::new(machine),
-        graph: Box::new(graph.clone()),
-    })
-}
-
 pub(super) fn unit_of(text: &'static str) -> Result<Unit, MachineError> {
     Unit::parse(text).map_err(|_| MachineError::UnknownUnit { unit: text })
 }
@@ -144,13 +132,6 @@ struct Running {
     row: Row,
     picks: Picks,
     announced: Vec<Announced>,
-}
-
-/// A planned channel of the graph: its set points, where they and their instants go, and the units of both sides.
-struct Announced {
-    set_points: Announcements,
-    to: [usize; 2],
-    units: (Unit, Unit),
 }
 
 impl Source for Running {
@@ -169,12 +150,7 @@ impl Source for Running {
             };
         }
         for plan in &mut self.announced {
-            if let Some((set_point, from_s)) = plan.set_points.next(self.row.time_ns) {
-                let (machine, graph) = &plan.units;
-                let converted = machine.convert(set_point, graph);
-                samples.values[plan.to[0]] = converted.unwrap_or(f64::NAN);
-                samples.values[plan.to[1]] = from_s;
-            }
+            plan.put(self.row.time_ns, &mut samples.values);
         }
         Ok(Some(Event::Row(Instant::from_ns(self.row.time_ns))))
     }

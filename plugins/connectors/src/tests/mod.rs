@@ -2,6 +2,7 @@
 
 mod conformance;
 mod faults;
+mod planned;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -6,10 +6,11 @@ use std::collections::VecDeque;
 
 use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Beginning, Stepper};
+use athermal_numerics::{Beginning, Novelty, Stepper};
 use serde::{Deserialize, Serialize};
 
 use super::model::Identified;
+use crate::novelty::novelty_at;
 use crate::scaling::Scaling;
 
 /// After more steps than that without inputs a model begins anew, unless it reaches further back itself. A mode that hardly
@@ -56,6 +57,7 @@ athermal_core::state!(Known, "identified/4");
 pub(super) struct Following {
     known: Known,
     deviations: Vec<f64>,
+    novelty: Option<Novelty>,
     begins: Begins,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
@@ -93,6 +95,7 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
+            novelty: of.novelty.clone(),
             begins: Begins::of(of),
             room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
@@ -342,6 +345,14 @@ impl Learner for Following {
         let doubt = followed.stepper.doubt(steps, &mut self.room.borrow_mut());
         // The first is that of an innovation.
         (known(last.min(steps - 1)).powi(2) + doubt * known(0).powi(2)).sqrt()
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        novelty_at(self.novelty.as_ref(), regressors)
+    }
+
+    fn centre(&self, of: Instant) -> f64 {
+        self.predict(&self.known.scaling.means, of)
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {

@@ -52,6 +52,10 @@ macro_rules! identified {
                 true
             }
 
+            fn has_novelty(&self) -> bool {
+                !self.asked().regressors().feature_lags.is_empty()
+            }
+
             fn trainer(
                 &self,
                 setup: &athermal_core::node::TrainingSetup,

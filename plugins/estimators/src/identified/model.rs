@@ -2,7 +2,7 @@
 
 use athermal_core::node::numbers;
 use athermal_core::time::Duration;
-use athermal_numerics::{Beginning, Polynomials};
+use athermal_numerics::{Beginning, Novelty, Polynomials};
 use serde::{Deserialize, Serialize};
 
 use crate::scaling::Scaling;
@@ -35,6 +35,9 @@ pub(super) struct Identified {
     /// Where the filter of each input begins in a run, on scaled inputs, in the unit of the truth; nothing where at rest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) beginnings: Vec<Beginning>,
+    /// How far inputs are from those of the rows of the fit, where these say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) novelty: Option<Novelty>,
 }
 
 impl Identified {
@@ -72,5 +75,6 @@ pub(super) fn identified(step: Duration) -> Identified {
         step,
         series: 1,
         deviations: vec![1.0],
+        novelty: None,
     }
 }

@@ -6,6 +6,7 @@ use athermal_core::time::Duration;
 use super::coefficients;
 use super::follow::Following;
 use super::model::{Identified, MOST_DIFFERENCES, MOST_SERIES};
+use crate::novelty::{novelty_at, novelty_mistakes};
 use crate::order::LARGEST;
 
 impl Predictor for Identified {
@@ -41,6 +42,7 @@ impl Predictor for Identified {
             mistakes.push(Mistake::at("step", message));
         }
         mistakes.extend(coefficients::mistakes(self));
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }
@@ -57,6 +59,14 @@ impl Predictor for Identified {
 
     fn std_dev(&self, _regressors: &[f64]) -> f64 {
         self.deviations.last().copied().unwrap_or(f64::NAN)
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        novelty_at(self.novelty.as_ref(), regressors)
+    }
+
+    fn centre(&self) -> f64 {
+        self.model.at_rest(|_| 0.0)
     }
 
     fn coefficients(&self) -> Option<Coefficients> {

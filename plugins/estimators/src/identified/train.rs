@@ -14,6 +14,7 @@ use super::model::Identified;
 use super::rehearse::{self, Reach};
 use super::rows::{Bridges, Pace, Rows};
 use crate::conditioning::tell_rows;
+use crate::novelty::novelty_of_rows;
 use crate::scaling::Scaling;
 
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
@@ -186,6 +187,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             mean_level: found.mean_level,
             step: pace.step,
             series: pace.series,
+            novelty: novelty_of_rows(self.names.len(), self.rows.regressors()),
         };
         self.tell_error(one_step, &identified, report);
         Ok(identified)

@@ -19,6 +19,7 @@ use super::coefficients::Hourly;
 use super::follow::Following;
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
+use crate::novelty::novelty_of_rows;
 use crate::scaling::Scaling;
 
 /// The most rows that the search for variances goes through, again and again.
@@ -229,6 +230,7 @@ impl KalmanTrainer {
             at_large: followed.at_large,
             every: self.every,
             range: Some(self.range.clone()),
+            novelty: novelty_of_rows(width, &self.regressors),
         };
         report.in_sample_rmse = self.in_sample_rmse(&predictor);
         Ok(predictor)

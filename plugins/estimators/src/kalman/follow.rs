@@ -2,10 +2,11 @@
 
 use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::Kalman as Filter;
+use athermal_numerics::{Kalman as Filter, Novelty};
 use serde::{Deserialize, Serialize};
 
 use super::KalmanPredictor;
+use crate::novelty::{after_learning, novelty_at};
 use crate::scaling::Scaling;
 
 /// A truth that misses by more than so many deviations is a leap.
@@ -23,6 +24,8 @@ pub(super) struct Following {
     every: Duration,
     /// The regressors of the filter.
     row: Vec<f64>,
+    /// How far regressors are from those of the fit, and the filter that it ended with.
+    of_fit: Option<(Novelty, Filter)>,
 }
 
 /// What is known of level, trend and coefficients.
@@ -76,6 +79,18 @@ pub(super) fn std_dev(filter: &Filter, time: f64, regressors: impl Fn(usize) -> 
     })
 }
 
+/// The variance that the last so many states, which are coefficients, bring into a prediction.
+fn variance(filter: &Filter, coefficients: usize, scaled: impl Fn(usize) -> f64) -> f64 {
+    let order = filter.state().len();
+    let first = order - coefficients;
+    let rows = filter.covariance().chunks_exact(order).skip(first);
+    let sums = rows.enumerate().map(|(i, row)| {
+        let row = row[first..].iter().enumerate();
+        scaled(i) * row.map(|(j, value)| value * scaled(j)).sum::<f64>()
+    });
+    sums.sum::<f64>().max(0.0)
+}
+
 impl Following {
     pub(super) fn new(predictor: &KalmanPredictor) -> Self {
         Self {
@@ -83,6 +98,10 @@ impl Following {
             at_large: predictor.at_large.clone(),
             every: predictor.every,
             row: vec![1.0; predictor.regressors.len() + 1],
+            of_fit: predictor
+                .novelty
+                .clone()
+                .map(|novelty| (novelty, predictor.filter.clone())),
         }
     }
 
@@ -147,6 +166,25 @@ impl Learner for Following {
         } = &self.known;
         let scaled = with_one(scaling.of(regressors));
         std_dev(filter, self.known.since(of), scaled)
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        let Some((novelty, start)) = &self.of_fit else {
+            return f64::NAN;
+        };
+        let Known {
+            filter, scaling, ..
+        } = &self.known;
+        after_learning(novelty_at(Some(novelty), regressors), || {
+            [filter, start].map(|filter| variance(filter, regressors.len(), scaling.of(regressors)))
+        })
+    }
+
+    fn centre(&self, of: Instant) -> f64 {
+        let Known {
+            filter, scaling, ..
+        } = &self.known;
+        scaling.truth + filter.expected(self.known.since(of), with_one(|_| 0.0))
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -228,6 +266,7 @@ mod tests {
             at_large: vec![(0.0, 4.0)],
             every: Duration::ZERO,
             range: None,
+            novelty: None,
         })
     }
 

@@ -7,7 +7,7 @@ use athermal_core::node::{
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
-use athermal_numerics::Kalman as Filter;
+use athermal_numerics::{Kalman as Filter, Novelty};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,7 @@ mod fit;
 mod follow;
 
 use crate::features::too_many;
+use crate::novelty::{novelty_at, novelty_mistakes};
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
 use follow::{Following, std_dev};
@@ -55,7 +56,8 @@ use follow::{Following, std_dev};
 /// trend start from what the fit knew of them at large. The port `std_dev` is the standard deviation of the truth about its
 /// prediction; it grows while no truth comes. The port `learning` tells what became of the newest truth, in the numbers of
 /// `rls`, and what is not learned from is not followed either, but for 4, a feature outside the range of the fit. The answer
-/// changes with time alone, so the node runs at every tick.
+/// changes with time alone, so the node runs at every tick. The port `novelty` is that of `linear`, of the features, and less where it
+/// has learned since, as that of `rls` is by the variance that the coefficients bring in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kalman {
@@ -146,6 +148,10 @@ impl Estimator for Kalman {
         true
     }
 
+    fn has_novelty(&self) -> bool {
+        true
+    }
+
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
         too_many(features, 1)
     }
@@ -220,6 +226,9 @@ struct KalmanPredictor {
     /// The range of the regressors in the fit; of models before it was kept, none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     range: Option<TrainedRange>,
+    /// How far regressors are from those of the rows that were followed, where these say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    novelty: Option<Novelty>,
 }
 
 impl Predictor for KalmanPredictor {
@@ -244,6 +253,7 @@ impl Predictor for KalmanPredictor {
             mistakes.push(Mistake::at("at_large", message));
         }
         mistakes.extend(self.range.iter().flat_map(|range| range.mistakes(width)));
+        mistakes.extend(novelty_mistakes(self.novelty.as_ref(), width));
         mistakes
     }
 
@@ -253,6 +263,14 @@ impl Predictor for KalmanPredictor {
 
     fn std_dev(&self, regressors: &[f64]) -> f64 {
         std_dev(&self.filter, 0.0, self.scaling.of(regressors))
+    }
+
+    fn novelty(&self, regressors: &[f64]) -> f64 {
+        novelty_at(self.novelty.as_ref(), regressors)
+    }
+
+    fn centre(&self) -> f64 {
+        self.scaling.truth + self.filter.expected(0.0, |_| 0.0)
     }
 
     fn coefficients(&self) -> Option<Coefficients> {

@@ -55,7 +55,7 @@ impl Lowering<'_> {
             );
         }
         let names = || fit.regressors.iter().map(|of| &of.name);
-        let heeded = learning.is_none() && (novelty.is_some() || *outside != Outside::Pass);
+        let heeded = novelty.is_some() || *outside != Outside::Pass;
         let (found, used) = match engine.fitted().get(&node.instance()) {
             Some(predictor) => (
                 fitted(node, &**predictor, heeded)?,

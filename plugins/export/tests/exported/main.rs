@@ -5,6 +5,7 @@
 
 mod command;
 mod fmu;
+mod learners;
 mod onnx;
 mod processors;
 mod random;

@@ -17,6 +17,7 @@ fn one(time: Time) -> Form {
         sequence: None,
         quality: None,
         values: Values::One("/value".to_owned(), 3),
+        instants: Box::default(),
     }
 }
 
@@ -34,6 +35,7 @@ fn each() -> Form {
             value: "/v".to_owned(),
             channels: HashMap::from([("Ch1.Room".to_owned(), 0), ("7".to_owned(), 1)]),
         },
+        instants: Box::default(),
     }
 }
 
@@ -43,6 +45,7 @@ fn plain() -> Form {
         sequence: None,
         quality: None,
         values: Values::Plain(2),
+        instants: Box::default(),
     }
 }
 
@@ -105,6 +108,55 @@ fn behaviour_06_the_time_of_a_value_is_that_of_its_source() {
         let form = one(at("/ts", unit));
         let read = form.read(payload.as_bytes(), ARRIVAL);
         assert_eq!(read.given, [reading(3, ns, 1.0)], "{text} in {unit:?}");
+    }
+}
+
+#[test]
+fn from_when_on_a_planned_value_applies_is_written_as_the_time_is() {
+    let planned = |time: Time| Form {
+        values: Values::Fields(vec![
+            ("/chuck".to_owned(), 0),
+            ("/applies_at".to_owned(), 1),
+        ]),
+        instants: Box::new([1]),
+        ..one(time)
+    };
+    let (rfc, ms) = (at("/time", None), at("/time", Some(1_000_000)));
+    let (now, then) = (1_764_279_677_000_000_000, 1_764_281_477.5);
+    for (time, texts) in [
+        (
+            rfc,
+            [
+                "\"2025-11-27T21:41:17Z\"",
+                "\"2025-11-27T23:11:17.5+01:00\"",
+            ],
+        ),
+        (ms, ["1764279677000", "1764281477500"]),
+    ] {
+        let form = planned(time);
+        let [now_text, then_text] = texts;
+        let payload = |rest: &str| format!("{{\"time\": {now_text}, \"chuck\": 50{rest}}}");
+        let applies = payload(&format!(", \"applies_at\": {then_text}"));
+        let read = form.read(applies.as_bytes(), ARRIVAL);
+        assert_eq!(
+            read.given,
+            [reading(0, now, 50.0), reading(1, now, then)],
+            "{applies}"
+        );
+        // Without it a value applies at once, which is no fault.
+        for rest in ["", ", \"applies_at\": null"] {
+            let read = form.read(payload(rest).as_bytes(), ARRIVAL);
+            assert_eq!(read.given, [reading(0, now, 50.0)], "{rest}");
+            assert_eq!(read.left_out, []);
+        }
+        let wrong = payload(", \"applies_at\": \"soon\"");
+        assert_eq!(reasons(&form, wrong.as_bytes()), [Reason::WrongTime]);
+    }
+    let form = planned(Time::Arrival);
+    for text in ["90.5", "\"1970-01-01T00:01:30.5Z\""] {
+        let payload = format!("{{\"chuck\": 50, \"applies_at\": {text}}}");
+        let read = form.read(payload.as_bytes(), ARRIVAL);
+        assert_eq!(read.given, [reading(0, 7, 50.0), reading(1, 7, 90.5)]);
     }
 }
 

@@ -108,6 +108,15 @@ impl GatedLearner {
         self.learner.std_dev(row, of)
     }
 
+    pub(crate) fn novelty(&self, row: &[f64]) -> f64 {
+        self.learner.novelty(row)
+    }
+
+    /// What it predicts now in the middle of the rows of the fit.
+    pub(crate) fn centre(&self, now: Instant) -> f64 {
+        self.learner.centre(now + self.withheld.link().ahead)
+    }
+
     /// The slot of the truth.
     pub(crate) fn truth(&self) -> usize {
         self.withheld.link().slot

@@ -73,7 +73,7 @@ struct Linear<'a> {
     slot: usize,
     trigger: Option<usize>,
     learns: bool,
-    edge: Option<&'a Edge>,
+    edge: Option<Edge>,
     novelty: Option<usize>,
     form: LinearForm<'a>,
     shared: Option<&'a Part>,
@@ -104,7 +104,7 @@ impl<'a> Linear<'a> {
             slot: running.slot,
             trigger: running.trigger,
             learns: estimate.learning.is_some(),
-            edge: estimate.edge.as_ref(),
+            edge: estimate.edge,
             novelty: running.novelty,
             form,
             shared,
@@ -164,7 +164,7 @@ impl Bank {
             slot: of.slot,
             trigger: of.trigger,
             learns: of.learns,
-            edge: of.edge.cloned(),
+            edge: of.edge,
             novelty: of.novelty,
             constant: of.form.constant,
             coefficients: of.form.coefficients[at_once..].into(),
@@ -250,13 +250,15 @@ impl Bank {
             }
             let mut prediction = member.constant + sums.sum(&member.coefficients, others);
             let mut novelty = f64::NAN;
-            if let Some(edge) = &member.edge {
+            if let Some(edge) = member.edge
+                && let Some(estimate) = nodes[member.node].estimate()
+            {
                 let row = &mut self.all[..at_once.len() + others.len()];
                 let (first, rest) = row.split_at_mut(at_once.len());
                 first.copy_from_slice(at_once);
                 rest.copy_from_slice(others);
-                novelty = edge.novelty(row);
-                prediction = edge.bounded(prediction, novelty);
+                novelty = estimate.novelty_of(row);
+                prediction = edge.bounded(prediction, novelty, || estimate.centre(now));
             }
             let (value, stamp) = given(prediction, stamp.min(oldest), now);
             context.slots.set(member.slot, value, stamp);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::edge::Edge;
 use super::gather::Gathered;
 use super::part::Part;
+use crate::channel::unless_infinite;
 use crate::compile::{Gather, Outside, PlannedNode, PlannedRole, TruthLink};
 use crate::engine::learning::Feedback;
 use crate::engine::learning::GatedLearner;
@@ -124,11 +125,11 @@ impl Estimate {
                 EngineError::DoesNotLearn { node }
             })
         });
-        let heeded = learning.is_none() && (novelty.is_some() || *outside != Outside::Pass);
+        let heeded = novelty.is_some() || *outside != Outside::Pass;
         Ok(Self {
             width: used.len(),
             plain: std_dev.is_none(),
-            edge: heeded.then(|| Edge::new(&predictor, *outside)),
+            edge: heeded.then(|| Edge::new(*outside)),
             novelty: f64::NAN,
             takes_absent: predictor.takes_absent(),
             predictor,
@@ -212,7 +213,7 @@ impl Estimate {
         let mut prediction = f64::NAN;
         self.novelty = f64::NAN;
         if whole {
-            self.novelty = self.novelty_of(row);
+            self.novelty = self.novelty_at(row);
             prediction = self.bounded(row, now, self.novelty);
         }
         if let Some(mut feedback) = self.feedback.take() {
@@ -228,23 +229,46 @@ impl Estimate {
     /// The prediction from regressors at an instant: that of what goes on learning, else of the fit.
     #[inline]
     fn predict(&self, row: &[f64], at: Instant) -> f64 {
-        self.bounded(row, at, self.novelty_of(row))
+        self.bounded(row, at, self.novelty_at(row))
     }
 
     /// The same where it is known how far the row is outside.
     #[inline]
     fn bounded(&self, row: &[f64], at: Instant, novelty: f64) -> f64 {
-        match (&self.learning, &self.edge) {
-            (Some(learning), _) => learning.predict(row, at),
-            (None, None) => self.predictor.predict(row),
-            (None, Some(edge)) => edge.bounded(self.predictor.predict(row), novelty),
+        let prediction = match &self.learning {
+            Some(learning) => learning.predict(row, at),
+            None => self.predictor.predict(row),
+        };
+        match self.edge {
+            Some(edge) => edge.bounded(prediction, novelty, || self.centre(at)),
+            None => prediction,
         }
     }
 
+    /// How far a row is outside, 1 at the edge; NaN where that is not known or nobody asks.
     #[inline]
-    fn novelty_of(&self, row: &[f64]) -> f64 {
-        let edge = self.edge.as_ref();
-        edge.map_or(f64::NAN, |edge| edge.novelty(row))
+    fn novelty_at(&self, row: &[f64]) -> f64 {
+        if self.edge.is_none() {
+            return f64::NAN;
+        }
+        self.novelty_of(row)
+    }
+
+    /// The same whoever asks.
+    #[inline]
+    pub(crate) fn novelty_of(&self, row: &[f64]) -> f64 {
+        unless_infinite(match &self.learning {
+            Some(learning) => learning.novelty(row),
+            None => self.predictor.novelty(row),
+        })
+    }
+
+    /// What it predicts at an instant in the middle of the rows of the fit.
+    pub(crate) fn centre(&self, at: Instant) -> f64 {
+        match &self.learning {
+            Some(learning) => learning.centre(at),
+            None => self.predictor.centre(),
+        }
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
@@ -271,7 +295,7 @@ impl Estimate {
         let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
         let mut std_dev = widened * self.std_dev_of_one(row, now);
         if let Some(edge) = &self.edge {
-            std_dev = edge.widened(std_dev, prediction, self.novelty);
+            std_dev = edge.widened(std_dev, prediction, self.novelty, || self.centre(now));
         }
         if std_dev.is_finite() {
             std_dev

@@ -27,6 +27,12 @@ faulty! {
     Unsure,
     /// Predicts from what it was not given.
     UsesOther,
+    /// Finds all that it sees new.
+    Startled,
+    /// Finds nothing new.
+    Worldly,
+    /// Says that it knows what is new, and does not.
+    Ignorant,
 }
 
 impl Estimator for Ratio {
@@ -48,6 +54,13 @@ impl Estimator for Ratio {
 
     fn has_std_dev(&self) -> bool {
         matches!(self.fault, Fault::Negative | Fault::Unsure)
+    }
+
+    fn has_novelty(&self) -> bool {
+        matches!(
+            self.fault,
+            Fault::Startled | Fault::Worldly | Fault::Ignorant
+        )
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
@@ -108,6 +121,11 @@ impl Trainer for Averaging {
             means: vec![if written { mean } else { 0.0 }],
             trusting: self.fault == Fault::Trusting,
             unsure: self.fault == Fault::Unsure,
+            novelty: match self.fault {
+                Fault::Startled => Some(5.0),
+                Fault::Worldly => Some(0.5),
+                _ => None,
+            },
             misstated: (self.fault == Fault::Misstated).then(|| vec![0.0; width]),
             mislearnt: self.fault == Fault::Mislearnt,
             unwritten: if written { 0.0 } else { mean },
@@ -126,6 +144,7 @@ struct Fitted {
     means: Vec<f64>,
     trusting: bool,
     unsure: bool,
+    novelty: Option<f64>,
     misstated: Option<Vec<f64>>,
     mislearnt: bool,
     #[serde(skip)]
@@ -154,6 +173,10 @@ impl Predictor for Fitted {
         } else {
             -self.means[0].abs()
         }
+    }
+
+    fn novelty(&self, _regressors: &[f64]) -> f64 {
+        self.novelty.unwrap_or(f64::NAN)
     }
 
     fn linear(&self) -> Option<LinearForm<'_>> {
@@ -265,6 +288,25 @@ fn a_deviation_that_is_promised_comes() {
         with("unsure"),
         Rule::Uncertainty,
         "`node:std_dev.a` is never there in the second half of the run, though predictions are",
+    );
+}
+
+#[test]
+fn novelty_is_above_one_far_from_the_fit_and_hardly_ever_on_its_data() {
+    breaks_one::<Ratio>(
+        with("startled"),
+        Rule::Novelty,
+        "`node:novelty.a` is above 1 at ",
+    );
+    breaks_one::<Ratio>(
+        with("worldly"),
+        Rule::Novelty,
+        "of 100 rows far outside of its fit the largest novelty is 0.5",
+    );
+    breaks::<Ratio>(
+        with("ignorant"),
+        Rule::Novelty,
+        "it says `has_novelty`, and its fit gives none",
     );
 }
 
