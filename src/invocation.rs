@@ -1,13 +1,20 @@
 //! Commands that the user may try next, with the program named as the user named it.
 
+use std::sync::OnceLock;
+
+static CALLED: OnceLock<String> = OnceLock::new();
+
+/// Keeps how the program was called.
+pub fn called(name: String) {
+    // A process is one program; whoever calls it twice calls it so.
+    let _ = CALLED.set(name);
+}
+
 /// The program as it was called, quoted for a shell where it must be.
 #[must_use]
 pub fn program() -> String {
-    let name = std::env::args().next().unwrap_or_default();
-    if name.is_empty() {
-        return "athermal".to_owned();
-    }
-    quoted(&name)
+    let name = CALLED.get().filter(|name| !name.is_empty());
+    name.map_or_else(|| "athermal".to_owned(), |name| quoted(name))
 }
 
 /// A word for a shell.

@@ -35,6 +35,8 @@ pub use athermal_analysis::{chart, diagnosis, report};
 extern crate athermal_command;
 
 #[cfg(feature = "cli")]
+pub mod calls;
+#[cfg(feature = "cli")]
 mod checkout;
 #[cfg(feature = "cli")]
 mod command;
@@ -50,7 +52,7 @@ pub mod schema;
 mod starter;
 
 #[cfg(feature = "cli")]
-pub use program::command_line;
+pub use program::{command_line, command_line_of};
 
 #[cfg(feature = "cli")]
 use athermal_command::{message, output, terminal};
@@ -69,6 +71,8 @@ use athermal_estimators as _;
 #[cfg(feature = "cli")]
 use athermal_export as _;
 use athermal_features as _;
+#[cfg(feature = "cli")]
+use athermal_fleet as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_http as _;
 use athermal_kinematics as _;

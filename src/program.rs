@@ -1,5 +1,6 @@
 //! The command line as a whole; each command stands in a file of its own.
 
+use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
@@ -7,6 +8,7 @@ use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
 use crate::command::Command;
+use crate::invocation;
 use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 
 const EXAMPLES: &str = "\
@@ -24,16 +26,24 @@ outside failed, such as reading a file.";
 /// The command line of athermal, with every plugin that the program links: all that its `main` has to do.
 #[must_use]
 pub fn command_line() -> ExitCode {
-    let arguments = whole().get_matches();
+    command_line_of(std::env::args_os()).into()
+}
+
+/// The same with these words, of which the first is the name of the program: its exit status.
+pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let name = words.first().map(|name| name.to_string_lossy());
+    invocation::called(name.unwrap_or_default().into_owned());
+    let arguments = whole().get_matches_from(words);
     let options = Options::from_arg_matches(&arguments);
     let options = options.unwrap_or_else(|error| error.exit());
     let mut terminal = Terminal::new(&options);
     report_panics_in_a_line();
     match caught(|| run(&arguments, &mut terminal)) {
-        Ok(answer) => answer.into(),
+        Ok(answer) => answer.status(),
         Err(failure) => {
             terminal.error(&failure);
-            failure.exit_code()
+            failure.status()
         }
     }
 }

@@ -3,6 +3,7 @@
 mod table;
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -23,10 +24,11 @@ use super::data::{self, Data, FITS, recording, warn_overlap};
 use super::doubts;
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
+use super::found::{self, Found};
 use super::model;
 use super::scored::Scored;
 use crate::message::Message;
-use crate::terminal::{Answer, Failure, Format, Terminal};
+use crate::terminal::{Answer, Failure, Terminal};
 use athermal_analysis::figures::{count, number, seconds};
 
 /// Fit several graphs on the same data and score them on others, in one table
@@ -113,48 +115,58 @@ impl Compare {
     /// # Errors
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let options = self.scored.options()?;
-        let (contenders, fits) = self.fit_and_run(&options, terminal)?;
-        let comparisons = compare(&contenders, options.abs_truth_below.as_ref());
-        if terminal.format == Format::Json {
-            println!("{:#}", self.facts(&comparisons, &fits));
-        } else {
-            let asked = self.scored.in_words();
-            for line in &asked {
-                println!("{line}");
-            }
-            if !asked.is_empty() {
-                println!();
-            }
-            for comparison in &comparisons {
-                let spans = is_one_of_several(comparison, &comparisons);
-                let table = describe(comparison, options.mode, fits.len() > 1, spans);
-                println!("{table}");
-            }
-            for fit in &fits {
-                println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
-            }
-        }
-        warn(terminal, &comparisons, &fits);
-        Ok(match failed(terminal, &fits) {
-            true => Answer::No,
-            false => Answer::Fine,
-        })
+        let models = self.models(terminal)?;
+        let mut failed = false;
+        found::show(terminal, || {
+            let (found, some_failed) = self.find(models, terminal)?;
+            failed = some_failed;
+            Ok(found)
+        })?;
+        Ok(if failed { Answer::No } else { Answer::Fine })
     }
 
-    /// The graphs, each with its name.
-    fn models(&self, terminal: &Terminal) -> Result<Vec<(String, String, Model)>, Failure> {
-        let mut models = Vec::new();
-        for path in &self.graphs {
-            let model = model::load_to_fit(path, &mut Sources::new(), terminal)?;
-            self.scored.check(&model)?;
-            models.push((path.display().to_string(), model));
+    /// Fits and scores graphs, each with the name of its file; whether something could not be fitted.
+    ///
+    /// # Errors
+    /// When the data cannot be used.
+    pub fn find(
+        &self,
+        models: Vec<(String, Model)>,
+        terminal: &Terminal,
+    ) -> Result<(Found, bool), Failure> {
+        let options = self.scored.options()?;
+        let (contenders, fits) = self.fit_and_run(models, &options, terminal)?;
+        let comparisons = compare(&contenders, options.abs_truth_below.as_ref());
+        let mut text = String::new();
+        let asked = self.scored.in_words();
+        for line in &asked {
+            let _ = writeln!(text, "{line}");
         }
-        let graphs = models.iter();
-        let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
-        let named = models.into_iter().zip(names);
-        let named = named.map(|((path, model), name)| (name, path, model));
-        Ok(named.collect())
+        if !asked.is_empty() {
+            text.push('\n');
+        }
+        for comparison in &comparisons {
+            let spans = is_one_of_several(comparison, &comparisons);
+            let table = describe(comparison, options.mode, fits.len() > 1, spans);
+            let _ = writeln!(text, "{table}");
+        }
+        for fit in &fits {
+            let seconds = number(fit.seconds);
+            let _ = writeln!(text, "{} was fitted in {seconds} s", fit.graph);
+        }
+        let facts = self.facts(&comparisons, &fits);
+        warn(terminal, &comparisons, &fits);
+        let failed = failed(terminal, &fits);
+        Ok((Found { text, facts }, failed))
+    }
+
+    /// The graphs, each with the name of its file.
+    fn models(&self, terminal: &Terminal) -> Result<Vec<(String, Model)>, Failure> {
+        let load = |path: &PathBuf| {
+            let model = model::load_to_fit(path, &mut Sources::new(), terminal)?;
+            Ok((path.display().to_string(), model))
+        };
+        self.graphs.iter().map(load).collect()
     }
 
     /// What went wrong with the data, with the graph that was to read them where there are several.
@@ -169,6 +181,7 @@ impl Compare {
 
     fn fit_and_run(
         &self,
+        models: Vec<(String, Model)>,
         scored: &ScoreOptions,
         terminal: &Terminal,
     ) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
@@ -184,7 +197,10 @@ impl Compare {
             shown: BTreeSet::new(),
             in_fits: Vec::new(),
         };
-        for (name, path, mut model) in self.models(terminal)? {
+        let graphs = models.iter();
+        let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
+        for ((path, mut model), name) in models.into_iter().zip(names) {
+            self.scored.check(&model)?;
             let began = Instant::now();
             let options = FitOptions::default();
             let fit = fit_without_card(&mut model, &self.data, &options, terminal)

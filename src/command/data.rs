@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use athermal::core::compile::Plan;
-use athermal::files::{Dataset, FileError, Format, Options, Report, recordings_in};
+use athermal::files::{Dataset, FileError, Format, Options, Report, is_in_memory, recordings_in};
 use athermal::run::model::DataCard;
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
@@ -18,8 +18,9 @@ use super::refused;
 use crate::invocation::{program, quoted};
 use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::{Failure, Terminal, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
+use athermal_fleet::RowsId;
 
 /// Recorded data.
 #[derive(Debug, Args)]
@@ -43,7 +44,10 @@ struct Given {
 
 impl From<PathBuf> for Given {
     fn from(name: PathBuf) -> Self {
-        let mut files = recordings_in(&name);
+        let mut files = match is_in_memory(&name) {
+            true => Vec::new(),
+            false => recordings_in(&name),
+        };
         if files.is_empty() {
             files.push(name.clone());
         }
@@ -185,12 +189,12 @@ impl Data {
         self.dataset_of(self.paths().map(Path::to_owned).collect(), None)
     }
 
-    /// The files; none where a journal is read.
+    /// The files; none where a journal or a table in memory is read.
     #[must_use]
     pub fn files(&self) -> Option<Vec<PathBuf>> {
-        let files = self
-            .paths()
-            .map(|path| journal_of(path).is_none().then(|| path.to_owned()));
+        let files = self.paths().map(|path| {
+            (journal_of(path).is_none() && !is_in_memory(path)).then(|| path.to_owned())
+        });
         files.collect()
     }
 
@@ -277,14 +281,19 @@ impl Data {
         }
     }
 
-    /// The files for a model's card.
+    /// The files for a model's card; of tables in memory their rows, as a graph reads them.
     ///
     /// # Errors
     /// When a file cannot be read.
-    pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
+    pub fn cards(&self, plan: &Plan, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
         let reports = dataset.reports();
         let card = |path: &Path| {
             let name = path.display().to_string();
+            if is_in_memory(path) {
+                let rows = self.others(vec![path.to_owned()]).dataset();
+                let rows = RowsId::of(&rows, plan).map_err(outside)?;
+                return Ok(rows.card());
+            }
             let report = reports.iter().find(|(file, _)| *file == name);
             let rows = report.map_or(0, |(_, report)| report.rows);
             let card = match journal_of(path) {

@@ -96,7 +96,7 @@ fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u6
     let setup = Setup {
         days,
         seed,
-        schedule: None,
+        ..Setup::default()
     };
     let recording = Simulated::new(known.machine, setup);
     write_recording(&recording, known.machine, false, path, terminal)

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::report;
 use athermal::run::score::{Lack, Score, ScoreOptions, score};
@@ -12,6 +13,7 @@ use super::beyond;
 use super::data::Data;
 use super::doubts::Doubts;
 use super::faults::{FaultWatch, Purpose};
+use super::found::{self, Found};
 use super::model::load_fitted;
 use super::scored::Scored;
 use super::unscored;
@@ -71,7 +73,21 @@ impl Evaluate {
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
-        self.scored.check(&model)?;
+        let found = found::show(terminal, || self.find(&model, terminal))?;
+        let mut scores = found.facts["scores"].as_array().into_iter().flatten();
+        if terminal.format == Format::Table && scores.any(|of| of["n"] != 0) {
+            // Why the scores are what they are.
+            terminal.note(next(&self.data.words_with("diagnose", &self.model)));
+        }
+        Ok(Answer::Fine)
+    }
+
+    /// Scores a model that is compiled for scores.
+    ///
+    /// # Errors
+    /// When the data cannot be used.
+    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<Found, Failure> {
+        self.scored.check(model)?;
         self.data.check_offsets(&[])?;
         let dataset = self.data.dataset();
         let options = ScoreOptions {
@@ -93,25 +109,20 @@ impl Evaluate {
             faults: watch.found(),
             outside_fit: beyond::beyond(model.sample_ranges(), &scores.ranges),
         };
-        if terminal.format == Format::Json {
-            let period = scores.period.map(|(from, to)| {
-                json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
-            });
-            let mut facts = json!({ "data": self.data.names() });
-            self.scored.add_to(&mut facts);
-            facts["each_on_its_own"] = self.each_on_its_own.into();
-            facts["period"] = json!(period);
-            facts["scores"] = json!(scores.scores);
-            facts["unscored"] = json!(scores.unscored);
-            facts["lacks"] = json!(scores.lacks);
-            doubts.add_to(&mut facts);
-            println!("{facts:#}");
-        } else {
-            print!("{}", report::scores(&scores, &self.in_words()));
-        }
+        let period = scores.period.map(|(from, to)| {
+            json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
+        });
+        let mut facts = json!({ "data": self.data.names() });
+        self.scored.add_to(&mut facts);
+        facts["each_on_its_own"] = self.each_on_its_own.into();
+        facts["period"] = json!(period);
+        facts["scores"] = json!(scores.scores);
+        facts["unscored"] = json!(scores.unscored);
+        facts["lacks"] = json!(scores.lacks);
+        doubts.add_to(&mut facts);
         doubts.warn(terminal);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
-        self.data.warn_fitted_on(terminal, &model, period);
+        self.data.warn_fitted_on(terminal, model, period);
         unscored::warn(terminal, &scores.unscored);
         for message in Lack::warnings(&scores.lacks) {
             terminal.warning(message);
@@ -128,11 +139,11 @@ impl Evaluate {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",
             );
-        } else if terminal.format == Format::Table && scores.scores.iter().any(|of| of.n > 0) {
-            // Why the scores are what they are.
-            terminal.note(next(&self.data.words_with("diagnose", &self.model)));
         }
-        Ok(Answer::Fine)
+        Ok(Found {
+            text: report::scores(&scores, &self.in_words()),
+            facts,
+        })
     }
 
     /// How it is scored, where otherwise than usual.

@@ -96,20 +96,9 @@ impl Fit {
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
-        self.data.check_offsets(&[])?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
-        let options = FitOptions {
-            memory: self.memory.saturating_mul(1 << 20),
-            threads: self.threads.count(),
-            ..FitOptions::default()
-        };
-        let outcome = match self.blocks.is_wanted() {
-            true => self
-                .blocks
-                .fit_on(&mut model, &self.data, &options, terminal)?,
-            false => fit_on(&mut model, &self.data, &options, terminal)?,
-        };
+        let outcome = self.fit(&mut model, terminal)?;
         self.doubt_tests(&model, sources, terminal);
         let failed = outcome.report.failed().count();
         if failed > 0 && failed == outcome.report.estimators.len() {
@@ -136,6 +125,23 @@ impl Fit {
         } else {
             Answer::Fine
         })
+    }
+
+    /// Fits a graph, and warns of what may be wrong in the data.
+    ///
+    /// # Errors
+    /// When the data cannot be read.
+    pub fn fit(&self, model: &mut Model, terminal: &Terminal) -> Result<FitOutcome, Failure> {
+        self.data.check_offsets(&[])?;
+        let options = FitOptions {
+            memory: self.memory.saturating_mul(1 << 20),
+            threads: self.threads.count(),
+            ..FitOptions::default()
+        };
+        match self.blocks.is_wanted() {
+            true => self.blocks.fit_on(model, &self.data, &options, terminal),
+            false => fit_on(model, &self.data, &options, terminal),
+        }
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
@@ -208,16 +214,25 @@ impl Fit {
             return;
         }
         for fit in &report.estimators {
-            if let Outcome::Failed(error) = &fit.outcome {
-                terminal.warning(format_args!(
-                    "{} could not be fitted: {error}; it will give no prediction",
-                    fit.node
-                ));
+            if let Some(warning) = unfitted(fit) {
+                terminal.warning(warning);
             }
             if !terminal.quiet && !to_stdout {
                 print!("{}", describe(fit, self.candidates));
             }
         }
+    }
+}
+
+/// The warning of a node that could not be fitted.
+#[must_use]
+pub fn unfitted(fit: &EstimatorFit) -> Option<String> {
+    match &fit.outcome {
+        Outcome::Fitted(_) => None,
+        Outcome::Failed(error) => Some(format!(
+            "{} could not be fitted: {error}; it will give no prediction",
+            fit.node
+        )),
     }
 }
 
@@ -261,7 +276,8 @@ pub fn fit_on(
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());
     faults::warn(terminal, &outcome.faults);
-    model.card = Some(Card::of(report, data.cards(dataset)?, created()));
+    let cards = data.cards(&model.plan, dataset)?;
+    model.card = Some(Card::of(report, cards, created()));
     Ok(outcome)
 }
 
@@ -413,7 +429,8 @@ fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
 }
 
 /// The text about one fitted node.
-fn describe(fit: &EstimatorFit, candidates: bool) -> String {
+#[must_use]
+pub fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let mut text = String::new();
     let _ = write!(
         text,

@@ -75,7 +75,7 @@ impl BlockOptions {
                     blocks.push(block);
                     Ok(())
                 })?;
-                cards = data.cards(&dataset)?;
+                cards = data.cards(plan, &dataset)?;
                 (fitted, report) = fit_from_blocks(plan, &blocks[..], options, &mut nothing)?;
             }
             Some(folder) => {
@@ -112,7 +112,8 @@ impl BlockOptions {
     ) -> Result<(KeptBlocks, Vec<DataCard>), Failure> {
         let files = data.files().ok_or_else(|| {
             Failure::Request(
-                "--keep-blocks: blocks are kept of files, and not of a journal".to_owned(),
+                "--keep-blocks: blocks are kept of files, not of a journal or of a table in memory"
+                    .to_owned(),
             )
         })?;
         let mut kept = KeptBlocks::refresh(

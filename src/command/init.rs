@@ -9,7 +9,7 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::data::{Data, Reading, no_graph};
 use crate::invocation::{command, quoted};
-use crate::starter::{NoStarter, Request, starter};
+use crate::starter::{NoStarter, Request, Starter, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
 
@@ -57,11 +57,6 @@ impl Init {
     /// # Errors
     /// When the log cannot be read, nothing in it drifts, or the graph is there already.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let request = Request {
-            time: self.time.clone(),
-            format: self.time_format.clone(),
-            drifting: self.drifts.clone(),
-        };
         let to_stdout = self.output == Path::new("-");
         if !to_stdout && !self.force && self.output.exists() {
             return Err(Failure::Request(format!(
@@ -71,18 +66,7 @@ impl Init {
         }
         let data = Data::of(self.data.clone(), self.reading.clone());
         check_apart("--output", &self.output, data.paths())?;
-        data.check_offsets(&[])?;
-        let starter = starter(&data.dataset(), &request).map_err(|error| match error {
-            NoStarter::File(error) => {
-                // There is no `--lenient` here that it could advise.
-                let reason = error.without_advice().to_string();
-                match error.into() {
-                    Failure::Request(_) => Failure::Request(reason),
-                    other => other,
-                }
-            }
-            NoStarter::Unfit(why) => Failure::Request(why),
-        })?;
+        let starter = self.find()?;
         let people = terminal.format == Format::Table;
         if people {
             for remark in &starter.remarks {
@@ -106,6 +90,31 @@ impl Init {
             println!("{facts:#}");
         }
         Ok(Answer::Fine)
+    }
+
+    /// Looks and guesses.
+    ///
+    /// # Errors
+    /// When the log cannot be read, or nothing in it drifts.
+    pub fn find(&self) -> Result<Starter, Failure> {
+        let request = Request {
+            time: self.time.clone(),
+            format: self.time_format.clone(),
+            drifting: self.drifts.clone(),
+        };
+        let data = Data::of(self.data.clone(), self.reading.clone());
+        data.check_offsets(&[])?;
+        starter(&data.dataset(), &request).map_err(|error| match error {
+            NoStarter::File(error) => {
+                // There is no `--lenient` here that it could advise.
+                let reason = error.without_advice().to_string();
+                match error.into() {
+                    Failure::Request(_) => Failure::Request(reason),
+                    other => other,
+                }
+            }
+            NoStarter::Unfit(why) => Failure::Request(why),
+        })
     }
 
     fn next(&self, data: &Data) -> String {

@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use athermal::Model;
 use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
 use athermal::diagnosis::feedback;
-use athermal::report::{gather, page, plots, text};
+use athermal::report::{Facts, gather, page, plots, text};
 use athermal::run::fit::FitError;
 use athermal::run::score::Lack;
 use clap::Args;
@@ -17,6 +18,7 @@ use super::beyond::beyond;
 use super::data::{self, Data};
 use super::doubts;
 use super::faults::{FaultWatch, Purpose};
+use super::found::Found;
 use super::model::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
@@ -53,8 +55,9 @@ impl Report {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.data.check_lasting("--data")?;
         self.data.check_offsets(&[])?;
+        let to_stdout = self.output.as_deref() == Some(Path::new("-"));
         if let Some(output) = &self.output {
-            if output.as_os_str() == "-" && terminal.format == Format::Json {
+            if to_stdout && terminal.format == Format::Json {
                 let message = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
                 return Err(Failure::Request(message.to_owned()));
             }
@@ -62,9 +65,36 @@ impl Report {
             check_apart("--output", output, read)?;
         }
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
+        let (found, facts) = self.find(&model, terminal)?;
+        match terminal.format {
+            Format::Json => println!("{:#}", found.facts),
+            Format::Table if to_stdout => {}
+            Format::Table => print!("{}", found.text),
+        }
+        if let Some(path) = &self.output {
+            let page = page(&facts);
+            if to_stdout {
+                print!("{page}");
+            } else {
+                write_aside(path, &page)?;
+                let (path, kb) = (path.display(), page.len() / 1000);
+                terminal.note(format_args!("wrote {path} ({kb} kB)"));
+            }
+        }
+        if let Some(folder) = &self.plots {
+            write_plots(terminal, folder, &plots(&facts))?;
+        }
+        Ok(Answer::Fine)
+    }
+
+    /// Gathers the facts on a model that is compiled for scores.
+    ///
+    /// # Errors
+    /// When the data cannot be used.
+    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<(Found, Facts), Failure> {
         let dataset = self.data.dataset();
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let facts = gather(&model, &watch, self.data.names()).map_err(|error| {
+        let facts = gather(model, &watch, self.data.names()).map_err(|error| {
             let of_a_pass = error.downcast::<FitError>();
             of_a_pass.map_or_else(outside, |error| Failure::from(*error))
         })?;
@@ -76,7 +106,7 @@ impl Report {
             course.refused,
             &course.rejected,
         );
-        self.data.warn_fitted_on(terminal, &model, course.period_s);
+        self.data.warn_fitted_on(terminal, model, course.period_s);
         if let Some(message) = feedback::in_words(&model.plan) {
             terminal.warning(message);
         }
@@ -91,40 +121,26 @@ impl Report {
                 "the graph has no prediction of a measured truth, so there is little to report",
             );
         }
-        if terminal.format == Format::Json {
-            let mut json = serde_json::to_value(&facts)
-                .map_err(|error| Failure::Outside(error.to_string()))?;
-            let ranges = facts.course.sensors.iter().filter_map(|of| {
-                let (channel, (lowest, highest)) = (of.name.clone(), of.range?);
-                Some(SampleRange {
-                    channel,
-                    lowest,
-                    highest,
-                })
-            });
-            let ranges: Vec<SampleRange> = ranges.collect();
-            let outside_fit = beyond(model.sample_ranges(), &ranges);
-            for (key, found) in doubts::facts(&watch.found(), &outside_fit, &dataset) {
-                json[key] = found;
-            }
-            println!("{json:#}");
-        } else if self.output.as_deref() != Some(Path::new("-")) {
-            print!("{}", text(&facts));
+        let mut json =
+            serde_json::to_value(&facts).map_err(|error| Failure::Outside(error.to_string()))?;
+        let ranges = course.sensors.iter().filter_map(|of| {
+            let (channel, (lowest, highest)) = (of.name.clone(), of.range?);
+            Some(SampleRange {
+                channel,
+                lowest,
+                highest,
+            })
+        });
+        let ranges: Vec<SampleRange> = ranges.collect();
+        let outside_fit = beyond(model.sample_ranges(), &ranges);
+        for (key, found) in doubts::facts(&watch.found(), &outside_fit, &dataset) {
+            json[key] = found;
         }
-        if let Some(path) = &self.output {
-            let page = page(&facts);
-            if path.as_os_str() == "-" {
-                print!("{page}");
-            } else {
-                write_aside(path, &page)?;
-                let (path, kb) = (path.display(), page.len() / 1000);
-                terminal.note(format_args!("wrote {path} ({kb} kB)"));
-            }
-        }
-        if let Some(folder) = &self.plots {
-            write_plots(terminal, folder, &plots(&facts))?;
-        }
-        Ok(Answer::Fine)
+        let found = Found {
+            text: text(&facts),
+            facts: json,
+        };
+        Ok((found, facts))
     }
 }
 

@@ -10,8 +10,8 @@ use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal::trial::fault::FaultSpec;
 use athermal::trial::machine::{
-    ClosedLoop, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation, machine,
-    machines,
+    ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation,
+    Spread, machine, machines,
 };
 use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_points, write_table};
 use clap::Args;
@@ -34,6 +34,7 @@ use athermal_analysis::figures::counted;
   athermal simulate die-tester -o train.csv
   athermal simulate die-tester -o test.csv --days 2 --seed 2 --truth
   athermal simulate linear-axis -o - --days 0.1 | head
+  athermal simulate die-tester -o machine7.csv --spread 30% --machine-seed 7
   athermal simulate die-tester -o faulty.csv \\
       --fault temperature.plate1=stuck,from=6h,for=12h \\
       --fault \"temperature.room=drift,size=0.5 K/h\"
@@ -63,6 +64,22 @@ pub struct Simulate {
         value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
     )]
     seed: u64,
+    /// One machine of a fleet: its parameters lie around those of the design, by so much
+    ///
+    /// Expansion, conductivity and heat capacity of each body, its skin, joints and views, the time constant of the chuck, the power of
+    /// motors and creep are each multiplied with exp(SPREAD n), `n` standard normal: a log-normal distribution. Sensors of temperature
+    /// have offsets of SPREAD times 0.5 K. Measures are those of the drawing. 0% is the design.
+    #[arg(long, default_value = "0%", requires = "machine")]
+    spread: Spread,
+    /// Which machine of the fleet it is; weather, motions and noise follow `--seed`
+    #[arg(
+        long,
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        requires = "spread",
+        value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
+    )]
+    machine_seed: u64,
     /// Add the true drift of each axis as a column
     #[arg(long, requires = "machine")]
     truth: bool,
@@ -130,13 +147,20 @@ impl Simulate {
                 "machine": name,
                 "days": self.days,
                 "seed": self.seed,
+                "spread": self.spread.share(),
+                "machine_seed": self.machine_seed,
             });
             println!("{facts:#}");
         } else {
             let (rows, days) = (counted(rows, "row"), counted(self.days, "day"));
             let (file, seed) = (output.display(), self.seed);
+            let one = if self.spread.share() > 0.0 {
+                format!(", machine {} of spread {}", self.machine_seed, self.spread)
+            } else {
+                String::new()
+            };
             terminal.note(format_args!(
-                "wrote {file}: {rows}, {days} of `{name}`, seed {seed}"
+                "wrote {file}: {rows}, {days} of `{name}`{one}, seed {seed}"
             ));
         }
         Ok(Answer::Fine)
@@ -148,14 +172,42 @@ impl Simulate {
         output: &Path,
         terminal: &Terminal,
     ) -> Result<u64, Failure> {
-        let setup = self.setup(machine)?;
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
-        let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
+        let recording = self.recording(machine)?;
         match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
             Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
         }
+    }
+
+    fn recording<'a>(&self, machine: &'a dyn Machine) -> Result<Simulated<'a>, Failure> {
+        let setup = self.setup(machine)?;
+        Ok(Simulated::new(machine, setup).with_faults(self.faults.clone()))
+    }
+
+    /// Simulates a machine by its own: each row with its time in ns goes to `put`. Gives the names of the columns behind the time.
+    ///
+    /// # Errors
+    /// When there is no such machine, or the schedule or a fault does not fit it.
+    pub fn rows(
+        &self,
+        terminal: &Terminal,
+        put: &mut dyn FnMut(i64, &[f64]),
+    ) -> Result<Vec<String>, Failure> {
+        let name = self.machine.as_deref().unwrap_or_default();
+        let machine = machine(name).map_err(refused)?.machine;
+        let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
+        let machine = disturbed.as_deref().unwrap_or(machine);
+        let mut simulation = Watched::start(&self.recording(machine)?, terminal)?;
+        let channels = machine.channels();
+        let (mut row, mut values) = (Row::empty(channels), Vec::new());
+        while simulation.next(&mut row) {
+            values.clear();
+            take(&row, self.truth, &mut values);
+            put(row.time_ns, &values);
+        }
+        Ok(table_columns(channels, self.truth))
     }
 
     /// Writes a recording of the machine under the correction of a graph.
@@ -190,6 +242,10 @@ impl Simulate {
             days: self.days,
             seed: self.seed,
             schedule: self.schedule(machine)?,
+            individual: Individual {
+                spread: self.spread,
+                seed: self.machine_seed,
+            },
         })
     }
 

@@ -5,6 +5,7 @@ mod column;
 mod dates;
 mod dropped;
 mod group;
+mod layout;
 mod name;
 mod own_times;
 mod placeholder;

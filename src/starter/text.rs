@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use athermal::core::document::{Arrangement, DecimalMark, TableBase, TableFormat};
+use athermal::core::document::TableBase;
 use athermal::core::unit::Unit;
 
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::group::{Group, groups};
+use super::layout::lay_out;
 use super::range;
 use super::survey::Survey;
 use super::window::{Choice, ENOUGH};
@@ -16,6 +17,9 @@ use athermal_analysis::figures::count;
 
 /// Voters on halves of the sensors take at least so many.
 const FEWEST_SENSORS: usize = 4;
+
+/// Of two sensors that differ, neither is known to be wrong.
+const FEWEST_CHECKED: usize = 3;
 
 /// Of more segments, neighbours make up one fold.
 const MOST_FOLDS: u64 = 10;
@@ -118,6 +122,12 @@ impl Writer<'_> {
     fn sloping(&self) -> impl Iterator<Item = &Group> {
         let causes = self.temperatures.iter().chain(&self.drives);
         causes.filter(|group| !self.is_rare(group))
+    }
+
+    /// Whether a sensor that contradicts the others of its signal can be known: where temperatures follow each other, and are three.
+    fn is_checked(&self, group: &Group) -> bool {
+        let is_temperature = self.temperatures.iter().any(|of| of.signal == group.signal);
+        is_temperature && group.channels.len() >= FEWEST_CHECKED && !self.is_rare(group)
     }
 
     fn sets(&self, text: &mut String) {
@@ -336,7 +346,29 @@ impl Writer<'_> {
             names(&self.drifting),
             toml_string(&self.drift_unit()),
         );
+        for group in self.temperatures.iter().filter(|of| self.is_checked(of)) {
+            let _ = writeln!(
+                text,
+                "\n{}\n\
+                 type = \"cross_check\"\ninputs.signal = {}\ninputs.truth = \"drift.{}\"\n\
+                 ahead = \"{}\"\nlag = \"{lag}\"\nafter = \"{}\"\nrecover = \"{lag}\"",
+                beside(
+                    &format!("[nodes.{}]", of_signal(group, "trusted")),
+                    "a sensor that contradicts the others is absent, like a dead one"
+                ),
+                toml_string(&group.signal),
+                self.axes().first().unwrap_or(&"*"),
+                self.clock.length(0.0),
+                self.clock.length(0.2 * self.choice.drift_s),
+                lag = self.clock.length(2.0 * self.choice.drift_s),
+            );
+        }
         for (number, group) in self.sloping().enumerate() {
+            let signal = if self.is_checked(group) {
+                of_signal(group, "trusted")
+            } else {
+                group.signal.clone()
+            };
             let why = match number {
                 0 => "short windows see the fast part of the drift, long ones the slow",
                 _ => "the same of another signal",
@@ -356,7 +388,7 @@ impl Writer<'_> {
                 beside(&format!("[nodes.{}]", of_signal(group, "masses")), lagged),
                 self.clock.length(0.5 * self.choice.drift_s),
                 self.clock.length(4.0 * self.choice.drift_s),
-                signal = toml_string(&group.signal),
+                signal = toml_string(&signal),
             );
         }
     }
@@ -499,56 +531,8 @@ fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// `[table]` or what changes it for a file, where the layout of the log is not the usual one.
-fn lay_out(heading: &str, table: &TableFormat, text: &mut String) {
-    if *table == TableFormat::default() {
-        return;
-    }
-    let _ = writeln!(text, "\n{heading}");
-    let mut key = |key: &str, value: Option<String>, comment: &str| {
-        if let Some(value) = value {
-            let _ = writeln!(text, "{}", beside(&format!("{key} = {value}"), comment));
-        }
-    };
-    let separator = table.separator;
-    let separator = separator.map(|of| toml_string(&char::from(of.0).to_string()));
-    key("separator", separator, "what stands between cells");
-    let decimal = table.decimal.map(|mark| match mark {
-        DecimalMark::Comma => toml_string(","),
-        DecimalMark::Point => toml_string("."),
-    });
-    key("decimal", decimal, "the decimal mark of values");
-    let arrangement = (table.layout == Arrangement::Long).then(|| toml_string("long"));
-    key("layout", arrangement, "a row for each value");
-    let name = table.name.as_deref().map(toml_string);
-    key("name", name, "the column that says what a row is of");
-    let value = table.value.as_deref().map(toml_string);
-    key("value", value, "the column of its value");
-    let segment = table.segment.as_deref().map(toml_string);
-    key("segment", segment, "where it changes, times start again");
-    let encoding = table.encoding.map(|of| toml_string(of.name()));
-    key("encoding", encoding, "how bytes become text");
-    let rows = |rows: Option<u32>| rows.map(|rows| rows.to_string());
-    key(
-        "skip",
-        rows(table.skip),
-        "lines above the names of the columns",
-    );
-    key(
-        "units",
-        rows(table.units),
-        "the row below them that has the units",
-    );
-    let lenient = table.lenient.then(|| true.to_string());
-    key(
-        "lenient",
-        lenient,
-        "some cells or rows cannot be read, and are taken as missing",
-    );
-}
-
 /// What stands in a line, and a comment beside it.
-fn beside(line: &str, comment: &str) -> String {
+pub(super) fn beside(line: &str, comment: &str) -> String {
     format!("{line:<34} # {comment}")
 }
 
@@ -561,7 +545,7 @@ fn of_signal(group: &Group, what: &str) -> String {
 }
 
 /// A text as TOML writes it.
-fn toml_string(text: &str) -> String {
+pub(super) fn toml_string(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 

@@ -193,7 +193,7 @@ fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
         let setup = Setup {
             days: 1.0,
             seed,
-            schedule: None,
+            ..Setup::default()
         };
         Simulated::new(known.machine, setup)
     };

@@ -155,6 +155,40 @@ fn reference_what_was_learned_is_hardly_worse_than_no_model_whatever_becomes_of_
 }
 
 #[test]
+fn reference_what_a_correction_integrates_is_no_worse_than_none_whatever_becomes_of_the_world() {
+    let Some(folder) = changed_world() else {
+        return;
+    };
+    // It is of half a window ahead: given when its truth comes, it stands beside that.
+    let late = r#"
+        late = "late"
+        [nodes.late]
+        type = "delay"
+        inputs.signal = "rate"
+        delay = "150s"
+        "#;
+    let name = "die-tester-compensate";
+    let test = Table::read(&dataset(folder.join("test.csv")), &plan(name, late)).unwrap();
+    let train = folder.with_file_name("data").join("die-tester/train.csv");
+    let all = errors(name, train, &test, LIMIT, "late", late);
+    let mut wrong = Vec::new();
+    for (axis, of_axis) in AXES.iter().zip(&all) {
+        for (event, from, to) in events(&folder) {
+            let within = of_axis
+                .iter()
+                .filter(|(at, ..)| (from..=to + 1800.0).contains(at));
+            let error = root_mean_square(within.clone().map(|(_, _, error)| *error));
+            let ratio = error / root_mean_square(within.map(|(_, truth, _)| *truth));
+            println!("{axis} while {event}: {ratio:.2} of no model");
+            if ratio.is_nan() || ratio > 1.05 {
+                wrong.push(format!("{axis} has {ratio} of no model while: {event}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
 fn reference_to_shrink_costs_little_at_chuck_steps_beyond_those_of_the_fit() {
     let Some(folder) = data() else { return };
     let folder = folder.join("die-tester");

@@ -121,7 +121,9 @@ fn on_a_recording_without_a_correction_both_graphs_of_the_die_tester_are_worth_t
 /// What is told of the die tester's graph when the correction's rate looks another time ahead.
 fn told_of(ahead: &str) -> String {
     let read = Read::new(&format!(
-        "schema = 1\nextends = \"die-tester-control.toml\"\nnodes.rate = {{ ahead = \"{ahead}\" }}\n"
+        "schema = 1\nextends = \"die-tester-control.toml\"\nnodes.compensate.inputs.rate = {{ from = \"other\", max_age = \"1min\" }}\n\
+         [nodes.other]\ntype = \"linear\"\neach = \"axis\"\nahead = \"{ahead}\"\n\
+         inputs = {{ features = {{ from = \"gradients\", max_age = \"1min\" }}, truth = \"drift.{{axis}}\" }}\n"
     ));
     assert!(read.plan.is_some() && !read.diagnostics.has_errors());
     read.told()

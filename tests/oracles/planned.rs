@@ -15,7 +15,7 @@ fn days(days: f64, seed: u64) -> Simulated<'static> {
     let setup = Setup {
         days,
         seed,
-        schedule: None,
+        ..Setup::default()
     };
     Simulated::new(machine("die-tester").unwrap().machine, setup)
 }

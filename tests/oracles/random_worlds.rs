@@ -131,11 +131,11 @@ fn in_two_hours_of_a_random_world_the_virtual_sensor_is_hardly_worse_than_no_mod
     // A day has twelve windows, and each of six axes counts.
     assert!(found.len() as f64 > 0.9 * 72.0 * seeds as f64);
     assert!(share >= 0.99, "{share}");
-    // A sensor that leaps in quiet hours is believed for a minute or two, until the votes that read it lose their weight.
+    // Where a sensor leaps in quiet hours and is not named, half of the plain voters may believe it for minutes.
     let above = found.iter().filter(|ratio| **ratio > 1.5).count();
     println!("{above} are above 1.5");
     assert!(
-        above <= 1 + found.len() / 1000 && worst <= 4.0,
+        above <= 1 + found.len() / 3600 && worst <= 2.0,
         "{above} and {worst}"
     );
 }

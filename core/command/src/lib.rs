@@ -26,6 +26,7 @@
 //! # assert!(matches.is_some_and(|matches| matches.is_ok()));
 //! ```
 
+pub mod collect;
 pub mod message;
 pub mod numbers;
 #[macro_use]

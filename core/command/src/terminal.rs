@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io::{IsTerminal, Write};
-use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -18,6 +17,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
+use crate::collect::{self, Collected, ProgressListener};
 use crate::message::Message;
 
 /// Options that every command takes.
@@ -89,6 +89,15 @@ impl Terminal {
         self.write("warning", Some("\x1b[1;33m"), &message.into());
     }
 
+    /// Shows a report that was collected.
+    pub fn pass_on(&self, report: &Collected) {
+        match report.level {
+            "note" => self.note(report.message.clone()),
+            "warning" => self.warning(report.message.clone()),
+            level => self.write(level, Some("\x1b[1;31m"), &report.message),
+        }
+    }
+
     /// Reports why the program gives up.
     pub fn error(&self, failure: &Failure) {
         match failure {
@@ -145,14 +154,18 @@ impl Terminal {
                 self.print(message.line(text("severity")));
             }
         } else if !diagnostics.is_empty() {
-            self.print(diagnostics.render(sources, self.colour, 100).trim_end());
+            let plain = diagnostics.render(sources, false, 100);
+            if !collect::take("warning", &Message::from(plain.trim_end())) {
+                self.print(diagnostics.render(sources, self.colour, 100).trim_end());
+            }
         }
     }
 
     /// Shows how many ticks a longer piece of work has stepped.
     #[must_use]
     pub fn progress(&self, what: &'static str) -> Progress {
-        self.progress_as(ProgressBar::no_length(), "{msg}: {human_pos} ticks", what)
+        let template = "{msg}: {human_pos} ticks";
+        self.progress_as(ProgressBar::no_length(), template, what)
     }
 
     /// Shows how far a longer piece of work has come, as a bar.
@@ -171,11 +184,15 @@ impl Terminal {
         Progress {
             bar,
             waits: std::io::stderr().is_terminal() && !self.quiet,
+            listener: collect::progress(),
         }
     }
 
     /// Writes an event for programs or a line for people, with a label of this colour where it is graver than a note.
-    fn write(&self, level: &str, colour: Option<&str>, message: &Message) {
+    fn write(&self, level: &'static str, colour: Option<&str>, message: &Message) {
+        if collect::take(level, message) {
+            return;
+        }
         if let Some(to) = &*diversion() {
             return to(level, message);
         }
@@ -225,17 +242,21 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
 }
 
 /// A line on standard error that shows how far the work has come, once it takes a second.
-#[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
     /// Whether the line waits for the second to pass.
     waits: bool,
+    /// Who takes it instead, where somebody does.
+    listener: Option<ProgressListener>,
 }
 
 impl Progress {
     /// Shows how many have been done so far.
     pub fn set(&mut self, done: u64) {
         self.bar.set_position(done);
+        if let Some(listener) = &self.listener {
+            return listener(&self.bar.message(), done, self.bar.length());
+        }
         if self.waits && self.bar.elapsed() >= Duration::from_secs(1) {
             self.waits = false;
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
@@ -263,11 +284,13 @@ pub enum Answer {
     No,
 }
 
-impl From<Answer> for ExitCode {
-    fn from(answer: Answer) -> Self {
-        match answer {
-            Answer::Fine => ExitCode::SUCCESS,
-            Answer::No => ExitCode::from(1),
+impl Answer {
+    /// The exit status.
+    #[must_use]
+    pub fn status(self) -> u8 {
+        match self {
+            Self::Fine => 0,
+            Self::No => 1,
         }
     }
 }
@@ -293,13 +316,13 @@ pub enum Failure {
 impl Failure {
     /// The exit status: 2 where the request was wrong, 3 where something outside failed.
     #[must_use]
-    pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(match self {
+    pub fn status(&self) -> u8 {
+        match self {
             Self::Request(_) => 2,
             Self::Graph { diagnostics, .. } => status_of(diagnostics),
             Self::Outside(_) => 3,
             Self::Exit(code) => *code,
-        })
+        }
     }
 }
 

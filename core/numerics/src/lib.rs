@@ -45,8 +45,10 @@ mod normal_equations;
 mod novelty;
 mod orthogonal;
 mod penalty;
+mod pool;
 mod prediction_error;
 mod prediction_variance;
+mod prior;
 mod quiet_folds;
 mod rls;
 mod robust;
@@ -81,11 +83,13 @@ pub use least_squares::{
 pub use non_negative::non_negative_least_squares;
 pub use novelty::Novelty;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
+pub use pool::{FEWEST_MACHINES, MachineRows, Pooled, pool};
 pub use prediction_error::{
     Beginning, Fading, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,
     PredictionErrorFit, Samples, Stepper, Transfer,
 };
 pub use prediction_variance::PredictionVariance;
+pub use prior::{CoefficientPrior, Known, PriorFit, Pull};
 pub use quiet_folds::quiet_folds;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use robust::{median, robust_deviation};

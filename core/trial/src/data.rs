@@ -37,6 +37,7 @@ impl Simulation {
             days: self.days,
             seed: self.seed,
             schedule: self.schedule.clone(),
+            ..Setup::default()
         };
         let machine = machine(self.machine)?.machine;
         Ok(Box::new(Simulated::new(machine, setup)))

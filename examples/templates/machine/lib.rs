@@ -149,6 +149,7 @@ mod tests {
             days: 0.1,
             seed,
             schedule: schedule.map(|text| Schedule::parse(text, &[CHUCK]).unwrap()),
+            ..Setup::default()
         }
     }
 

@@ -16,10 +16,10 @@ use crate::column::Instants;
 use crate::rows::{Column, Rows, Wanted};
 
 /// So many rows are decoded at a time: the numbers of a wide table then stay in the second cache.
-const BATCH: usize = 2048;
+pub(crate) const BATCH: usize = 2048;
 
 /// Batches, one after the other.
-pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
+pub type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
 
 /// A file whose batches have a schema.
 struct Batched {
@@ -96,6 +96,18 @@ fn words(error: impl Display) -> String {
 
 fn opened(path: &Path) -> Result<File, String> {
     File::open(path).map_err(words)
+}
+
+/// Batches of this schema that come from elsewhere, as the columns of a file that is read once
+/// ([`athermal_files::Reader::from_typed`]).
+#[must_use]
+pub fn batches(schema: SchemaRef, batches: Batches) -> Box<dyn TypedFile> {
+    let places = (0..schema.fields().len()).collect();
+    Box::new(Batched {
+        schema,
+        keys: Vec::new(),
+        read: Box::new(move |_| Ok((batches, places))),
+    })
 }
 
 pub(crate) fn parquet(path: &Path) -> Result<Box<dyn TypedFile>, String> {

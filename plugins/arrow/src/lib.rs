@@ -8,11 +8,14 @@
 
 mod column;
 mod file;
+mod memory;
 mod parquet_sink;
 mod rows;
 mod sink;
 mod stamp;
 
+pub use file::{Batches, batches};
+pub use memory::table;
 pub use sink::ParquetSink;
 
 use athermal_files::{FileKind, register_file_kind};

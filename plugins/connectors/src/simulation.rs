@@ -89,7 +89,7 @@ impl Source for SimulationSource {
         let setup = Setup {
             days: self.days,
             seed: self.seed,
-            schedule: None,
+            ..Setup::default()
         };
         let mut simulation = known.start(&setup).map_err(ConnectorError::new)?;
         let axes = axes(&wiring.name);

@@ -1,7 +1,8 @@
 //! The endogenous estimator: drift from past drift.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, PlannedRow, Regressors, Trainer, TrainingSetup,
+    TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -77,6 +78,14 @@ impl Estimator for Ar {
         self.solver.learns()
     }
 
+    fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
+        self.solver.mistakes_of_row(row)
+    }
+
+    fn needs_constants(&self) -> bool {
+        self.solver.prior().is_some()
+    }
+
     fn has_novelty(&self) -> bool {
         true
     }
@@ -86,7 +95,7 @@ impl Estimator for Ar {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(LinearTrainer::new(setup, self.solver, None).with_order(self.lag_order()))
+        Box::new(LinearTrainer::new(setup, self.solver.clone(), None).with_order(self.lag_order()))
     }
 }
 

@@ -1,7 +1,8 @@
 //! The estimator with both: drift from past drift and temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, PlannedRow, Regressors, Trainer, TrainingSetup,
+    TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -89,6 +90,14 @@ impl Estimator for Arx {
         self.solver.learns()
     }
 
+    fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
+        self.solver.mistakes_of_row(row)
+    }
+
+    fn needs_constants(&self) -> bool {
+        self.solver.prior().is_some()
+    }
+
     fn has_novelty(&self) -> bool {
         true
     }
@@ -102,7 +111,7 @@ impl Estimator for Arx {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        let trainer = LinearTrainer::new(setup, self.solver, self.selection);
+        let trainer = LinearTrainer::new(setup, self.solver.clone(), self.selection);
         Box::new(trainer.with_order(self.lag_order()))
     }
 }

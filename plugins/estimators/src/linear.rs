@@ -1,7 +1,7 @@
 //! The exogenous estimator: drift from temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+    Estimator, InputPort, Learns, Mistake, PlannedRow, Regressors, Trainer, TrainingSetup,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -60,6 +60,14 @@ impl Estimator for Linear {
         self.solver.learns()
     }
 
+    fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
+        self.solver.mistakes_of_row(row)
+    }
+
+    fn needs_constants(&self) -> bool {
+        self.solver.prior().is_some()
+    }
+
     fn has_novelty(&self) -> bool {
         true
     }
@@ -73,7 +81,11 @@ impl Estimator for Linear {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(LinearTrainer::new(setup, self.solver, self.selection))
+        Box::new(LinearTrainer::new(
+            setup,
+            self.solver.clone(),
+            self.selection,
+        ))
     }
 }
 

@@ -100,6 +100,7 @@ mod tests {
             of_truth: false,
         };
         let mut trainer = kind.trainer(&TrainingSetup {
+            instance: "one".to_owned(),
             regressors: vec![regressor("a"), regressor("b")],
             places: vec![0, 1],
             error_unit: "nm".to_owned(),

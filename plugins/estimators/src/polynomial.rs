@@ -15,7 +15,7 @@ use crate::novelty::novelty_mistakes;
 use crate::regression::LinearTrainer;
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::selection::Selection;
-use crate::solver::Solver;
+use crate::solver::{PRIOR, Solver};
 
 /// More terms would take the memory of many rows, and no machine has been seen that needs them.
 const MOST_TERMS: usize = 500;
@@ -58,7 +58,12 @@ impl Estimator for Polynomial {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        self.solver.mistakes()
+        let mut mistakes = self.solver.mistakes();
+        if self.solver.prior().is_some() {
+            let message = "a prior is for regressors as they are, and not for their products";
+            mistakes.push(Mistake::at(PRIOR, message).help("leave `prior` out"));
+        }
+        mistakes
     }
 
     fn has_novelty(&self) -> bool {
@@ -90,7 +95,7 @@ impl Estimator for Polynomial {
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(PolynomialTrainer {
             terms: self.terms(setup.regressors.len()),
-            solver: self.solver,
+            solver: self.solver.clone(),
             selection: self.selection,
             running: Standardizer::new(setup.regressors.len()),
             setup: TrainingSetup {
@@ -208,7 +213,7 @@ impl PolynomialTrainer {
             found_from: self.waiting.len() / (features.len() + 1),
             centres: standard.means,
             scales: standard.scales,
-            trainer: LinearTrainer::new(&setup, self.solver, Some(self.selection)),
+            trainer: LinearTrainer::new(&setup, self.solver.clone(), Some(self.selection)),
             z: Vec::new(),
             row: Vec::new(),
         };

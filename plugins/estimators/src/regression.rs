@@ -5,6 +5,7 @@ use athermal_core::node::{
     Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::node::{number, numbers};
+use athermal_core::unit::Unit;
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, Novelty, PredictionVariance,
     Sgd, SgdOptions, Standardization,
@@ -15,6 +16,7 @@ use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
 use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 use crate::online::{Frame, OnlinePredictor, Recursion};
+use crate::prior::{Met, Wanted};
 use crate::selection::Selection;
 use crate::solver::Solver;
 use crate::summed::{add_sums, sums_of};
@@ -25,6 +27,8 @@ use crate::unsolved::unsolved;
 pub(crate) struct LinearTrainer {
     regressors: Vec<Regressor>,
     solver: Solver,
+    /// The prior as these rows meet it, or why it does not.
+    prior: Option<Result<Met, String>>,
     selection: Option<Selection>,
     order: Option<LagOrder>,
     blocks: GramBlocks,
@@ -39,16 +43,31 @@ pub(crate) struct Found {
     pub(crate) standard: Standardization,
     pub(crate) squares: LeastSquares,
     pub(crate) fit: LinearFit,
+    /// Where the fit is one towards a prior.
+    of_prior: Option<OfPrior>,
 }
+
+/// What says of a fit towards a prior how far its predictions may be off, and its regressors from those of the fleet.
+type OfPrior = (Option<PredictionVariance>, Option<Novelty>);
 
 impl LinearTrainer {
     pub(crate) fn new(setup: &TrainingSetup, solver: Solver, selection: Option<Selection>) -> Self {
         let blocks = GramBlocks::with_row_memory(setup.regressors.len(), setup.memory);
+        let prior = solver.prior().map(|(prior, _)| {
+            let unit = Unit::parse(&setup.error_unit).map_err(|error| error.to_string())?;
+            prior.meet(Wanted {
+                instance: &setup.instance,
+                regressors: &setup.regressors,
+                unit: &unit,
+                ahead: setup.ahead,
+            })
+        });
         let of_selection = selection.as_ref().map_or(1, Selection::parts);
         let parts = of_selection.max(solver.penalty().parts());
         Self {
             regressors: setup.regressors.clone(),
             solver,
+            prior,
             selection,
             order: None,
             blocks: blocks.cut_into(parts),
@@ -107,7 +126,8 @@ impl LinearTrainer {
         let (chosen, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
         let solved = squares.solve(&gram, &chosen, &standard.scales, self.blocks.rows());
-        let fit = solved.map_err(unsolved)?;
+        let mut fit = solved.map_err(unsolved)?;
+        let of_prior = self.towards_prior(&gram, &standard.scales, alpha, &mut fit, report)?;
         report.condition = Some(fit.condition);
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         let of_all = self.selection.as_ref().and_then(|_| {
@@ -126,7 +146,36 @@ impl LinearTrainer {
             standard,
             squares,
             fit,
+            of_prior,
         })
+    }
+
+    /// Pulls a fit towards the prior, where there is one; gives what says how far its predictions may be off.
+    fn towards_prior(
+        &self,
+        gram: &Gram,
+        scales: &[f64],
+        alpha: f64,
+        fit: &mut LinearFit,
+        report: &mut TrainingReport,
+    ) -> Result<Option<OfPrior>, TrainingError> {
+        let (Some(prior), Some((_, weight))) = (&self.prior, self.solver.prior()) else {
+            return Ok(None);
+        };
+        let prior = prior.as_ref().map_err(|reason| TrainingError::Unsolvable {
+            reason: reason.clone(),
+        })?;
+        let pull = prior.pull(weight, alpha);
+        let columns = prior.columns(&fit.columns);
+        let solved = prior.coefficients.fit(gram, &columns, scales, pull);
+        let solved = solved.map_err(unsolved)?;
+        fit.coefficients = solved.coefficients;
+        fit.intercept = solved.intercept;
+        fit.residual_sum_of_squares = solved.residual_sum_of_squares;
+        // What is said of how least squares were solved is not of this fit.
+        fit.method = Method::Cholesky;
+        prior.tell(pull, &self.regressors, &fit.columns, report);
+        Ok(Some((solved.variance, prior.novelty(&fit.columns))))
     }
 
     /// The range of some of the regressors, where it was kept.
@@ -157,7 +206,17 @@ impl LinearTrainer {
         &self,
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
-        let found = self.find(report)?;
+        let mut found = self.find(report)?;
+        if let Some((variance, novelty)) = found.of_prior.take() {
+            let model = LinearPredictor {
+                variance,
+                regressors: found.names,
+                coefficients: found.fit.coefficients,
+                intercept: found.fit.intercept,
+                novelty,
+            };
+            return Ok((model, None));
+        }
         let novelty = self.novelty_of(&found);
         match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => {

@@ -156,9 +156,7 @@ impl Estimator for Rls {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        let solver = Solver::Ridge {
-            alpha: Penalty::Fixed(self.alpha),
-        };
+        let solver = Solver::ridge(Penalty::Fixed(self.alpha));
         // The range is kept whether it learns or not, so that the same fit serves both.
         let setup = TrainingSetup {
             learns: true,

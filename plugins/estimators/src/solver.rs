@@ -2,21 +2,35 @@
 
 use std::fmt::Debug;
 
-use athermal_core::node::{Learns, Mistake};
+use athermal_core::node::{Learns, Mistake, PlannedRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::penalty::Penalty;
+use crate::prior::{Prior, Wanted};
 
 /// How coefficients are found, on standardised regressors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Solver {
-    /// Minimises the sum of squares plus `alpha · ‖w‖²`, the intercept free (Hoerl and Kennard 1970).
+    /// Minimises the sum of squares plus `alpha · ‖w‖²`, the intercept free (Hoerl and Kennard 1970). With a prior it minimises the sum of
+    /// squares plus `λ (θ − μ)ᵀ Σ⁻¹ (θ − μ)`, with mean and covariance of the coefficients `θ` over the machines of a fleet, the
+    /// constant among them, in the units of the regressors (Lindley and Smith 1972). Regressors that the prior does not know have
+    /// the penalty `alpha`. Of fewer regressors than it knows, as after a selection, it has the mean and covariance of those.
     Ridge {
         /// The penalty, at least 0, or how it is chosen.
         #[serde(default = "one")]
         alpha: Penalty,
+        /// The file of a prior, which `athermal fleet fit --pooled` writes. A relative path starts at this file; what is in it becomes a
+        /// part of the graph and of its models.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<String>")]
+        prior: Option<Prior>,
+        /// How many times as much the prior counts as was best over the machines of the fleet, above 0, 1 by default. More is
+        /// nearer to the mean.
+        #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        prior_weight: f64,
     },
     /// Minimises the sum of squares. Above a condition number of 1000 it works on the rows by singular values, where they
     /// are kept; above 10⁶ it says so.
@@ -44,6 +58,18 @@ pub enum Solver {
     },
 }
 
+/// Where the prior stands.
+pub(crate) const PRIOR: &str = "solver.prior";
+
+fn as_it_is() -> f64 {
+    1.0
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_as_it_is(weight: &f64) -> bool {
+    *weight == as_it_is()
+}
+
 fn one() -> Penalty {
     Penalty::Fixed(1.0)
 }
@@ -66,15 +92,58 @@ fn five() -> usize {
 
 impl Default for Solver {
     fn default() -> Self {
-        Self::Ridge { alpha: one() }
+        Self::ridge(one())
     }
 }
 
 impl Solver {
+    /// Ridge without a prior.
+    pub(crate) fn ridge(alpha: Penalty) -> Self {
+        Self::Ridge {
+            alpha,
+            prior: None,
+            prior_weight: as_it_is(),
+        }
+    }
+
+    /// The prior, and how many times as much it counts as was best over machines.
+    pub(crate) fn prior(&self) -> Option<(&Prior, f64)> {
+        match self {
+            Self::Ridge {
+                prior: Some(prior),
+                prior_weight,
+                ..
+            } => Some((prior, *prior_weight)),
+            _ => None,
+        }
+    }
+
+    /// What is wrong with the prior for the rows of an instance.
+    pub(crate) fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
+        let Some((prior, _)) = self.prior() else {
+            return Vec::new();
+        };
+        let wanted = Wanted {
+            instance: row.instance,
+            regressors: row.regressors,
+            unit: &row.truth.difference(),
+            ahead: row.ahead,
+        };
+        let mistake = prior.meet(wanted).err();
+        Vec::from_iter(mistake.map(|message| Mistake::at(PRIOR, message)))
+    }
+
     /// A range of penalties that is none.
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
         match self {
-            Self::Ridge { alpha } => alpha.mistakes("solver.alpha"),
+            Self::Ridge { alpha, prior, .. } => {
+                let prior = prior.iter().flat_map(|prior| prior.mistakes(PRIOR));
+                alpha
+                    .mistakes("solver.alpha")
+                    .into_iter()
+                    .chain(prior)
+                    .collect()
+            }
             Self::Ols {} | Self::Sgd { .. } => Vec::new(),
         }
     }
@@ -112,7 +181,7 @@ impl Solver {
     /// The penalty of the least squares that this stands for.
     pub(crate) fn penalty(&self) -> Penalty {
         match *self {
-            Self::Ridge { alpha } => alpha,
+            Self::Ridge { alpha, .. } => alpha,
             Self::Ols {} | Self::Sgd { .. } => Penalty::Fixed(0.0),
         }
     }

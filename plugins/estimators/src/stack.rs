@@ -358,6 +358,7 @@ mod tests {
             of_truth: false,
         };
         let setup = TrainingSetup {
+            instance: "stack".to_owned(),
             regressors: (0..rows[0].0.len()).map(regressor).collect(),
             places: (0..rows[0].0.len()).collect(),
             error_unit: "nm/min".to_owned(),

@@ -107,8 +107,8 @@ impl Reader {
         if let Some((_, time)) = options.times.iter().find(|(file, _)| file == path) {
             layout.time = time.clone();
         }
-        if let Some(kind) = typed::kind_of(path) {
-            return Self::from_typed(path, typed::open(kind, path)?, layout, options);
+        if let Some(file) = typed::opened(path) {
+            return Self::from_typed(path, file?, layout, options);
         }
         let format = options.format.or_else(|| Format::of_file(path));
         let options = Options { format, ..options };
@@ -162,8 +162,11 @@ impl Reader {
         Ok(Self::of_rows(rows, separator, layout, table, &options))
     }
 
-    /// Reads a file that is no text.
-    fn from_typed(
+    /// Reads columns that are no text, such as those of a data frame; the path stands for them in messages.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`].
+    pub fn from_typed(
         path: &Path,
         file: Box<dyn TypedFile>,
         layout: Layout,

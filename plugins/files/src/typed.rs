@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::cells::{Cells, Numbers};
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
+use crate::lent;
 use crate::{FileError, Layout, Place};
 
 /// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
@@ -115,7 +116,7 @@ pub(crate) fn kind_by_name(path: &Path) -> Option<&'static FileKind> {
 }
 
 /// The kind of a file that is there, by its name, else by its first bytes.
-pub(crate) fn kind_of(path: &Path) -> Option<&'static FileKind> {
+fn kind_of(path: &Path) -> Option<&'static FileKind> {
     if path == Path::new("-") || crate::Format::of_text(path).is_some() {
         return None;
     }
@@ -129,11 +130,16 @@ pub(crate) fn kind_of(path: &Path) -> Option<&'static FileKind> {
     })
 }
 
-/// Opens a file of a kind.
-pub(crate) fn open(kind: &FileKind, path: &Path) -> Result<Box<dyn TypedFile>, FileError> {
+/// Opens what stands at a path, or goes by it in memory, where it is no text.
+pub(crate) fn opened(path: &Path) -> Option<Result<Box<dyn TypedFile>, FileError>> {
+    let unreadable = |reason| failed(path.display().to_string().into(), 0, reason);
+    if let Some(table) = lent::open(path) {
+        return Some(table.map_err(unreadable));
+    }
+    let kind = kind_of(path)?;
     // What cannot be opened at all says so as every file does.
-    File::open(path).map_err(|source| FileError::cannot_open(path, source))?;
-    (kind.open)(path).map_err(|reason| failed(path.display().to_string().into(), 0, reason))
+    let there = File::open(path).map_err(|source| FileError::cannot_open(path, source));
+    Some(there.and_then(|_| (kind.open)(path).map_err(unreadable)))
 }
 
 fn failed(file: Arc<str>, line: u64, reason: String) -> FileError {

@@ -1,5 +1,7 @@
 //! Heat in a bar of equal cells, and how much the bar grows. Decides conduction and expansion, not what heats the bar.
 
+use athermal_trial::machine::Individual;
+
 /// What a bar is made of; handbook values at 20 °C.
 #[derive(Debug, Clone, Copy)]
 pub struct Material {
@@ -47,6 +49,29 @@ pub struct Shape {
     pub transfer: f64,
     /// Number of cells.
     pub cells: usize,
+}
+
+impl Shape {
+    /// The same bar in one machine of its type: its material and its skin are drawn, its measures are those of the drawing.
+    #[must_use]
+    pub fn of(self, individual: &Individual, body: &str) -> Self {
+        let drawn =
+            |parameter: &str, of: f64| of * individual.factor(&format!("{body} {parameter}"));
+        let Material {
+            conductivity,
+            capacity,
+            expansion,
+        } = self.material;
+        Self {
+            material: Material {
+                conductivity: drawn("conductivity", conductivity),
+                capacity: drawn("capacity", capacity),
+                expansion: drawn("expansion", expansion),
+            },
+            transfer: drawn("transfer", self.transfer),
+            ..self
+        }
+    }
 }
 
 /// A bar, insulated at both ends, with air along its side: `ρc ∂T/∂t = k ∂²T/∂x² + g (T_air − T) + q`.

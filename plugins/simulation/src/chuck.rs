@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use athermal_trial::machine::Individual;
+
 /// Stefan–Boltzmann constant in W/(m² K⁴) (CODATA 2018).
 const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
 const KELVIN: f64 = 273.15;
@@ -22,11 +24,25 @@ pub struct View {
     pub conducting: f64,
 }
 
+impl View {
+    /// The same coupling in one machine of its type.
+    #[must_use]
+    pub fn of(self, individual: &Individual, body: &str) -> Self {
+        let drawn =
+            |parameter: &str, of: f64| of * individual.factor(&format!("{body} {parameter}"));
+        Self {
+            radiating_m2: drawn("view", self.radiating_m2),
+            conducting: drawn("gap", self.conducting),
+        }
+    }
+}
+
 /// A chuck that follows its set point.
 #[derive(Debug, Clone)]
 pub struct Chuck {
     level: f64,
     hunting: f64,
+    follow_s: f64,
 }
 
 impl Chuck {
@@ -36,7 +52,15 @@ impl Chuck {
         Self {
             level: set_point,
             hunting: 0.0,
+            follow_s: FOLLOW_S,
         }
+    }
+
+    /// The same in one machine of its type, with a time constant of its own.
+    #[must_use]
+    pub fn of(self, individual: &Individual) -> Self {
+        let follow_s = self.follow_s * individual.factor("chuck time constant");
+        Self { follow_s, ..self }
     }
 
     /// Its temperature in °C.
@@ -59,7 +83,7 @@ impl Chuck {
 
     /// One step of `step_s` seconds towards `set_point` °C.
     pub fn step(&mut self, step_s: f64, set_point: f64) {
-        let wanted = (set_point - self.level) * (step_s / FOLLOW_S).min(1.0);
+        let wanted = (set_point - self.level) * (step_s / self.follow_s).min(1.0);
         let most = FASTEST * step_s;
         self.level += wanted.clamp(-most, most);
         self.hunting += step_s / HUNTING_S;

@@ -81,8 +81,8 @@ impl Machine for DieTester {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
         let own = || self.schedule(setup.seed);
         let schedule = setup.schedule.clone().or_else(own).unwrap_or_default();
-        let bodies = Bodies::settled(self.world.clone(), &schedule, setup.seed);
-        Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
+        let bodies = Bodies::settled(self.world.clone(), &schedule, setup);
+        Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup)))
     }
 }
 
@@ -132,7 +132,8 @@ const DUTY: Duty = Duty {
 const HOLDER_TO_STAGE: f64 = 0.04;
 const STAGE_TO_FRAME: f64 = 0.1;
 
-/// What makes one side of the machine.
+/// What makes one side of the machine, as designed.
+#[derive(Clone, Copy)]
 struct SideShape {
     holder: Shape,
     holder_view: View,
@@ -181,7 +182,9 @@ const SIDES: [SideShape; 2] = [
 
 /// One side: a holder on a stage.
 struct Side {
-    shape: &'static SideShape,
+    shape: SideShape,
+    holder_to_stage: f64,
+    stage_to_frame: f64,
     holder: Bar,
     stage: Bar,
     coupling: Coupling,
@@ -190,18 +193,25 @@ struct Side {
 }
 
 impl Side {
-    fn new(shape: &'static SideShape, number: usize, room: f64, seed: u64) -> Self {
-        let stream = |what: &str| Prng::stream(seed, &format!("{what} {number}"));
+    fn new(mut shape: SideShape, number: usize, room: f64, setup: &Setup) -> Self {
+        let one = &setup.individual;
+        let [holder, stage] = [format!("holder {number}"), format!("stage {number}")];
+        shape.holder_view = shape.holder_view.of(one, &holder);
+        shape.stage_view = shape.stage_view.of(one, &stage);
+        let stream = |what: &str| Prng::stream(setup.seed, &format!("{what} {number}"));
         let creep = |axis: usize| {
-            let prng = stream(["creep X", "creep Y", "creep Z"][axis]);
-            Creep::new(shape.creep_nm[axis], Bodies::STEP_S, prng)
+            let name = ["creep X", "creep Y", "creep Z"][axis];
+            let sigma_nm = shape.creep_nm[axis] * one.factor(&format!("{name} {number}"));
+            Creep::new(sigma_nm, Bodies::STEP_S, stream(name))
         };
         Self {
             shape,
-            holder: Bar::new(&shape.holder, room),
-            stage: Bar::new(&STAGE, room),
+            holder_to_stage: HOLDER_TO_STAGE * one.factor(&format!("{holder} joint")),
+            stage_to_frame: STAGE_TO_FRAME * one.factor(&format!("{stage} joint")),
+            holder: Bar::new(&shape.holder.of(one, &holder), room),
+            stage: Bar::new(&STAGE.of(one, &stage), room),
             coupling: Coupling::new(0.18, Bodies::STEP_S, stream("coupling")),
-            motors: Motors::new(DUTY, stream("motors")),
+            motors: Motors::new(DUTY.of(one, &stage), stream("motors")),
             creep: std::array::from_fn(creep),
         }
     }
@@ -209,8 +219,8 @@ impl Side {
     /// One step; gives the heat in W that has flowed into the frame.
     fn step(&mut self, air: f64, door: f64, chuck: &Chuck, frame: f64) -> f64 {
         let motion = self.motors.step(Bodies::STEP_S);
-        let to_stage = HOLDER_TO_STAGE * (self.holder.last() - self.stage.first());
-        let to_frame = STAGE_TO_FRAME * (self.stage.last() - frame);
+        let to_stage = self.holder_to_stage * (self.holder.last() - self.stage.first());
+        let to_frame = self.stage_to_frame * (self.stage.last() - frame);
         let to_holder_w = chuck.heat_w(self.shape.holder_view, self.holder.first());
         let to_stage_w = chuck.heat_w(self.shape.stage_view, self.stage.first());
         self.holder.heat_first(to_holder_w);
@@ -252,18 +262,19 @@ struct Bodies {
 }
 
 impl Bodies {
-    fn settled(world: World, schedule: &Schedule, seed: u64) -> Self {
+    fn settled(world: World, schedule: &Schedule, setup: &Setup) -> Self {
+        let one = &setup.individual;
         let [chuck_track, room_track] = [CHUCK, ROOM].map(|what| schedule.track(&what));
         let (chuck, air) = (chuck_track.at(0), room_track.at(0));
         let start_s = -SETTLED_S as f64;
         let mut bodies = Self {
             chuck_track,
             room_track,
-            room: Room::new(AIR, air, start_s, Self::STEP_S, seed),
+            room: Room::new(AIR, air, start_s, Self::STEP_S, setup.seed),
             air,
-            chuck: Chuck::new(chuck),
-            frame: Bar::new(&FRAME, air),
-            sides: [0, 1].map(|side| Side::new(&SIDES[side], side + 1, air, seed)),
+            chuck: Chuck::new(chuck).of(one),
+            frame: Bar::new(&FRAME.of(one, "frame"), air),
+            sides: [0, 1].map(|side| Side::new(SIDES[side], side + 1, air, setup)),
             world,
             time_ns: 0,
         };

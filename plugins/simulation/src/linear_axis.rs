@@ -63,8 +63,8 @@ impl Machine for LinearAxis {
             .schedule
             .as_ref()
             .map_or_else(|| Track::constant(ROOM.default), |s| s.track(&ROOM));
-        let bodies = Bodies::settled(self.world.clone(), room, setup.seed);
-        Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup.seed)))
+        let bodies = Bodies::settled(self.world.clone(), room, setup);
+        Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup)))
     }
 }
 
@@ -130,6 +130,8 @@ struct Bodies {
     arm: Bar,
     slide: Bar,
     column: Bar,
+    arm_to_slide: f64,
+    slide_to_column: f64,
     couplings: [Coupling; 3],
     motors: Motors,
     creep: [Creep; 3],
@@ -138,23 +140,30 @@ struct Bodies {
 }
 
 impl Bodies {
-    fn settled(world: World, room_track: Track, seed: u64) -> Self {
+    fn settled(world: World, room_track: Track, setup: &Setup) -> Self {
+        let (seed, one) = (setup.seed, &setup.individual);
         let air = room_track.at(0);
         let stream = |label: &str| Prng::stream(seed, label);
         let coupling = |label| Coupling::new(0.18, Self::STEP_S, stream(label));
         let creep = |axis: usize| {
-            let prng = stream(["creep X", "creep Y", "creep Z"][axis]);
-            Creep::new(CREEP_NM[axis], Self::STEP_S, prng)
+            let name = ["creep X", "creep Y", "creep Z"][axis];
+            Creep::new(
+                CREEP_NM[axis] * one.factor(name),
+                Self::STEP_S,
+                stream(name),
+            )
         };
         let mut bodies = Self {
             room_track,
             room: Room::new(AIR, air, -SETTLED_S as f64, Self::STEP_S, seed),
             air,
-            arm: Bar::new(&ARM, air),
-            slide: Bar::new(&SLIDE, air),
-            column: Bar::new(&COLUMN, air),
+            arm: Bar::new(&ARM.of(one, "arm"), air),
+            slide: Bar::new(&SLIDE.of(one, "slide"), air),
+            column: Bar::new(&COLUMN.of(one, "column"), air),
+            arm_to_slide: ARM_TO_SLIDE * one.factor("arm joint"),
+            slide_to_column: SLIDE_TO_COLUMN * one.factor("slide joint"),
             couplings: ["coupling arm", "coupling slide", "coupling column"].map(coupling),
-            motors: Motors::new(DUTY, stream("motors")),
+            motors: Motors::new(DUTY.of(one, "slide"), stream("motors")),
             creep: std::array::from_fn(creep),
             world,
             time_ns: 0,
@@ -173,8 +182,8 @@ impl Plant for Bodies {
     fn step(&mut self, time_ns: i64) {
         self.air = self.room.step(self.room_track.at(time_ns));
         let motion = self.motors.step(Self::STEP_S);
-        let to_slide = ARM_TO_SLIDE * (self.arm.last() - self.slide.first());
-        let to_column = SLIDE_TO_COLUMN * (self.slide.last() - self.column.first());
+        let to_slide = self.arm_to_slide * (self.arm.last() - self.slide.first());
+        let to_column = self.slide_to_column * (self.slide.last() - self.column.first());
         self.arm.heat_last(-to_slide);
         self.slide.heat_first(to_slide + motion.heat_w);
         self.slide.heat_last(-to_column);

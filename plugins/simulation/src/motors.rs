@@ -1,6 +1,7 @@
 //! When the motors of a stage work. Decides the alignment bursts and their heat, not where the heat goes.
 
 use athermal_core::prng::Prng;
+use athermal_trial::machine::Individual;
 
 /// How often and how hard motors work.
 #[derive(Debug, Clone, Copy)]
@@ -11,6 +12,15 @@ pub struct Duty {
     pub burst_s: [f64; 2],
     /// Heat during a burst in W; each burst has its own between half and one and a half of it.
     pub power_w: f64,
+}
+
+impl Duty {
+    /// The same motors in one machine of its type: their power is drawn, their work is planned.
+    #[must_use]
+    pub fn of(self, individual: &Individual, stage: &str) -> Self {
+        let power_w = self.power_w * individual.factor(&format!("{stage} power"));
+        Self { power_w, ..self }
+    }
 }
 
 /// Alignment bursts at random times: exponential pauses, uniform durations.

@@ -1,12 +1,14 @@
 //! How the true state of a machine becomes rows. Decides sampling instants, noise, resolution and true drift, not the state.
 
 use athermal_core::prng::Prng;
-use athermal_trial::machine::{Channel, Row, SECOND_NS, Simulation};
+use athermal_trial::machine::{Channel, Row, SECOND_NS, Setup, Simulation};
 
 /// Seconds between rows: every temperature is sampled in each.
 pub const PERIOD_S: i64 = 10;
 /// Standard deviation of the noise of a temperature, in K.
 const TEMPERATURE_NOISE: f64 = 1e-3;
+/// Offset of a sensor of temperature in K, times the spread of machines; 0 as designed.
+const TEMPERATURE_OFFSET: f64 = 0.5;
 /// Standard deviation of the noise of a position, in nm.
 const POSITION_NOISE_NM: f64 = 12.0;
 /// Shortest and longest time in s between two alignments; 75 s on average.
@@ -45,6 +47,8 @@ pub struct Recorder<P> {
     plant: P,
     temperatures: usize,
     decimals: Vec<u32>,
+    /// Of each temperature.
+    offset: Vec<f64>,
     noise: Vec<Prng>,
     alignment: Prng,
     next_alignment_s: f64,
@@ -61,8 +65,9 @@ pub struct Recorder<P> {
 }
 
 impl<P: Plant> Recorder<P> {
-    /// Records `rows` rows of `plant`, which stands at time 0; positions count from there.
-    pub fn new(plant: P, channels: &[Channel], rows: u64, seed: u64) -> Self {
+    /// Records `rows` rows of `plant`, which stands at time 0; positions count from there. The setup is that of the plant.
+    pub fn new(plant: P, channels: &[Channel], rows: u64, setup: &Setup) -> Self {
+        let (seed, individual) = (setup.seed, setup.individual);
         let axes = channels.iter().filter(|channel| channel.is_axis()).count();
         let mut alignment = Prng::stream(seed, "alignment");
         let mut origin_nm = vec![0.0; axes];
@@ -71,6 +76,11 @@ impl<P: Plant> Recorder<P> {
             plant,
             temperatures: channels.len() - axes,
             decimals: channels.iter().map(|channel| channel.decimals).collect(),
+            offset: channels
+                .iter()
+                .filter(|channel| !channel.is_axis())
+                .map(|of| TEMPERATURE_OFFSET * individual.offset(&format!("sensor {}", of.name)))
+                .collect(),
             noise: channels
                 .iter()
                 .map(|channel| Prng::stream(seed, &format!("noise {}", channel.reference())))
@@ -133,8 +143,8 @@ impl<P: Plant> Simulation for Recorder<P> {
         self.plant
             .temperatures(&mut row.values[..self.temperatures]);
         for column in 0..self.temperatures {
-            let noise = TEMPERATURE_NOISE * self.noise[column].normal();
-            row.values[column] = resolved(row.values[column] + noise, self.decimals[column]);
+            let error = TEMPERATURE_NOISE * self.noise[column].normal() + self.offset[column];
+            row.values[column] = resolved(row.values[column] + error, self.decimals[column]);
         }
         row.values[self.temperatures..].fill(f64::NAN);
         row.true_drift.fill(f64::NAN);
@@ -207,7 +217,11 @@ mod tests {
     }
 
     fn rows(count: u64) -> Vec<Row> {
-        let mut recorder = Recorder::new(Ramp(0), &CHANNELS, count, 4);
+        let setup = Setup {
+            seed: 4,
+            ..Setup::default()
+        };
+        let mut recorder = Recorder::new(Ramp(0), &CHANNELS, count, &setup);
         let mut row = Row::empty(&CHANNELS);
         let mut rows = Vec::new();
         while recorder.next(&mut row) {

@@ -7,13 +7,13 @@ mod tables;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
 use athermal::diagnosis::day::Days;
 use athermal::diagnosis::{
     Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
 };
 use athermal::run::score::Lack;
+use athermal::{Duration, Model};
 use clap::Args;
 use serde_json::json;
 
@@ -21,6 +21,7 @@ use super::beyond;
 use super::data::Data;
 use super::doubts::Doubts;
 use super::faults::{FaultWatch, Purpose};
+use super::found::{self, Found};
 use super::model::load_fitted;
 use super::report::write_plots;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -77,15 +78,41 @@ impl Diagnose {
     /// # Errors
     /// When the model or the data cannot be used, or a picture cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        self.data.check_lasting("--data")?;
+        self.data.check_offsets(&[])?;
+        let model = load_fitted(&self.model, Wanted::default(), terminal)?;
+        let mut found = None;
+        found::show(terminal, || {
+            let (shown, diagnosis) = self.find(&model, terminal)?;
+            found = Some(diagnosis);
+            Ok(shown)
+        })?;
+        let Some(diagnosis) = found else {
+            return Ok(Answer::Fine);
+        };
+        if let Some(folder) = &self.plots {
+            write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
+        }
+        if terminal.format == Format::Table {
+            let tables = Tables::new(&diagnosis, &self.of);
+            if let Some(next) = self.next(&tables, &model, window::any(&model.plan)) {
+                terminal.note(format_args!("\n{next}"));
+            }
+        }
+        Ok(Answer::Fine)
+    }
+
+    /// Diagnoses a model.
+    ///
+    /// # Errors
+    /// When a name or the length of a day is none, or the data cannot be used.
+    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<(Found, Diagnosis), Failure> {
         if self.day <= Duration::ZERO {
             return Err(Failure::Request(format!(
                 "--day is {} and must be greater than 0",
                 self.day
             )));
         }
-        self.data.check_lasting("--data")?;
-        self.data.check_offsets(&[])?;
-        let model = load_fitted(&self.model, Wanted::default(), terminal)?;
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
         let options = Options {
@@ -99,11 +126,11 @@ impl Diagnose {
                 .set(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
+        let (diagnosis, observation) = diagnose(model, &watch, &options, &mut progress)?;
         drop(bar);
         let clocks = match self.no_fit {
             true => Vec::new(),
-            false => offsets(&model, &dataset, terminal)?,
+            false => offsets(model, &dataset, terminal)?,
         };
         let tables = Tables::new(&diagnosis, &self.of);
         let trace = &observation.trace;
@@ -115,17 +142,13 @@ impl Diagnose {
             faults: watch.found(),
             outside_fit: beyond::beyond(model.sample_ranges(), &trace.ranges),
         };
-        if terminal.format == Format::Json {
-            let mut facts = json!({ "data": self.data.names(), "diagnosis": tables.shown() });
-            if !clocks.is_empty() {
-                facts["offsets"] = clocks.iter().map(OfFile::facts).collect();
-            }
-            doubts.add_to(&mut facts);
-            println!("{facts:#}");
-        } else {
-            print!("{}", tables.text());
-            clocks.iter().for_each(|of| print!("{}", of.sentence()));
+        let mut facts = json!({ "data": self.data.names(), "diagnosis": tables.shown() });
+        if !clocks.is_empty() {
+            facts["offsets"] = clocks.iter().map(OfFile::facts).collect();
         }
+        doubts.add_to(&mut facts);
+        let sentences = clocks.iter().map(OfFile::sentence);
+        let text = tables.text() + &sentences.collect::<String>();
         doubts.warn(terminal);
         for message in Lack::warnings(&diagnosis.lacks) {
             terminal.warning(message);
@@ -135,19 +158,10 @@ impl Diagnose {
             note_others(terminal, &model.plan, &diagnosis);
         }
         warn_empty(terminal, &model.plan, &diagnosis, &observation);
-        let drifts = window::any(&model.plan);
-        if self.window && !drifts {
+        if self.window && !window::any(&model.plan) {
             terminal.note("--window shows nothing, since no truth is a slope");
         }
-        if let Some(folder) = &self.plots {
-            write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
-        }
-        if terminal.format == Format::Table
-            && let Some(next) = self.next(&tables, &model, drifts)
-        {
-            terminal.note(format_args!("\n{next}"));
-        }
-        Ok(Answer::Fine)
+        Ok((Found { text, facts }, diagnosis))
     }
 
     fn report(&self, terminal: &Terminal, diagnosis: &Diagnosis) {

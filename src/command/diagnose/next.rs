@@ -34,6 +34,7 @@ impl Diagnose {
     /// model does not say. More data may follow.
     fn fit(&self, model: &Model, more: &[&str]) -> String {
         let cards = model.card.iter().flat_map(|card| &card.data);
+        let cards = cards.filter(|card| !card.path.is_empty());
         let seen: Vec<PathBuf> = cards.map(|card| PathBuf::from(&card.path)).collect();
         let seen = (!seen.is_empty()).then(|| self.data.others(seen));
         let data = seen.as_ref().unwrap_or(&self.data);

@@ -128,7 +128,7 @@ fn ports(kind: &str) -> BTreeMap<String, String> {
 #[test]
 fn the_page_of_a_node_names_the_output_ports_that_it_has() {
     for (kind, expected) in [
-        ("rls", &["learning", "prediction", "std_dev"][..]),
+        ("rls", &["learning", "novelty", "prediction", "std_dev"][..]),
         (
             "auto_weighted",
             &["novelty", "prediction", "std_dev", "weights"],
@@ -138,7 +138,7 @@ fn the_page_of_a_node_names_the_output_ports_that_it_has() {
             &["novelty", "prediction", "reason", "std_dev", "weights"],
         ),
         ("conformal", &["lower", "prediction", "upper"]),
-        ("narx", &["prediction"]),
+        ("narx", &["novelty", "prediction"]),
     ] {
         let ports = ports(kind);
         assert_eq!(ports.keys().collect::<Vec<_>>(), expected, "{kind}");

@@ -29,7 +29,7 @@ impl Looped {
         let setup = Setup {
             days: 3.0,
             seed: 1,
-            schedule: None,
+            ..Setup::default()
         };
         let recording = Simulated::new(machine, setup);
         model.fitted = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {})
@@ -56,6 +56,7 @@ impl Looped {
             days,
             seed,
             schedule: schedule.cloned(),
+            ..Setup::default()
         };
         let faults = fault.iter().flat_map(|faults| faults.split(' '));
         let faults = faults.map(|fault| fault.parse().unwrap()).collect();

@@ -162,7 +162,7 @@ fn a_correction_that_the_axis_clips_fools_nobody() {
     let setup = Setup {
         days: 0.5,
         seed: 3,
-        schedule: None,
+        ..Setup::default()
     };
     let mut alone = Simulated::new(looped.machine, setup).start().unwrap();
     let mut as_alone = looped.model.engine().unwrap();

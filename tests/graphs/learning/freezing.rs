@@ -21,12 +21,8 @@ fn what_learns_follows_a_change_and_what_does_not_stays_wrong() {
         frozen.freeze(true);
         let stayed = run(&mut frozen, 0, &rows);
         assert!(error(&rows, &stayed, 900) > 1.0);
-        // What learns has no edge.
-        let not = if node == SGD {
-            "learn = false\noutside = \"pass\""
-        } else {
-            "learn = false"
-        };
+        // What learns passes beyond the edge of its fit.
+        let not = "learn = false\noutside = \"pass\"";
         let off = node.replace("learn = { outliers = 6.0, margin = 0.5 }", not);
         let text = graph(&off).replace("learning = \"model:learning\"\n", "");
         let never = run(&mut engine(&text), 0, &rows);

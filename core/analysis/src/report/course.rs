@@ -15,6 +15,7 @@ use athermal_run::recording::{Event, Recording, pass};
 use athermal_run::score::{NoModel, PredictionTrace, Trace, TruthTrace};
 use serde::{Serialize, Serializer};
 
+use super::excursions::{NoveltyWatch, ask_for_novelty};
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
 use super::track::{Track, Unjudged, places, reads_drift};
 use super::{ReportError, Series};
@@ -114,10 +115,11 @@ fn as_period<S: Serializer>(period_s: &Option<(f64, f64)>, to: S) -> Result<S::O
     period.serialize(to)
 }
 
-/// The plan, with the weights of votes and the reasons of watches computed, whether or not the graph reads them.
+/// The plan, with the weights of votes, what is novel and the reasons of watches computed, whether or not the graph reads them.
 fn with_weights(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
     ask_for_reasons(&mut plan);
+    ask_for_novelty(&mut plan);
     let weights = plan.nodes.iter().filter_map(|node| node.port("weights"));
     let weights: Vec<_> = weights.flatten().collect();
     plan.observe(weights);
@@ -135,6 +137,7 @@ pub(super) fn follow(
     model: &Model,
     recording: &dyn Recording,
     trace: &Trace,
+    novelty: &mut NoveltyWatch,
 ) -> Result<(Course, Track, Vec<Unjudged>), ReportError> {
     let plan = Arc::new(with_weights(&model.plan));
     let mut engine = Engine::new(Arc::clone(&plan), &model.fitted)?;
@@ -150,6 +153,7 @@ pub(super) fn follow(
     pass(&mut engine, recording, |engine, event, samples| {
         let Event::Row(time) = event else {
             course.sensors.iter_mut().for_each(SensorFacts::segment);
+            novelty.segment();
             begins = true;
             return;
         };
@@ -168,6 +172,7 @@ pub(super) fn follow(
         for (axis, places) in course.axes.iter_mut().zip(&of_axes) {
             axis.look(places, engine, now_s);
         }
+        novelty.look(engine, now_s);
         if !track.axes.is_empty() {
             track.look(&corrected, engine, now, begins);
         }

@@ -7,8 +7,10 @@ mod change;
 mod course;
 mod departure;
 mod errors;
+mod excursions;
 mod hours;
 mod light;
+mod novelty;
 mod page;
 mod realignment;
 mod recomputed;
@@ -23,8 +25,10 @@ pub use change::{Settling, StepLoss};
 pub use course::{Axis, Course, Voter, Weight};
 pub use departure::Departure;
 pub use errors::Errors;
+use excursions::NoveltyWatch;
 use hours::Hours;
 pub use light::Light;
+pub use novelty::{Compared, Contradiction, Effect, Excursion, Novelty, Stretch};
 pub use page::{page, plots};
 pub use realignment::Realignment;
 pub use scores::scores;
@@ -60,6 +64,8 @@ pub struct Facts {
     pub lacks: Vec<Lack>,
     /// What happened over time.
     pub course: Course,
+    /// How far predictions went outside of their fits, and which sensors contradicted the others.
+    pub novelty: Novelty,
     /// How the errors of what is put out are spread, by axis.
     pub errors: Vec<Errors>,
     /// How features go with truths and residuals, against the lag.
@@ -147,7 +153,11 @@ pub fn gather(
         &mut |_| {},
     )?;
     let observation = observe(model, recording)?;
-    let (course, track, mut unjudged) = course::follow(model, recording, &observation.trace)?;
+    let mut watch = NoveltyWatch::new(model);
+    let (course, track, mut unjudged) =
+        course::follow(model, recording, &observation.trace, &mut watch)?;
+    let (mut novelty, periods) = watch.finish();
+    novelty.compare(model, recording, &course.axes, &periods)?;
     let worth = worth::worth(track, &mut unjudged)?;
     let verdict = |axis| Verdict::of(axis, &scores, worth.as_ref());
     let residuals = residuals(&model.plan, &observation);
@@ -155,6 +165,7 @@ pub fn gather(
         graph: model.plan.name.clone().unwrap_or_default(),
         data,
         verdicts: course.axes.iter().map(verdict).collect(),
+        novelty,
         errors: course
             .axes
             .iter()

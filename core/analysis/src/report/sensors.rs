@@ -100,10 +100,11 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     sources.map(facts).collect()
 }
 
-/// Has every `health` node give its reason and every `compensate` what holds it back, whether or not the graph reads it.
+/// Has every `health` and `cross_check` node give its reasons and every `compensate` what holds it back, whether or not the graph reads
+/// it.
 pub(super) fn ask_for_reasons(plan: &mut Plan) {
     for node in &mut plan.nodes {
-        if matches!(node.kind.name, "health" | "compensate")
+        if matches!(node.kind.name, "health" | "cross_check" | "compensate")
             && let PlannedRole::Feature { wanted, .. } = &mut node.role
         {
             wanted.fill(true);

@@ -28,6 +28,14 @@ pub fn text(facts: &Facts) -> String {
             );
         }
     }
+    let hours = Hours::of(&facts.course);
+    let outside = facts.novelty.sentences(&hours);
+    if !outside.is_empty() {
+        let _ = writeln!(text, "\nOutside of what was learned, in {}:", hours.label);
+        for sentence in outside {
+            text.push_str(&paragraph("  ", 4, &sentence));
+        }
+    }
     let sensors = facts.course.sensors.iter();
     let odd: Vec<_> = sensors
         .map(|sensor| (sensor, sensor.remarks()))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::instance::{Declared, Instance};
+use super::instance::{Declared, Instance, instance_name};
 use super::keys::{EstimatorKeys, Learn, Limits, Outside};
 use super::kind_fault::KindFault;
 use super::learning;
@@ -13,7 +13,7 @@ use super::resolver::Resolver;
 use super::row::Row;
 use crate::channel::Channel;
 use crate::diagnostic::Problem;
-use crate::node::{Estimator, FREEZE, Learns, Mistake, OutputPort};
+use crate::node::{Estimator, FREEZE, Learns, Mistake, OutputPort, PlannedRow};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -113,6 +113,17 @@ impl Resolver<'_> {
         let training = self.limits(instance, &instance.read.estimator, link.slot);
         let learning = self.learning(instance, estimator);
         let outside = self.outside(instance, estimator);
+        if whole {
+            let member = instance.decl.member.as_deref();
+            let mistakes = estimator.mistakes_of_row(&PlannedRow {
+                instance: &instance_name(&instance.node.name, member),
+                regressors: &row.regressors,
+                truth: &self.channels[truth].channel.unit,
+                ahead: link.ahead,
+            });
+            whole = mistakes.is_empty();
+            self.mistakes(instance, mistakes);
+        }
         if !whole {
             return None;
         }

@@ -105,6 +105,11 @@ pub trait Estimator: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Mistakes that show only beside all that makes up a row: parameters that are for other regressors, or another truth.
+    fn mistakes_of_row(&self, _row: &PlannedRow<'_>) -> Vec<Mistake> {
+        Vec::new()
+    }
+
     /// The predictor of a kind that needs no fit, given the names of its regressors.
     fn fixed(&self, _regressors: &[String]) -> Option<Box<dyn Predictor>> {
         None
@@ -199,9 +204,24 @@ pub struct Regressor {
     pub of_truth: bool,
 }
 
+/// What makes up the rows of an instance.
+#[derive(Debug, Clone, Copy)]
+pub struct PlannedRow<'a> {
+    /// The instance, as models name it: `thermal.Z1`.
+    pub instance: &'a str,
+    /// The regressors.
+    pub regressors: &'a [Regressor],
+    /// The unit of the truth.
+    pub truth: &'a Unit,
+    /// How far ahead the truth is predicted.
+    pub ahead: Duration,
+}
+
 /// What a trainer knows before the first row.
 #[derive(Debug, Clone)]
 pub struct TrainingSetup {
+    /// The instance that is fitted, as models name it: `thermal.Z1`.
+    pub instance: String,
     /// The regressors, in the order of a row's values.
     pub regressors: Vec<Regressor>,
     /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out, and those

@@ -38,8 +38,8 @@ pub use combiner::{Combine, Combiner, Evidence, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, OrderFigure, OrderTable, Regressor, Regressors, Runs, SelectionStep,
-    Summed, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
+    CandidateScore, Estimator, OrderFigure, OrderTable, PlannedRow, Regressor, Regressors, Runs,
+    SelectionStep, Summed, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub(crate) use feature::{PortValues, SlotTime};

@@ -13,6 +13,10 @@ use crate::diagnostic::{Diagnostics, Names, Place, Problem, SourceId, Sources};
 
 /// The largest file that is read, in bytes.
 const LARGEST: usize = 16_000_000;
+/// Keys in the tables of nodes whose text is the path of a JSON file: what is in it stands in its place.
+const FROM_FILES: [&str; 1] = ["prior"];
+/// The table of such a file whose entries are for instances of nodes. Each node gets those of its own.
+const OF_INSTANCES: &str = "estimators";
 /// The greatest number of files in a chain of `extends`.
 const LONGEST_CHAIN: usize = 16;
 
@@ -236,6 +240,7 @@ impl Chain<'_> {
             Some(entry) => self.other(&entry.value, "extends"),
             None => None,
         };
+        self.include_files(&mut table);
         let borrowed = self.borrow_modules(&mut table);
         let inherited = base.as_mut().and_then(|base| base.get_mut("modules"));
         if let Some(inherited) = inherited.and_then(Value::as_table_mut) {
@@ -245,6 +250,80 @@ impl Chain<'_> {
             }
         }
         Some(merge(base, table, &mut self.removed, self.diagnostics))
+    }
+
+    /// Puts what is in JSON files in the place of their names, in the nodes of a graph and of its modules.
+    fn include_files(&mut self, table: &mut Table) {
+        let names_one = |value: &Value| value.has_key(&FROM_FILES);
+        let sections = ["nodes", "modules"];
+        for section in sections {
+            if !table.get(section).is_some_and(names_one) {
+                continue;
+            }
+            let named = table.get_mut(section).and_then(Value::as_table_mut);
+            for (name, entry) in named.into_iter().flat_map(Table::iter_mut) {
+                // The instances of a node in a module have names that are not known yet.
+                let node = (section == "nodes").then_some(name);
+                self.include_in(node, &mut entry.value);
+            }
+        }
+    }
+
+    fn include_in(&mut self, node: Option<&str>, value: &mut Value) {
+        let Some(table) = value.as_table_mut() else {
+            return;
+        };
+        for (key, entry) in table.iter_mut() {
+            let place = entry.value.place;
+            match &entry.value.data {
+                Data::Text(path) if FROM_FILES.contains(&key) => {
+                    let path = self.sources.resolve(place, path);
+                    match self.included(&path, node, place) {
+                        Ok(value) => entry.value = value,
+                        Err(problem) => self.fail(place, problem),
+                    }
+                }
+                // What stands there are channels, and an input may have any name.
+                Data::Table(_) if key != "inputs" => self.include_in(node, &mut entry.value),
+                _ => {}
+            }
+        }
+    }
+
+    fn included(
+        &self,
+        path: &Path,
+        node: Option<&str>,
+        place: Place,
+    ) -> Result<Value, Box<dyn Problem>> {
+        let text = self.reader.read_named(path);
+        let text = text.map_err(|error| not_read(path, &error, self.reader, &self.paths))?;
+        let shown = || path.display().to_string();
+        let unusable = |reason: String| problem::Unusable {
+            path: shown(),
+            reason,
+        };
+        if text.len() > LARGEST {
+            return Err(problem::TooLarge { limit: LARGEST }.into());
+        }
+        let mut json: serde_json::Value =
+            serde_json::from_str(&text).map_err(|error| unusable(format!("no JSON: {error}")))?;
+        let of_instances = json.get_mut(OF_INSTANCES);
+        if let (Some(node), Some(serde_json::Value::Object(all))) = (node, of_instances) {
+            let known: Vec<String> = all.keys().cloned().collect();
+            let is_own = |name: &str| {
+                let rest = name.strip_prefix(node);
+                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+            };
+            all.retain(|name, _| is_own(name));
+            if all.is_empty() {
+                let known = known.join(", ");
+                let reason = format!("it has nothing for node `{node}`; it has {known}");
+                return Err(unusable(reason).into());
+            }
+        }
+        let read = Value::from_json(&json, place);
+        read.map_err(|error| unusable(error.to_string()).into())
     }
 
     /// Puts the modules of other files (`modules.NAME.from`) in the place of their names, which it gives.

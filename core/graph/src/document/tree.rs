@@ -207,6 +207,14 @@ impl Value {
         }
     }
 
+    /// Whether a table in it has one of these keys.
+    pub(super) fn has_key(&self, keys: &[&str]) -> bool {
+        let table = self.as_table().into_iter().flat_map(Table::iter);
+        table
+            .into_iter()
+            .any(|(key, entry)| keys.contains(&key) || entry.value.has_key(keys))
+    }
+
     /// The text, if it is one.
     pub fn as_text(&self) -> Option<&str> {
         match &self.data {

@@ -205,6 +205,7 @@ pub(super) fn trainer_of(
         .iter()
         .map(|&candidate| fit.regressors[candidate].clone());
     let setup = TrainingSetup {
+        instance: node.instance(),
         regressors: regressors.collect::<Vec<Regressor>>(),
         places: kept.to_vec(),
         error_unit: plan.channels[fit.truth.slot]

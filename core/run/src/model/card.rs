@@ -38,16 +38,17 @@ pub struct Card {
     pub estimators: Vec<EstimatorCard>,
 }
 
-/// A file that was read.
+/// A file that was read, or rows that came from elsewhere.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DataCard {
-    /// Its path as given.
+    /// Its path as given; empty where rows did not come from a file.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub path: String,
     /// Rows in it.
     pub rows: u64,
-    /// Its length in bytes.
+    /// Its length in bytes; of rows alone that of what the checksum is of.
     pub bytes: u64,
-    /// A checksum of its content, by which files are known again (FNV-1a, 64 bits).
+    /// A checksum of its content, by which files are known again, or of the values of the rows (FNV-1a, 64 bits).
     pub hash: String,
 }
 

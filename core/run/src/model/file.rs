@@ -238,6 +238,59 @@ impl Model {
         })
     }
 
+    /// The same model, compiled so that it offers more than it reads itself.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn compiled_for(&self, wanted: Wanted) -> Result<Self, ModelError> {
+        let mut diagnostics = Diagnostics::new();
+        match compile_part(&self.graph, wanted, &mut diagnostics) {
+            Ok(plan) => Ok(Self {
+                plan: Arc::new(plan),
+                ..self.clone()
+            }),
+            Err(_) => Err(ModelError::Graph {
+                diagnostics: Box::new(diagnostics),
+                sources: Box::default(),
+            }),
+        }
+    }
+
+    /// Reads a graph, which is to be fitted, from its text; `name` stands for its path, and what it extends is read from files.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn graph_of_text(
+        name: &str,
+        text: &str,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let mut diagnostics = Diagnostics::new();
+        let read = document::load_text(name, text, &Disk, sources, &mut diagnostics);
+        Self::declared(read, Wanted::default(), diagnostics, sources, doubts)
+    }
+
+    /// The same from a tree as JSON, such as that of a model.
+    ///
+    /// # Errors
+    /// As [`Model::load`]; that the tree has a null stands in the text of [`ModelError::NotAModel`].
+    pub fn graph_of_tree(
+        name: &str,
+        tree: &serde_json::Value,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let source = sources.add(name, String::new());
+        let tree = Value::from_json(tree, Place::new(source, 0, 0));
+        let tree = tree.map_err(|error| ModelError::NotAModel {
+            path: name.into(),
+            source: serde::de::Error::custom(error),
+        })?;
+        let read = Some(Document::new(source, tree));
+        Self::declared(read, Wanted::default(), Diagnostics::new(), sources, doubts)
+    }
+
     fn load_graph(
         path: &Path,
         wanted: Wanted,
@@ -245,8 +298,19 @@ impl Model {
         doubts: &mut Diagnostics,
     ) -> Result<Self, ModelError> {
         let mut diagnostics = Diagnostics::new();
-        let graph = document::load(path, &Disk, sources, &mut diagnostics)
-            .and_then(|read| document::declare(read, &mut diagnostics));
+        let read = document::load(path, &Disk, sources, &mut diagnostics);
+        Self::declared(read, wanted, diagnostics, sources, doubts)
+    }
+
+    /// The graph that was read, compiled; `diagnostics` are those of reading it.
+    fn declared(
+        read: Option<Document>,
+        wanted: Wanted,
+        mut diagnostics: Diagnostics,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let graph = read.and_then(|read| document::declare(read, &mut diagnostics));
         let plan = graph
             .as_ref()
             .and_then(|graph| compile_part(graph, wanted, &mut diagnostics).ok());

@@ -7,6 +7,7 @@
 
 mod closed_loop;
 mod faulty;
+mod individual;
 mod planned;
 mod recording;
 mod registry;
@@ -15,6 +16,7 @@ mod simulation;
 
 pub use closed_loop::ClosedLoop;
 pub use faulty::Faulty;
+pub use individual::{Individual, Spread, SpreadError};
 pub use planned::{Announcements, plans};
 pub use recording::{MachineError, Simulated};
 pub use registry::{KnownMachine, UnknownMachine, machine, machines};
@@ -106,15 +108,18 @@ pub struct Setup {
     pub seed: u64,
     /// Set points over time; `None` is the machine's own schedule.
     pub schedule: Option<Schedule>,
+    /// Which machine of its type it is.
+    pub individual: Individual,
 }
 
 impl Default for Setup {
-    /// Seven days of seed 1 with the machine's own schedule.
+    /// Seven days of seed 1 with the machine's own schedule, as designed.
     fn default() -> Self {
         Self {
             days: 7.0,
             seed: 1,
             schedule: None,
+            individual: Individual::DESIGN,
         }
     }
 }

@@ -430,6 +430,7 @@ mod tests {
             of_truth: false,
         };
         TrainingSetup {
+            instance: "thermal".to_owned(),
             regressors: regressors.iter().map(regressor).collect(),
             places: (0..regressors.len()).collect(),
             error_unit: "nm".to_owned(),

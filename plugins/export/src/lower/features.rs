@@ -83,6 +83,10 @@ impl Lowering<'_> {
             wanted,
         };
         match (node.kind.package, node.kind.name) {
+            ("athermal-control", "cross_check") => refuse(
+                "sensors cannot be compared with each other there",
+                "fit a graph that `extends` this one without the node, and with the sensors themselves where it is read",
+            ),
             _ if fit.is_some() => refuse(
                 format!("a fitted `{}` cannot be exported", node.kind.name),
                 "use slopes, lags or first-order lags as features",

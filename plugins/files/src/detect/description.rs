@@ -42,8 +42,8 @@ impl Description {
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
         let path = path.as_ref();
-        if let Some(kind) = typed::kind_of(path) {
-            return of_typed(path, typed::open(kind, path)?, rows);
+        if let Some(file) = typed::opened(path) {
+            return of_typed(path, file?, rows);
         }
         let mut described = of_lines(Lines::open(path, None)?, Format::of_file(path), rows)?;
         if let Some(encoding) = marked(path) {

@@ -96,7 +96,7 @@ impl Broker {
         })
     }
 
-    /// The MQTT of a NATS server, which keeps sessions in JetStream.
+    /// The MQTT of a NATS server, which keeps sessions in JetStream. It writes what it acknowledges only where that is asked of it.
     pub fn nats(ack_wait: &str) -> Option<Self> {
         if !has("nats-server") {
             return None;
@@ -104,7 +104,7 @@ impl Broker {
         let (folder, port, client) = (Folder::new("nats"), free_port(), free_port());
         let store = folder.0.display().to_string();
         let text = format!(
-            "server_name: one\nlisten: 127.0.0.1:{client}\njetstream {{ store_dir: \"{store}\" }}\n\
+            "server_name: one\nlisten: 127.0.0.1:{client}\njetstream {{ store_dir: \"{store}\", sync_interval: always }}\n\
              mqtt {{ listen: \"127.0.0.1:{port}\", ack_wait: \"{ack_wait}\", max_ack_pending: 10000 }}\n"
         );
         fs::write(folder.0.join("conf"), text).unwrap();

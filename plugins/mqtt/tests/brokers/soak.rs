@@ -1,5 +1,6 @@
-//! A minute of a thousand ticks a second (ten in the long mode), with swaps and outages: nothing is lost that the broker kept, memory
-//! is flat, and a message is an output `wait` and a few milliseconds after it was sent, beside a bare client that sleeps as long.
+//! A minute of a thousand ticks a second (ten in the long mode, or as many as `ATHERMAL_SOAK` says), with swaps and outages: nothing is
+//! lost that the broker kept, memory is flat, and a message is an output `wait` and a few milliseconds after it was sent, beside a bare
+//! client that sleeps as long.
 
 use std::fs;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -162,9 +163,13 @@ fn text(port: u16, max_age: &str) -> String {
 #[test]
 #[ignore = "runs alone, so that its times and its memory are its own: `cargo test -p athermal-mqtt --test brokers soak -- --ignored`"]
 fn a_thousand_ticks_a_second_for_a_minute_with_swaps_and_outages() {
-    let minutes = match std::env::var("ATHERMAL_LONG").is_ok_and(|of| of == "1") {
-        true => 10,
-        false => 1,
+    let minutes = match (
+        std::env::var("ATHERMAL_SOAK"),
+        std::env::var("ATHERMAL_LONG"),
+    ) {
+        (Ok(minutes), _) => minutes.parse().expect("minutes of the soak"),
+        (_, Ok(long)) if long == "1" => 10,
+        _ => 1,
     };
     // What it has is saved each second, and not with each message.
     let Some(mut broker) = Broker::mosquitto("autosave_interval 1\nmax_queued_messages 0\n") else {

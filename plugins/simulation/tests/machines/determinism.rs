@@ -15,7 +15,7 @@ fn start(machine: &dyn Machine, days: f64, seed: u64) -> Box<dyn Simulation> {
     let setup = Setup {
         days,
         seed,
-        schedule: None,
+        ..Setup::default()
     };
     machine.start(&setup).unwrap()
 }
@@ -159,6 +159,7 @@ fn a_schedule_moves_the_chuck_and_the_chuck_the_axes() {
         days: 0.125,
         seed: 1,
         schedule: Some(schedule),
+        ..Setup::default()
     };
     let rows = rows(machine, machine.start(&setup).unwrap());
     let chuck = |minute: usize| rows[minute * 6].values[5];

@@ -16,7 +16,7 @@ fn rows(name: &str, by: &[&str]) -> Vec<Row> {
     let setup = Setup {
         days: 0.25,
         seed: 3,
-        schedule: None,
+        ..Setup::default()
     };
     let mut simulation = machine.start(&setup).unwrap();
     let mut row = Row::empty(machine.channels());

@@ -21,7 +21,7 @@ fn record(machine: &dyn Machine, days: f64, seed: u64) -> Recording {
     let setup = Setup {
         days,
         seed,
-        schedule: None,
+        ..Setup::default()
     };
     let mut simulation = machine.start(&setup).unwrap();
     let mut row = Row::empty(machine.channels());

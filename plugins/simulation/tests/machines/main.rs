@@ -6,3 +6,4 @@ mod conformance;
 mod determinism;
 mod disturbances;
 mod drift;
+mod spread;

@@ -24,6 +24,7 @@ pub fn page(facts: &Facts) -> String {
     worth_section(&mut html, facts);
     html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
     html.push_str(&tables::scores(&facts.scores));
+    outside(&mut html, facts);
     over_time(&mut html, facts);
     votes(&mut html, facts);
     chosen(&mut html, facts);
@@ -113,6 +114,33 @@ fn light_section(html: &mut String, light: &Light, hours: &Hours) {
     if !light.steps.is_empty() {
         html.push_str("<h3>Largest loss per temperature step</h3>");
         html.push_str(&tables::steps(light));
+    }
+}
+
+/// How far predictions went outside of their fits, and which sensors contradicted the others.
+fn outside(html: &mut String, facts: &Facts) {
+    let (novelty, hours) = (&facts.novelty, Hours::of(&facts.course));
+    if novelty.estimators.is_empty() && novelty.contradictions.is_empty() {
+        return;
+    }
+    let _ = write!(
+        html,
+        "<h2>Outside of what was learned</h2><p class=\"muted\">Novelty is how far the regressors of a prediction are outside of those of \
+         the fit; 1 is its edge, where one row of a thousand of the fit lies. Times are in {}.</p>",
+        hours.label
+    );
+    for contradiction in &novelty.contradictions {
+        let sentence = contradiction.sentence(&hours);
+        let _ = write!(html, "<p class=\"bad\">{}</p>", escaped(&sentence));
+    }
+    if novelty.estimators.iter().all(|of| of.worst.is_none()) {
+        html.push_str("<p>No prediction was made from outside.</p>");
+        return;
+    }
+    html.push_str(&tables::excursions(&novelty.estimators, &hours));
+    if !novelty.effects.is_empty() {
+        html.push_str("<h3>What heeding it does to what is put out</h3>");
+        html.push_str(&tables::effects(&novelty.effects));
     }
 }
 
@@ -231,10 +259,11 @@ fn card(html: &mut String, facts: &Facts) {
     }
     html.push_str(".</p><ul>");
     for data in &card.data {
+        let path = Some(&*data.path).filter(|path| !path.is_empty());
         let _ = write!(
             html,
             "<li>{}: {} rows, {} bytes, checksum {}</li>",
-            escaped(&data.path),
+            escaped(path.unwrap_or("rows from elsewhere")),
             data.rows,
             data.bytes,
             escaped(&data.hash)

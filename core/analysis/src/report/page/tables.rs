@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 use athermal_run::model::EstimatorCard;
 use athermal_run::score::Score;
 
-use super::super::{Departure, Hours, Light, SensorFacts, figure, spelled};
+use super::super::{
+    Compared, Departure, Effect, Excursion, Hours, Light, SensorFacts, figure, spelled,
+};
 use crate::figures::count;
 use crate::markup::escaped;
 
@@ -195,6 +197,81 @@ pub(super) fn sensors(sensors: &[SensorFacts]) -> String {
         "unit",
     ];
     table(&header, &rows)
+}
+
+/// Each estimator that went outside of its fit.
+pub(super) fn excursions(all: &[Excursion], hours: &Hours) -> String {
+    let mut rows = String::new();
+    for of in all {
+        let Some(worst) = &of.worst else { continue };
+        let share = of.share.map(|share| 100.0 * share);
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td><td>{} %</td><td class=\"left\">{}</td><td>{:.1} to {:.1}</td><td>{}</td><td class=\"left\">{}</td>{}</tr>",
+            escaped(&of.node),
+            figure(share),
+            of.done(),
+            hours.at(worst.from_s),
+            hours.at(worst.to_s),
+            figure(Some(worst.novelty)),
+            escaped(worst.by.as_deref().unwrap_or("–")),
+            compared(of.errors.as_ref())
+        );
+    }
+    let header = [
+        "estimator",
+        "outside, of the time",
+        "its predictions then",
+        "worst, hours",
+        "largest novelty",
+        "pushed by",
+        "truths then",
+        "RMSE",
+        "had nothing been done",
+        "no model",
+        "unit",
+    ];
+    table(&header, &rows)
+}
+
+/// What heeding novelty did to what is put out.
+pub(super) fn effects(all: &[Effect]) -> String {
+    let mut rows = String::new();
+    for of in all {
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td>{}</tr>",
+            escaped(&of.prediction),
+            compared(Some(&of.errors))
+        );
+    }
+    let header = [
+        "prediction",
+        "truths that it changes",
+        "RMSE",
+        "had nothing been done",
+        "no model",
+        "unit",
+    ];
+    table(&header, &rows)
+}
+
+/// Five cells; a prediction that heeding novelty makes worse is marked.
+fn compared(errors: Option<&Compared>) -> String {
+    let Some(of) = errors else {
+        return "<td>0</td><td>–</td><td>–</td><td>–</td><td></td>".to_owned();
+    };
+    let worse = of.rmse.zip(of.rmse_unheeded);
+    let worse = worse.is_some_and(|(with, without)| with > without);
+    format!(
+        "<td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td>{}</td>",
+        count(of.n),
+        if worse { " class=\"bad\"" } else { "" },
+        figure(of.rmse),
+        figure(of.rmse_unheeded),
+        figure(of.baseline_zero),
+        escaped(spelled(&of.unit))
+    )
 }
 
 /// How the fit of each node that has one went.

@@ -48,7 +48,7 @@ problem! {
         named: bool,
     }
     error: "unreadable file",
-    explanation: "A file named on the command line or by `extends` cannot be read, or is not UTF-8.",
+    explanation: "A file named on the command line, by `extends` or by `prior` cannot be read, is not UTF-8, or is not what is needed there.",
     message: format!("cannot read \"{path}\": {reason}"),
     label: "named here",
     help: match graph_meant(path, beside) {
@@ -66,6 +66,19 @@ problem! {
             Some(format!("in that folder there is {graphs}"))
         }
     },
+}
+
+problem! {
+    /// A JSON file that a node names can be read, and is not what it needs.
+    A002 Unusable {
+        /// The path as it was tried.
+        path: String,
+        /// Why it is not.
+        reason: String,
+    }
+    message: format!("cannot use \"{path}\": {reason}"),
+    label: "named here",
+    help: "a prior is what `athermal fleet fit --pooled` writes",
 }
 
 /// Which of some graph files a path may mean: all of them end alike, and that likens none to it.

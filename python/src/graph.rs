@@ -1,0 +1,139 @@
+//! A graph that is to be fitted, as a Python object.
+
+use std::path::{Path, PathBuf};
+
+use athermal::calls;
+use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::run::model::{Model as Run, ModelError};
+use pyo3::prelude::*;
+
+use crate::failure::{of_model, unfitted};
+use crate::json;
+use crate::model::{Model, columns, tree};
+use crate::work::{Data, work};
+
+/// A graph that was read and compiled, without a fit.
+#[pyclass(frozen, module = "athermal._athermal")]
+pub struct Graph {
+    pub inner: Run,
+}
+
+/// A graph, and what is doubtful in its file.
+fn read(
+    py: Python<'_>,
+    read: impl FnOnce(&mut Sources, &mut Diagnostics) -> Result<Run, ModelError>,
+) -> PyResult<Graph> {
+    let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
+    let inner = read(&mut sources, &mut doubts).map_err(|error| of_model(py, error))?;
+    if !doubts.is_empty() {
+        let text = doubts.render(&sources, false, 100).trim_end().to_owned();
+        let errors = py.import("athermal._errors")?;
+        errors.call_method1("warn", (vec![text], 3))?;
+    }
+    Ok(Graph { inner })
+}
+
+#[pymethods]
+impl Graph {
+    /// Reads a graph file, or the graph of a model.
+    #[staticmethod]
+    fn of_path(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        read(py, |sources, doubts| {
+            Run::load_to_fit(&path, Wanted::default(), sources, doubts)
+        })
+    }
+
+    /// Reads the text of a graph file; `name` stands for its path.
+    #[staticmethod]
+    fn of_text(py: Python<'_>, name: &str, text: &str) -> PyResult<Self> {
+        read(py, |sources, doubts| {
+            Run::graph_of_text(name, text, sources, doubts)
+        })
+    }
+
+    /// Reads a graph from its tree as JSON.
+    #[staticmethod]
+    fn of_json(py: Python<'_>, name: &str, text: &str) -> PyResult<Self> {
+        let tree = json::read(text)?;
+        read(py, |sources, doubts| {
+            Run::graph_of_tree(name, &tree, sources, doubts)
+        })
+    }
+
+    /// The tree as JSON.
+    fn to_json(&self) -> String {
+        tree(&self.inner).to_string()
+    }
+
+    /// Its name, where it has one.
+    #[getter]
+    fn name(&self) -> Option<String> {
+        self.inner.plan.name.clone()
+    }
+
+    /// The columns of its time.
+    #[getter]
+    fn time_columns(&self) -> Vec<String> {
+        columns(&self.inner.plan).0
+    }
+
+    /// All columns that it reads of a table.
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        columns(&self.inner.plan).1
+    }
+
+    /// The measured channels.
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        let sources = self.inner.plan.sources.iter();
+        sources.map(|of| of.name.clone()).collect()
+    }
+
+    /// What it puts out.
+    #[getter]
+    fn outputs(&self) -> Vec<String> {
+        let outputs = self.inner.plan.outputs.iter();
+        outputs.map(|of| of.name.clone()).collect()
+    }
+
+    /// A picture as SVG.
+    fn svg(&self) -> String {
+        calls::picture(&self.inner.plan)
+    }
+
+    /// Fits it on data, with the arguments of `athermal fit`. Gives the model, and how the fit went in words.
+    #[pyo3(signature = (data, arguments, progress = None))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        data: Data,
+        arguments: Vec<String>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Model, String)> {
+        let arguments = [data.arguments.clone(), arguments].concat();
+        let fitted = work(py, &data, progress, || calls::fit(&self.inner, &arguments))?;
+        match fitted.model {
+            Some(inner) => Ok((Model { inner }, fitted.text)),
+            None => Err(unfitted(py, &fitted.failed)),
+        }
+    }
+
+    /// The model of a graph in which nothing needs a fit, or with the fits of the model that its file names.
+    #[staticmethod]
+    fn model_of_path(py: Python<'_>, path: PathBuf) -> PyResult<Model> {
+        let graph = read(py, |sources, doubts| {
+            Run::load_from(Path::new(&path), Wanted::default(), sources, doubts)
+        })?;
+        Ok(Model { inner: graph.inner })
+    }
+}
+
+/// A starter graph for data, with the arguments of `athermal init`: its text, and what was found and guessed.
+#[pyfunction]
+pub fn init(py: Python<'_>, data: Data, arguments: Vec<String>) -> PyResult<(String, Vec<String>)> {
+    let arguments = [data.arguments.clone(), arguments].concat();
+    let starter = work(py, &data, None, || calls::init(&arguments))?;
+    Ok((starter.text, starter.remarks))
+}

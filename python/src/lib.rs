@@ -1,0 +1,42 @@
+//! The native part of the Python package: graphs, models and engines as Python objects. What users see stands in `athermal/*.py`.
+
+mod engine;
+mod failure;
+mod graph;
+mod json;
+mod model;
+mod predictions;
+mod simulated;
+mod stamps;
+mod table;
+mod work;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+
+use engine::Engine;
+use graph::Graph;
+use model::Model;
+use table::Table;
+
+/// Runs the command line with these words, of which the first is the name of the program; gives the exit status.
+#[pyfunction]
+fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| athermal::command_line_of(words))
+}
+
+/// Functions and classes; `athermal` wraps each.
+#[pymodule]
+fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<Table>()?;
+    module.add_class::<Graph>()?;
+    module.add_class::<Model>()?;
+    module.add_class::<Engine>()?;
+    module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(graph::init, module)?)?;
+    module.add_function(wrap_pyfunction!(model::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(simulated::simulate, module)?)?;
+    Ok(())
+}

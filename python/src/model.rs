@@ -1,0 +1,207 @@
+//! A graph with its fits, as a Python object.
+
+use arrow_schema::DataType;
+use athermal::calls::{self, Found};
+use athermal::core::compile::Plan;
+use athermal::core::document::{TimeBase, Value as Tree};
+use athermal::run::model::Model as Run;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::engine::Engine;
+use crate::failure::of_model;
+use crate::graph::Graph;
+use crate::json::to_python;
+use crate::predictions::Predictions;
+use crate::table::Table;
+use crate::work::{Data, work};
+
+/// A model.
+#[pyclass(frozen, module = "athermal._athermal")]
+pub struct Model {
+    pub inner: Run,
+}
+
+/// The columns of the time that a plan reads, and all columns.
+pub fn columns(plan: &Plan) -> (Vec<String>, Vec<String>) {
+    let TimeBase::Column { column, .. } = &plan.time;
+    let times: Vec<String> = column.names().to_vec();
+    let mut all = times.clone();
+    all.extend(plan.sources.iter().map(|of| of.column.clone()));
+    let tables = std::iter::once(&plan.table.base).chain(plan.table.files.iter().map(|of| &of.1));
+    for table in tables {
+        let cells = [&table.segment, &table.name, &table.value];
+        all.extend(cells.into_iter().flatten().cloned());
+    }
+    (times, all)
+}
+
+/// The graph of a model as declared.
+pub fn tree(model: &Run) -> Value {
+    Tree::to_json(&model.graph.tree)
+}
+
+/// A table of facts as Python has it: for people, and for programs.
+fn found<'py>(py: Python<'py>, found: &Found) -> PyResult<(String, Bound<'py, PyAny>)> {
+    Ok((found.text.clone(), to_python(py, &found.facts)?))
+}
+
+#[pymethods]
+impl Model {
+    /// Reads the text of a model; `name` stands for its path.
+    #[staticmethod]
+    fn of_json(py: Python<'_>, name: &str, text: String) -> PyResult<Self> {
+        let inner = py.detach(|| Run::from_text(name, text));
+        let inner = inner.map_err(|error| of_model(py, error))?;
+        Ok(Self { inner })
+    }
+
+    /// The model as `athermal fit` writes it.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        let text = py.detach(|| self.inner.to_text());
+        text.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Its graph.
+    fn graph(&self) -> Graph {
+        let (graph, plan) = (self.inner.graph.clone(), self.inner.plan.clone());
+        Graph {
+            inner: Run {
+                graph,
+                plan,
+                fitted: Default::default(),
+                card: None,
+            },
+        }
+    }
+
+    /// The card: where it comes from and how its fit went; `None` for a plain graph.
+    #[getter]
+    fn card<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &serde_json::json!(self.inner.card))
+    }
+
+    /// Its coefficients.
+    #[getter]
+    fn coefficients<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &serde_json::json!(self.inner.estimators()))
+    }
+
+    /// The revision of its graph and fits.
+    #[getter]
+    fn revision(&self) -> Option<String> {
+        self.inner.revision()
+    }
+
+    /// An engine that runs it, cold.
+    fn engine(&self, py: Python<'_>) -> PyResult<Engine> {
+        let engine = self.inner.engine();
+        engine
+            .map(|engine| Engine::new(py, engine))
+            .map_err(|error| of_model(py, error))
+    }
+
+    /// What it puts out for data, with the arguments of `athermal run`. `time` is the name of the column of the time.
+    #[pyo3(signature = (data, arguments, time, progress = None))]
+    fn predict(
+        &self,
+        py: Python<'_>,
+        data: Data,
+        arguments: Vec<String>,
+        time: String,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Table> {
+        let arguments = [data.arguments.clone(), arguments].concat();
+        let outputs = self.inner.plan.outputs.iter();
+        let outputs = outputs.map(|of| of.name.clone()).collect();
+        let like = self.time_type(&data);
+        let mut sink = Predictions::new(time, like.as_ref(), outputs);
+        let sink = work(py, &data, progress, move || {
+            calls::predict(&self.inner, &arguments, &mut sink)?;
+            Ok(sink)
+        })?;
+        sink.table()
+            .map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Scores, with the arguments of `athermal evaluate`.
+    #[pyo3(signature = (data, arguments, progress = None))]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        data: Data,
+        arguments: Vec<String>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, Bound<'py, PyAny>)> {
+        let arguments = [data.arguments.clone(), arguments].concat();
+        let of = work(py, &data, progress, || {
+            calls::evaluate(&self.inner, &arguments)
+        })?;
+        found(py, &of)
+    }
+
+    /// A diagnosis, with the arguments of `athermal diagnose`.
+    #[pyo3(signature = (data, arguments, progress = None))]
+    fn diagnose<'py>(
+        &self,
+        py: Python<'py>,
+        data: Data,
+        arguments: Vec<String>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, Bound<'py, PyAny>)> {
+        let arguments = [data.arguments.clone(), arguments].concat();
+        let of = work(py, &data, progress, || {
+            calls::diagnose(&self.inner, &arguments)
+        })?;
+        found(py, &of)
+    }
+
+    /// A report, with the arguments of `athermal report`; the last part is the page.
+    #[pyo3(signature = (data, arguments, progress = None))]
+    fn report<'py>(
+        &self,
+        py: Python<'py>,
+        data: Data,
+        arguments: Vec<String>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
+        let arguments = [data.arguments.clone(), arguments].concat();
+        let (of, page) = work(py, &data, progress, || {
+            calls::report(&self.inner, &arguments)
+        })?;
+        let (text, facts) = found(py, &of)?;
+        Ok((text, facts, page))
+    }
+}
+
+impl Model {
+    /// The type of the one column of the time in tables.
+    fn time_type(&self, data: &Data) -> Option<DataType> {
+        let (times, _) = columns(&self.inner.plan);
+        let [time] = &*times else { return None };
+        let (_, table) = data.tables.first()?;
+        let field = table.get().schema.field_with_name(time).ok()?;
+        Some(field.data_type().clone())
+    }
+}
+
+/// Graphs fitted on the same data and scored on others, with the arguments of `athermal compare`.
+#[pyfunction]
+#[pyo3(signature = (graphs, data, arguments, progress = None))]
+pub fn compare<'py>(
+    py: Python<'py>,
+    graphs: Vec<(String, Py<Graph>)>,
+    data: Data,
+    arguments: Vec<String>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, Bound<'py, PyAny>)> {
+    let graphs = graphs.into_iter();
+    let graphs = graphs.map(|(name, graph)| (name, graph.get().inner.clone()));
+    let graphs: Vec<_> = graphs.collect();
+    let arguments = [data.arguments.clone(), arguments].concat();
+    let of = work(py, &data, progress, move || {
+        calls::compare(graphs, &arguments)
+    })?;
+    found(py, &of)
+}

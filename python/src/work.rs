@@ -1,0 +1,125 @@
+//! Work of the library on behalf of Python: without its lock, with its signals, progress and warnings.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use athermal::calls::WITHOUT_ZONE;
+use athermal::files::{OpenTable, with_tables};
+use athermal_command::Failure;
+use athermal_command::collect::{Collected, ProgressListener, collected};
+use pyo3::prelude::*;
+
+use crate::failure::of_failure;
+use crate::table::Table;
+
+/// So often Python is asked whether it was interrupted.
+const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
+
+/// What a warning is raised from: a function of the package, which a user called.
+const USER: i32 = 3;
+
+/// The data of a call: the arguments that name them, and those of which the names stand for tables in memory.
+#[derive(Default, FromPyObject)]
+pub struct Data {
+    /// `--data`, names, and what else says how they are read.
+    pub arguments: Vec<String>,
+    /// Names and tables.
+    pub tables: Vec<(PathBuf, Py<Table>)>,
+}
+
+/// What ended the work from the side of Python.
+#[derive(Clone, Default)]
+struct Stop(Arc<Mutex<Option<PyErr>>>);
+
+impl Stop {
+    fn set(&self, error: PyErr) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(error);
+    }
+
+    fn take(&self) -> Option<PyErr> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    fn is_set(&self) -> bool {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .is_some()
+    }
+
+    /// Asks Python now and then whether to go on.
+    fn check(self) -> Arc<dyn Fn() -> Result<(), String> + Send + Sync> {
+        let asked = Mutex::new(Instant::now());
+        Arc::new(move || {
+            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+            if asked.elapsed() >= BETWEEN_SIGNALS {
+                *asked = Instant::now();
+                if let Err(error) = Python::attach(|py| py.check_signals()) {
+                    self.set(error);
+                }
+            }
+            match self.is_set() {
+                true => Err("stopped".to_owned()),
+                false => Ok(()),
+            }
+        })
+    }
+
+    /// Hands progress to a Python function; what that raises ends the work.
+    fn progress(self, listener: Py<PyAny>) -> ProgressListener {
+        Arc::new(move |what, done, total| {
+            if self.is_set() {
+                return;
+            }
+            let called = Python::attach(|py| listener.call1(py, (what, done, total)).map(drop));
+            if let Err(error) = called {
+                self.set(error);
+            }
+        })
+    }
+}
+
+/// Does some work on data. Its warnings are raised as Python's.
+pub fn work<R: Send>(
+    py: Python<'_>,
+    data: &Data,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce() -> Result<R, Failure> + Send,
+) -> PyResult<R> {
+    let stop = Stop::default();
+    let go_on = stop.clone().check();
+    let open = |(name, table): &(PathBuf, Py<Table>)| {
+        let table = table.get();
+        let (schema, batches) = (Arc::clone(&table.schema), Arc::clone(&table.batches));
+        let open: OpenTable = athermal_arrow::table(schema, batches, Arc::clone(&go_on));
+        (name.clone(), open)
+    };
+    let tables = data.tables.iter().map(open).collect();
+    let progress = progress.map(|listener| stop.clone().progress(listener));
+    let (result, reports) = py.detach(|| collected(progress, || with_tables(tables, work)));
+    if let Some(error) = stop.take() {
+        return Err(error);
+    }
+    warn(py, &reports)?;
+    result.map_err(|failure| of_failure(py, &failure))
+}
+
+/// Raises warnings, and the note that times have no zone.
+fn warn(py: Python<'_>, reports: &[Collected]) -> PyResult<()> {
+    let texts = reports.iter().filter_map(|report| {
+        let text = report.message.to_string();
+        let is_warning = report.level == "warning" || text.contains(WITHOUT_ZONE);
+        is_warning.then_some(text)
+    });
+    let texts: Vec<String> = texts.collect();
+    if texts.is_empty() {
+        return Ok(());
+    }
+    let errors = py.import("athermal._errors")?;
+    errors.call_method1("warn", (texts, USER))?;
+    Ok(())
+}
