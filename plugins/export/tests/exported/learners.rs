@@ -82,7 +82,7 @@ fn recursive_least_squares_as_they_were_fitted_give_the_bits_of_the_engine() {
 
 #[test]
 fn estimators_that_are_no_linear_form_are_refused_by_name() {
-    for kind in ["kalman", "state_space", "polynomial"] {
+    for kind in ["kalman", "state_space"] {
         let engine = fitted(&format!("type = \"{kind}\""));
         let error = lower(&engine, &options()).unwrap_err();
         let ExportError::Nodes(refusals) = &error else {
