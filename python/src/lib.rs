@@ -1,10 +1,12 @@
 //! The native part of the Python package: graphs, models and engines as Python objects. What users see stands in `athermal/*.py`.
 
+mod conformance;
 mod engine;
 mod failure;
 mod graph;
 mod json;
 mod model;
+mod nodes;
 mod predictions;
 mod simulated;
 mod stamps;
@@ -35,6 +37,7 @@ fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()?;
     module.add_class::<Engine>()?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(conformance::broken_rules, module)?)?;
     module.add_function(wrap_pyfunction!(graph::init, module)?)?;
     module.add_function(wrap_pyfunction!(model::compare, module)?)?;
     module.add_function(wrap_pyfunction!(simulated::simulate, module)?)?;
