@@ -18,29 +18,19 @@ fn main() {
     let shipped = model();
     let mut by_hand = Shipped::new(&shipped);
     let mut step = |tick: &Tick| by_hand.step(tick);
-    live(
-        "selected slopes",
-        &passing(&shipped),
-        ticks(9.0, 2),
-        &mut step,
-    );
+    live("selected slopes", &shipped, ticks(9.0, 2), &mut step);
     novelty(&shipped, ticks(9.0, 2));
     let all = dense::model();
     let mut by_hand = Dense::new(&all);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of_all = dense::ticks(9.0, 2);
-    live(
-        "all of 64 slopes",
-        &passing(&all),
-        of_all.clone(),
-        &mut step,
-    );
+    live("all of 64 slopes", &all, of_all.clone(), &mut step);
     novelty(&all, of_all.clone());
     let learning = dense::learning();
     let mut by_hand = Learning::new(&learning);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of = "all of 64 slopes that go on learning";
-    live(of, &passing(&learning), of_all.clone(), &mut step);
+    live(of, &learning, of_all.clone(), &mut step);
     novelty(&learning, of_all);
     program();
 }
@@ -54,7 +44,9 @@ type ByHand<'a> = &'a mut dyn FnMut(&Tick) -> [f64; 6];
 fn live(of: &str, model: &Model, mut warm: Vec<Tick>, by_hand: ByHand<'_>) {
     println!("models of {of}:");
     let measured = warm.split_off(17_280);
-    let mut engine = model.engine().expect("the fit belongs to the graph");
+    let mut engine = passing(model)
+        .engine()
+        .expect("the fit belongs to the graph");
     for tick in &warm {
         engine.step(tick.0, &tick.1).expect("ticks are in order");
         by_hand(tick);
