@@ -13,6 +13,7 @@ these, of which each is a segment of its own. Further named arguments are the op
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 from collections.abc import Mapping
@@ -451,3 +452,10 @@ def simulate(machine: str, days: float = 7.0, seed: int = 1, *, progress: Progre
     faults = options.pop("faults", None)
     words = [machine, *_frames.words({"days": days, "seed": seed, "fault": faults, **options})]
     return Frame(_athermal.simulate(_frames.Call(words, progress)))
+
+
+def __getattr__(name: str) -> Any:
+    # What builds on another library is imported once it is asked for.
+    if name in ("conformance", "dask", "sklearn", "spark"):
+        return importlib.import_module(f"athermal.{name}")
+    raise AttributeError(f"module 'athermal' has no attribute {name!r}")

@@ -3,6 +3,7 @@
 mod conformance;
 mod engine;
 mod failure;
+mod fleet;
 mod graph;
 mod json;
 mod model;
@@ -15,6 +16,7 @@ mod work;
 
 use std::ffi::OsString;
 
+use athermal_fleet::pool::started_by;
 use pyo3::prelude::*;
 
 use engine::Engine;
@@ -22,9 +24,11 @@ use graph::Graph;
 use model::Model;
 use table::Table;
 
-/// Runs the command line with these words, of which the first is the name of the program; gives the exit status.
+/// Runs the command line with these words, of which the first is the name of the program; gives the exit status. `itself` is how the
+/// program is started.
 #[pyfunction]
-fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+fn main(py: Python<'_>, words: Vec<OsString>, itself: Vec<OsString>) -> u8 {
+    started_by(itself);
     py.detach(|| athermal::command_line_of(words))
 }
 
@@ -38,6 +42,8 @@ fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Engine>()?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
     module.add_function(wrap_pyfunction!(conformance::broken_rules, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::check_columns, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::fit_machine, module)?)?;
     module.add_function(wrap_pyfunction!(graph::init, module)?)?;
     module.add_function(wrap_pyfunction!(model::compare, module)?)?;
     module.add_function(wrap_pyfunction!(simulated::simulate, module)?)?;
