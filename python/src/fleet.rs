@@ -7,7 +7,7 @@ use athermal_fleet::{batches, fitted};
 use pyo3::prelude::*;
 use serde_json::json;
 
-use crate::failure::request;
+use crate::failure::{guarded, request};
 use crate::graph::Graph;
 use crate::json::to_python;
 
@@ -24,12 +24,14 @@ pub fn fit_machine<'py>(
     let reader = RecordBatchStreamReader::from_pyarrow_bound(rows)?;
     let graph = &graph.get().inner;
     // Whoever makes the stream needs Python for it.
-    let fit = py.detach(move || {
-        let once = batches::once(graph, name, reader.schema(), reader, memory);
-        let fit = once.and_then(|rows| fitted(graph, &rows, memory, created));
-        fit.map_err(|error| error.to_string())
+    let fit = guarded(py, || {
+        py.detach(move || {
+            let once = batches::once(graph, name, reader.schema(), reader, memory);
+            let fit = once.and_then(|rows| fitted(graph, &rows, memory, created));
+            fit.map_err(|error| error.to_string())
+        })
     });
-    let fit = fit.map_err(|text| request(py, &text))?;
+    let fit = fit?.map_err(|text| request(py, &text))?;
     to_python(py, &json!(fit))
 }
 

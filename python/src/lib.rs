@@ -1,11 +1,13 @@
 //! The native part of the Python package: graphs, models and engines as Python objects. What users see stands in `athermal/*.py`.
 
+mod conformance;
 mod engine;
 mod failure;
 mod fleet;
 mod graph;
 mod json;
 mod model;
+mod nodes;
 mod predictions;
 mod simulated;
 mod stamps;
@@ -39,6 +41,7 @@ fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()?;
     module.add_class::<Engine>()?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(conformance::broken_rules, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::check_columns, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fit_machine, module)?)?;
     module.add_function(wrap_pyfunction!(graph::init, module)?)?;
