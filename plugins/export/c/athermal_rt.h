@@ -138,14 +138,15 @@ typedef struct {
 #define AT_FALLBACK 4
 #define AT_GUARD 5
 #define AT_STATE_GATE 6
+#define AT_HEDGE 7
 
 #define AT_BY_TIME 0
 #define AT_BY_COUNT 1
+#define AT_FADING 2
 
 #define AT_INVERSE_POWER 0
 #define AT_AS_PRINTED 1
 #define AT_AS_PRINTED_RAW 2
-#define AT_INVERSE_FOURTH_POWER 3
 
 typedef struct {
     int32_t rule;
@@ -161,12 +162,17 @@ typedef struct {
     int64_t ahead;
     int64_t limit;
     int64_t embargo;
-    int32_t runs;    /* room for so many runs and truths that wait, and for the errors of each voter */
+    int32_t runs;    /* room for so many runs and truths that wait, and for so many errors in so many rings */
     int32_t waiting;
     int32_t errors;
+    int32_t rings;
     int32_t memory;
-    int64_t longest; /* how long errors count, or how many */
+    int64_t longest; /* how long errors count */
+    at_real half_life; /* of errors that fade, in seconds; 0 where they do not */
     int32_t form;
+    at_real power;    /* of the mean square of the errors */
+    at_real rate;     /* of a hedge, and whether it is found on the way */
+    int32_t adaptive;
     at_real shrinkage;
     at_real floor;
     at_real share;

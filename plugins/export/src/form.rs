@@ -80,6 +80,15 @@ impl Layout {
 pub const GUARD: i64 = 5;
 /// See [`GUARD`].
 pub const STATE_GATE: i64 = 6;
+/// See [`GUARD`].
+pub const HEDGE: i64 = 7;
+
+/// How long errors count, by its number in the runtime: for a time.
+pub const BY_TIME: i64 = 0;
+/// So many of them.
+pub const BY_COUNT: i64 = 1;
+/// Ever less.
+pub const FADING: i64 = 2;
 
 impl Form {
     /// How many votes a vote has, and of how many it keeps errors: a guard compares each with predicting zero.

@@ -171,8 +171,8 @@ pub fn operations(form: &Form) -> usize {
             });
             2 * width + novelty.map_or(0, |directions| width * (4 + 2 * directions))
         }
-        // The memory of every voter is summed anew.
-        "vote" => 2 * form.voters(node).1 * node.place_of("errors") + 40,
+        // The memory of every voter is summed anew, and each weight is a power or an exponential.
+        "vote" => form.voters(node).1 * (2 * node.place_of("errors") + 80) + 40,
         _ => 40,
     };
     form.nodes.iter().map(of_node).sum()

@@ -23,11 +23,12 @@ const KINDS: [(&str, &str, &str); 12] = [
 /// The step that looks whether anything of a gather is new.
 const GATHER: usize = KINDS.len();
 
-/// Fields whose names are keywords or functions in Structured Text.
-const RENAMED: [(&str, &str); 3] = [
+/// Fields whose names are keywords or functions in Structured Text, or those of places.
+const RENAMED: [(&str, &str); 4] = [
     ("constant", "intercept"),
     ("limit", "tolerance"),
     ("floor", "least_weight"),
+    ("rings", "ring_count"),
 ];
 
 /// Sums of rows, of which a slope needs three in each of four places, beside what the runtime in C has in its state.
@@ -168,11 +169,12 @@ fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
                 ("arrived", next(&mut place, of("runs"))),
                 ("run_of", next(&mut place, of("waiting"))),
                 ("rings", next(&mut place, of("waiting"))),
-                ("error_times", next(&mut place, 2 * judged)),
+                ("error_times", next(&mut place, 2 * of("rings"))),
                 ("truths", next(&mut number, of("runs") * count)),
                 ("squares", next(&mut number, of("waiting"))),
                 ("sums", next(&mut number, judged * of("errors"))),
                 ("means", next(&mut number, judged)),
+                ("counts", next(&mut number, judged)),
                 ("trust", next(&mut number, judged)),
             ]
         }

@@ -6,6 +6,7 @@
 mod command;
 mod fmu;
 mod learners;
+mod math;
 mod onnx;
 mod processors;
 mod random;
