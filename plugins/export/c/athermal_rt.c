@@ -1,6 +1,15 @@
 /* The runtime of exported graphs; see athermal_rt.h. */
 #include "athermal_rt.h"
 
+/* For a program with one graph: the file of its header, which says what the graph uses. The rest is then left out. */
+#ifdef ATHERMAL_PLAN
+#include ATHERMAL_PLAN
+#endif
+#ifndef AT_USES
+#define AT_USES 0xffffffffu
+#endif
+#define AT_IS_USED(part) (((AT_USES >> (part)) & 1u) != 0u)
+
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -1678,8 +1687,12 @@ static void at_refresh(const at_vote *v, const at_ballot *b, int32_t voter, int6
 /* What is left after a time of an error that fades. */
 static at_real at_left(const at_vote *v, int64_t after)
 {
-    const at_real left = (at_real)at_exp2((double)(-at_seconds(after) / v->half_life));
-    return (left < AT_R(1.0)) ? left : AT_R(1.0);
+    at_real left = AT_R(1.0);
+    if (AT_IS_USED(AT_FADES)) {
+        const at_real power = (at_real)at_exp2((double)(-at_seconds(after) / v->half_life));
+        left = (power < left) ? power : left;
+    }
+    return left;
 }
 
 /* Lets the first so many errors of all voters go. */
@@ -1950,7 +1963,7 @@ static void at_hand_over(const at_vote *v, const at_ballot *b, at_memory m, int6
             m.i[AT_FLAGS] |= (int64_t)AT_FULL;
         } else if (at_keeps_errors(v) != 0) {
             at_observe_errors(v, b, m, row, b->truths[place], b->arrived[place]);
-        } else if (v->rule == AT_HEDGE) {
+        } else if (AT_IS_USED(AT_HEDGES) && (v->rule == AT_HEDGE)) {
             at_hedge_observe(v, b, row, b->truths[place], b->arrived[place]);
         } else {
             /* It goes by no truths. */
@@ -2123,7 +2136,10 @@ static at_real at_weight_of(const at_vote *v, at_real mean, at_real best, at_rea
     if (v->form == AT_INVERSE_POWER) {
         const at_real ratio = best / ((mean > AT_SMALLEST) ? mean : AT_SMALLEST);
         /* Of the mean square, so half of the power. */
-        weight = (v->power == AT_R(1.0)) ? ratio : (at_real)at_pow((double)ratio, (double)v->power);
+        weight = ratio;
+        if (AT_IS_USED(AT_ANY_POWER) && (v->power != AT_R(1.0))) {
+            weight = (at_real)at_pow((double)ratio, (double)v->power);
+        }
     } else if (roots > AT_R(0.0)) {
         weight = mean / (roots * roots);
     } else {
@@ -2403,7 +2419,7 @@ static at_real at_combine(const at_vote *v, const at_ballot *b, at_memory m, at_
         value = at_middle(v, b);
     } else if (v->rule == AT_GUARD) {
         value = at_guard(v, b, at_minus(m.i[AT_LAST], v->embargo), reason);
-    } else if (v->rule == AT_HEDGE) {
+    } else if (AT_IS_USED(AT_HEDGES) && (v->rule == AT_HEDGE)) {
         value = at_hedge(v, b);
     } else if (v->rule == AT_STATE_GATE) {
         value = at_state_gate(v, b, m, reason);
@@ -2980,6 +2996,209 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
     }
 }
 
+/* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at and since
+ * when it contradicts the others, each behind whether it is known; whether it is out, whether its last value passed; whether it agrees
+ * again, and since when. Within a step: the values, what of the form is left without the columns that are not there, the standardised
+ * columns, and what pulls at each. */
+
+#define AT_HAS_LOOKED 0
+#define AT_LOOKED 1
+#define AT_CONTRADICTS 2
+#define AT_CONTRADICTS_SINCE 3
+#define AT_IS_OUT 4
+#define AT_PASSES 5
+#define AT_AGREES 6
+#define AT_AGREES_SINCE 7
+#define AT_OF_SENSOR 8
+
+/* Whether something has lasted for so long; it begins now where it had not. */
+static int at_lasts(int64_t since[], int64_t now, int64_t length)
+{
+    if (since[0] == 0) {
+        since[0] = 1;
+        since[1] = now;
+    }
+    return (at_minus(now, since[1]) >= length) ? 1 : 0;
+}
+
+/* Takes a column out of a symmetric form: it is then whatever makes the form smallest. */
+static void at_free(at_real matrix[], int32_t columns, int32_t column)
+{
+    const at_real *own = &matrix[column * columns];
+    int32_t row;
+    int32_t nth;
+    if (own[column] > AT_R(0.0)) {
+        for (row = 0; row < columns; row++) {
+            at_real *other = &matrix[row * columns];
+            if (row != column) {
+                const at_real along = other[column] / own[column];
+                for (nth = 0; nth < columns; nth++) {
+                    other[nth] = other[nth] - (along * own[nth]);
+                }
+            }
+        }
+        for (row = 0; row < columns; row++) {
+            matrix[(row * columns) + column] = AT_R(0.0);
+            matrix[(column * columns) + row] = AT_R(0.0);
+        }
+    }
+}
+
+/* How far values are apart without the channels that are out, but with this one. */
+static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, int32_t with)
+{
+    const int32_t n = c->columns;
+    const at_real *values = &m.r[p->scratch];
+    at_real *matrix = &m.r[p->scratch + (2 * c->channels)];
+    at_real *z = &matrix[n * n];
+    at_real *pull = &z[n];
+    const at_real *lower = c->matrix;
+    at_real total = AT_R(-0.0);
+    int32_t row;
+    int32_t nth;
+    for (row = 0; row < n; row++) {
+        for (nth = 0; nth <= row; nth++) {
+            matrix[(row * n) + nth] = lower[nth];
+            matrix[(nth * n) + row] = lower[nth];
+        }
+        lower = &lower[row + 1];
+    }
+    for (nth = 0; nth < n; nth++) {
+        const int32_t place = c->places[nth];
+        const int32_t channel = place % c->channels;
+        z[nth] = (values[place] - c->mean[nth]) / c->scale[nth];
+        if ((at_is_absent(z[nth]) != 0)
+            || ((channel != with) && (m.i[c->ints + (AT_OF_SENSOR * channel) + AT_IS_OUT] != 0))) {
+            z[nth] = AT_R(0.0);
+            at_free(matrix, n, nth);
+        }
+    }
+    for (row = 0; row < n; row++) {
+        pull[row] = AT_R(-0.0);
+        for (nth = 0; nth < n; nth++) {
+            pull[row] = pull[row] + (matrix[(row * n) + nth] * z[nth]);
+        }
+    }
+    for (nth = 0; nth < n; nth++) {
+        total = total + (pull[nth] * z[nth]);
+    }
+    return ((total > AT_R(0.0)) ? total : AT_R(0.0)) / c->usual;
+}
+
+static at_real at_part(at_real pull, at_real own)
+{
+    return (own > AT_R(0.0)) ? ((pull * pull) / own) : AT_R(0.0);
+}
+
+/* How much of that one channel has in it. */
+static at_real at_share(const at_plan *p, const at_cross_check *c, at_memory m, int32_t channel)
+{
+    const int32_t n = c->columns;
+    const int32_t first = c->own[2 * channel];
+    const int32_t second = c->own[(2 * channel) + 1];
+    const at_real *matrix = &m.r[p->scratch + (2 * c->channels)];
+    const at_real *pull = &matrix[(n * n) + n];
+    at_real share = AT_R(0.0);
+    if (first >= 0) {
+        const at_real *own = &matrix[first * n];
+        share = at_part(pull[first], own[first]);
+        if (second >= 0) {
+            const at_real along = (own[first] > AT_R(0.0)) ? (own[second] / own[first]) : AT_R(0.0);
+            share = share
+                + at_part(pull[second] - (along * pull[first]), matrix[(second * n) + second] - (along * own[second]));
+        }
+        share = share / c->usual;
+    }
+    return share;
+}
+
+/* Finds which sensors contradict the others. */
+static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    at_real apart = at_apart(p, c, m, -1);
+    at_real most = at_share(p, c, m, 0);
+    int32_t suspect = 0;
+    int32_t nth;
+    for (nth = 1; nth < c->channels; nth++) {
+        const at_real share = at_share(p, c, m, nth);
+        if (share > most) {
+            most = share;
+            suspect = nth;
+        }
+    }
+    if (!((apart > c->limit) && ((apart - most) <= c->limit))) {
+        suspect = -1;
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        if (suspect != nth) {
+            sensor[AT_CONTRADICTS] = 0;
+        } else if (at_lasts(&sensor[AT_CONTRADICTS], now, c->after) != 0) {
+            sensor[AT_IS_OUT] = 1;
+            sensor[AT_CONTRADICTS] = 0;
+        } else {
+            /* Not for long enough. */
+        }
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        if ((sensor[AT_IS_OUT] != 0) && (at_is_absent(m.r[p->scratch + nth]) == 0)) {
+            apart = at_apart(p, c, m, nth);
+            if (apart > c->limit) {
+                sensor[AT_AGREES] = 0;
+            } else if (at_lasts(&sensor[AT_AGREES], now, c->recover) != 0) {
+                sensor[AT_IS_OUT] = 0;
+                sensor[AT_AGREES] = 0;
+            } else {
+                /* Not for long enough. */
+            }
+        }
+    }
+}
+
+static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    int64_t stamp;
+    int32_t nth;
+    for (nth = 0; nth < (2 * c->channels); nth++) {
+        m.r[p->scratch + nth] = at_port(p, m, c->signal, nth, &stamp);
+    }
+    if (c->columns > 0) {
+        at_compare(p, c, m);
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        const at_real value = at_port(p, m, c->signal, nth, &stamp);
+        const int there = (at_is_absent(value) == 0) ? 1 : 0;
+        const int is_new =
+            ((there != 0) && ((sensor[AT_HAS_LOOKED] == 0) || (sensor[AT_LOOKED] < stamp))) ? 1 : 0;
+        const int passes = ((there != 0) && (sensor[AT_IS_OUT] == 0)) ? 1 : 0;
+        at_real reason = AT_R(0.0);
+        if (is_new != 0) {
+            sensor[AT_HAS_LOOKED] = 1;
+            sensor[AT_LOOKED] = stamp;
+        }
+        if ((passes != 0) && (is_new != 0)) {
+            at_give(p, m, c->slot + nth, value, stamp);
+        } else if ((passes == 0) && (sensor[AT_PASSES] != 0)) {
+            at_give(p, m, c->slot + nth, AT_NAN, now);
+        } else {
+            /* As it was. */
+        }
+        sensor[AT_PASSES] = (int64_t)passes;
+        if (c->columns == 0) {
+            reason = AT_R(3.0);
+        } else if (sensor[AT_IS_OUT] != 0) {
+            reason = (sensor[AT_AGREES] != 0) ? AT_R(2.0) : AT_R(1.0);
+        } else {
+            /* It agrees. */
+        }
+        at_give(p, m, c->slot + c->channels + nth, reason, now);
+    }
+}
+
 /* ---- The plan. */
 
 static void at_run(const at_plan *p, at_memory m, const at_step *step)
@@ -2989,40 +3208,69 @@ static void at_run(const at_plan *p, at_memory m, const at_step *step)
         at_look(p, m, step->nth);
         break;
     case AT_SLOPE:
-        at_run_slope(p, &p->slope[step->nth], m);
+        if (AT_IS_USED(AT_SLOPE)) {
+            at_run_slope(p, &p->slope[step->nth], m);
+        }
         break;
     case AT_LAG:
-        at_run_lag(p, &p->lag[step->nth], m);
+        if (AT_IS_USED(AT_LAG)) {
+            at_run_lag(p, &p->lag[step->nth], m);
+        }
         break;
     case AT_FIRST_ORDER:
-        at_run_first_order(p, &p->first_order[step->nth], m);
+        if (AT_IS_USED(AT_FIRST_ORDER)) {
+            at_run_first_order(p, &p->first_order[step->nth], m);
+        }
         break;
     case AT_LINEAR:
-        at_run_linear(p, &p->linear[step->nth], m);
+        if (AT_IS_USED(AT_LINEAR)) {
+            at_run_linear(p, &p->linear[step->nth], m);
+        }
         break;
     case AT_VOTE:
-        at_run_vote(p, &p->vote[step->nth], m);
+        if (AT_IS_USED(AT_VOTE)) {
+            at_run_vote(p, &p->vote[step->nth], m);
+        }
         break;
     case AT_COMPENSATE:
-        at_run_compensate(p, &p->compensate[step->nth], m);
+        if (AT_IS_USED(AT_COMPENSATE)) {
+            at_run_compensate(p, &p->compensate[step->nth], m);
+        }
         break;
     case AT_STABILITY:
-        at_run_stability(p, &p->stability[step->nth], m);
+        if (AT_IS_USED(AT_STABILITY)) {
+            at_run_stability(p, &p->stability[step->nth], m);
+        }
         break;
     case AT_SAFE_STATE:
-        at_run_safe_state(p, &p->safe_state[step->nth], m);
+        if (AT_IS_USED(AT_SAFE_STATE)) {
+            at_run_safe_state(p, &p->safe_state[step->nth], m);
+        }
         break;
     case AT_UNCORRECTED:
-        at_run_uncorrected(p, &p->uncorrected[step->nth], m);
+        if (AT_IS_USED(AT_UNCORRECTED)) {
+            at_run_uncorrected(p, &p->uncorrected[step->nth], m);
+        }
         break;
     case AT_LOSS:
-        at_run_loss(p, &p->loss[step->nth], m);
+        if (AT_IS_USED(AT_LOSS)) {
+            at_run_loss(p, &p->loss[step->nth], m);
+        }
         break;
     case AT_SETTLED:
-        at_run_settled(p, &p->settled[step->nth], m);
+        if (AT_IS_USED(AT_SETTLED)) {
+            at_run_settled(p, &p->settled[step->nth], m);
+        }
+        break;
+    case AT_CROSS_CHECK:
+        if (AT_IS_USED(AT_CROSS_CHECK)) {
+            at_run_cross_check(p, &p->cross_check[step->nth], m);
+        }
         break;
     default:
-        at_run_pick(p, &p->pick[step->nth], m);
+        if (AT_IS_USED(AT_PICK)) {
+            at_run_pick(p, &p->pick[step->nth], m);
+        }
         break;
     }
 }
@@ -3062,6 +3310,11 @@ static void at_begin(const at_plan *p, at_memory m, const at_step *step, int seg
     case AT_SETTLED:
         for (nth = 0; nth <= AT_NEWEST_LOSS; nth++) {
             m.i[p->settled[step->nth].ints + nth] = 0;
+        }
+        break;
+    case AT_CROSS_CHECK:
+        for (nth = 0; nth < (AT_OF_SENSOR * p->cross_check[step->nth].channels); nth++) {
+            m.i[p->cross_check[step->nth].ints + nth] = 0;
         }
         break;
     default:

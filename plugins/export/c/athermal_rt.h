@@ -267,6 +267,24 @@ typedef struct {
     int32_t channels;
 } at_pick;
 
+/* How sensors go together. */
+typedef struct {
+    int32_t signal; /* all channels now, then all of them a lag ago */
+    int32_t slot;
+    int32_t channels;
+    int32_t columns;        /* of the fit; 0 where nothing was learned */
+    const int32_t *places;  /* of each column among these values */
+    const int32_t *own;     /* of each channel its two columns; -1 where there is none */
+    const at_real *mean;
+    const at_real *scale;
+    const at_real *matrix;  /* a lower triangle row by row */
+    at_real usual;
+    at_real limit;
+    int64_t after;
+    int64_t recover;
+    int32_t ints;
+} at_cross_check;
+
 #define AT_SLOPE 0
 #define AT_LAG 1
 #define AT_FIRST_ORDER 2
@@ -279,7 +297,12 @@ typedef struct {
 #define AT_LOSS 9
 #define AT_SETTLED 10
 #define AT_PICK 11
-#define AT_GATHER 12 /* as a step: reads whether anything in a gather is new */
+#define AT_CROSS_CHECK 12
+/* Parts of votes, beside these kinds, that a graph may do without. */
+#define AT_HEDGES 13
+#define AT_ANY_POWER 14
+#define AT_FADES 15
+#define AT_GATHER 16 /* as a step: reads whether anything in a gather is new */
 
 /* What is done at a tick, in order: a kind and the number of its parameters in the table of that kind. */
 typedef struct {
@@ -322,6 +345,7 @@ typedef struct {
     const at_loss *loss;
     const at_settled *settled;
     const at_pick *pick;
+    const at_cross_check *cross_check;
 } at_plan;
 
 /* The state of a plan. */

@@ -247,6 +247,15 @@ impl Record {
         usize::try_from(self.int_of(name)).unwrap_or(0)
     }
 
+    /// A number; 0 where the kind has none of the name.
+    #[must_use]
+    pub fn real_of(&self, name: &str) -> f64 {
+        match self.field(name) {
+            Some(Field::Real(value)) => *value,
+            _ => 0.0,
+        }
+    }
+
     /// Whole numbers; none where the kind has none of the name.
     #[must_use]
     pub fn longs_of(&self, name: &str) -> &[i64] {

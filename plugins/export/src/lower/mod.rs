@@ -241,7 +241,7 @@ impl<'a> Lowering<'a> {
         options: &Options,
     ) -> Result<Record, Refused> {
         match &node.role {
-            PlannedRole::Feature { .. } => self.feature(node),
+            PlannedRole::Feature { .. } => self.feature(engine, node),
             PlannedRole::Estimator { .. } => self.estimator(engine, node, options),
             PlannedRole::Combiner { .. } => self.combiner(node),
         }
@@ -258,6 +258,22 @@ fn samples(time: Duration, period: i64, spare: usize) -> usize {
 /// A refusal of one kind.
 fn refuse<T>(why: impl Into<String>, way: impl Into<String>) -> Result<T, Refused> {
     Err((why.into(), way.into()))
+}
+
+/// Refuses a node that has no fit.
+fn unfitted<T>() -> Result<T, Refused> {
+    refuse(
+        "it has not been fitted",
+        "fit the graph first: `athermal fit`",
+    )
+}
+
+/// Refuses a fit of another graph.
+fn unknown<T>(name: &str) -> Result<T, Refused> {
+    refuse(
+        format!("its fit uses `{name}`, which the graph does not have"),
+        "fit it again",
+    )
 }
 
 /// Refuses an output port that somebody reads.

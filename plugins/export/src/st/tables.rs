@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::form::{Entry, Field, Form, Record, Step};
 
 /// Kinds with their types and tables, in the order of the numbers by which steps name them.
-const KINDS: [(&str, &str, &str); 12] = [
+const KINDS: [(&str, &str, &str); 13] = [
     ("slope", "AT_Slope", "AT_SLOPES"),
     ("lag", "AT_Lag", "AT_LAGS"),
     ("first_order", "AT_FirstOrder", "AT_FIRST_ORDERS"),
@@ -18,6 +18,7 @@ const KINDS: [(&str, &str, &str); 12] = [
     ("loss", "AT_Loss", "AT_LOSSES"),
     ("settled", "AT_Settled", "AT_SETTLES"),
     ("pick", "AT_Pick", "AT_PICKS"),
+    ("cross_check", "AT_CrossCheck", "AT_CROSS_CHECKS"),
 ];
 
 /// The step that looks whether anything of a gather is new.
@@ -111,10 +112,12 @@ impl Lists {
     fn structure(&mut self, form: &Form, record: &Record) -> String {
         let mut fields = Vec::new();
         for (name, field) in &record.fields {
+            let renamed = RENAMED.iter().find(|(own, _)| own == name);
+            let name = renamed.map_or(*name, |(_, name)| name);
             let first = match field {
                 Field::Int(value) => *value,
                 Field::Real(value) => {
-                    fields.push((*name, real(*value)));
+                    fields.push((name, real(*value)));
                     continue;
                 }
                 Field::Inline(values) | Field::Ints(values) => put(&mut self.indices, values),
@@ -132,14 +135,13 @@ impl Lists {
                     put(&mut self.limits, &inner)
                 }
             };
-            fields.push((*name, long(first)));
+            fields.push((name, long(first)));
         }
         let places = places(form, record).into_iter();
         fields.extend(places.map(|(name, place)| (name, place.to_string())));
-        let written = fields.iter().map(|(name, value)| {
-            let renamed = RENAMED.iter().find(|(own, _)| own == name);
-            format!("{} := {value}", renamed.map_or(*name, |(_, name)| name))
-        });
+        let written = fields
+            .iter()
+            .map(|(name, value)| format!("{name} := {value}"));
         format!("({})", written.collect::<Vec<_>>().join(", "))
     }
 }
@@ -176,6 +178,15 @@ fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
                 ("means", next(&mut number, judged)),
                 ("counts", next(&mut number, judged)),
                 ("trust", next(&mut number, judged)),
+            ]
+        }
+        "cross_check" => {
+            let mut within = 2 * of("channels");
+            let columns = of("columns");
+            vec![
+                ("form", within),
+                ("z", next(&mut within, columns * columns)),
+                ("pull", next(&mut within, columns)),
             ]
         }
         "safe_state" => {

@@ -108,6 +108,21 @@ struct Settled {
     newest: Option<i64>,
 }
 
+#[derive(Serialize, Deserialize)]
+struct CrossCheck {
+    state: String,
+    sensors: Vec<Sensor>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Sensor {
+    last: Option<i64>,
+    since: Option<i64>,
+    is_out: bool,
+    passes: bool,
+    agrees_since: Option<i64>,
+}
+
 pub(super) fn read<T: DeserializeOwned>(node: &Record, own: &[u8]) -> Result<T, CarryError> {
     rmp_serde::from_slice(own).map_err(|error| CarryError::of(&node.node, error))
 }
@@ -310,6 +325,17 @@ pub(super) fn put(
             image.put_time(ints + 6, state.newest);
             image.reals[reals] = state.stood.unwrap_or(0.0);
         }
+        "cross_check" => {
+            let state: CrossCheck = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter().enumerate() {
+                let place = ints + 8 * nth;
+                image.put_time(place, sensor.last);
+                image.put_time(place + 2, sensor.since);
+                image.ints[place + 4] = i64::from(sensor.is_out);
+                image.ints[place + 5] = i64::from(sensor.passes);
+                image.put_time(place + 6, sensor.agrees_since);
+            }
+        }
         _ => {}
     }
     Ok(())
@@ -405,6 +431,18 @@ pub(super) fn take(
             state.waiting = image.ints[ints + 3] != 0;
             state.low_since = image.time(ints + 4);
             state.newest = image.time(ints + 6);
+            written(node, &state)?
+        }
+        "cross_check" => {
+            let mut state: CrossCheck = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter_mut().enumerate() {
+                let place = ints + 8 * nth;
+                sensor.last = image.time(place);
+                sensor.since = image.time(place + 2);
+                sensor.is_out = image.ints[place + 4] != 0;
+                sensor.passes = image.ints[place + 5] != 0;
+                sensor.agrees_since = image.time(place + 6);
+            }
             written(node, &state)?
         }
         _ => return Ok(()),

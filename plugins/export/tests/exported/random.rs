@@ -40,6 +40,9 @@ fn durations(random: &mut Prng, most: usize, from: f64, to: f64) -> String {
 /// A graph of everything, with parameters at random.
 pub fn graph(random: &mut Prng) -> String {
     let channels = 1 + random.between(0.0, 10.0) as usize;
+    // Of fewer than three sensors none contradicts the others.
+    let is_checked = channels > 2;
+    let checked = if is_checked { "trusted" } else { "temperature" };
     let channels: Vec<String> = (0..channels).map(|nth| format!("\"t{nth}\"")).collect();
     let span = 20 + random.between(0.0, 40.0) as u64;
     let ahead = [0, span / 2, span, span + 7][random.between(0.0, 4.0) as usize % 4];
@@ -85,7 +88,7 @@ min_samples = {}
 min_coverage = {}
 [nodes.gradients]
 type = "slope"
-inputs.signal = "temperature"
+inputs.signal = "{checked}"
 windows = {}
 unit = "mK/min"
 min_samples = {}
@@ -161,10 +164,34 @@ ahead = "{ahead}s"
 "#,
         lags[0], lags[1], lags[0], lags[1], lags[2],
     );
+    if is_checked {
+        let _ = write!(
+            text,
+            r#"
+[nodes.trusted]
+type = "cross_check"
+inputs.signal = {{ from = "temperature", max_age = "{}s" }}
+inputs.truth = "drift.X"
+ahead = "{ahead}s"
+lag = "{}s"
+limit = {}
+after = "{}s"
+recover = "{}s"
+"#,
+            5 + random.between(0.0, 60.0) as u64,
+            1 + random.between(0.0, 60.0) as u64,
+            one_of(random, &["1.0", "6.0", "20.0"]),
+            random.between(0.0, 20.0) as u64,
+            random.between(0.0, 40.0) as u64,
+        );
+    }
     // What is made of drift may not choose who predicts it while windows overlap.
     let state = if legal > 0 { "mark" } else { "state.{axis}" };
     votes(random, state, &mut text);
     control(random, &mut text);
+    if is_checked {
+        text.push_str("trusted = \"trusted\"\nwhy_trusted = \"trusted:reason\"\n");
+    }
     text
 }
 
@@ -478,6 +505,7 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
     let (seeds, ticks) = cases();
     let scratch = Scratch::new("random");
     let mut values = 0;
+    let mut reasons = [0; 4];
     for seed in seeds {
         let mut random = Prng::stream(seed, "an exported graph");
         let text = graph(&mut random);
@@ -488,6 +516,12 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
         let exhibit = Exhibit::new(&exported, &scratch.path(&seed.to_string()));
         let events = events(&mut random, &plan, ticks);
         let expected = stepped(&mut engine, &events);
+        let outputs = plan.outputs.iter().enumerate();
+        for (nth, _) in outputs.filter(|(_, of)| of.name.starts_with("why_trusted")) {
+            for row in &expected {
+                reasons[f64::from_bits(row[nth]) as usize] += 1;
+            }
+        }
         let there = expected.iter().flatten();
         values += there
             .filter(|&&bits| !f64::from_bits(bits).is_nan())
@@ -512,6 +546,8 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
         }
     }
     assert!(values > 50_000, "{values}");
+    println!("sensors by what is known of them: {reasons:?}");
+    assert!(reasons[..3].iter().all(|&count| count > 200), "{reasons:?}");
 }
 
 /// An engine goes on in C from the middle, and C goes on in an engine: the first difference from the engine that went all the way.
