@@ -3,6 +3,7 @@
 //! | part | decides |
 //! |---|---|
 //! | [`fit_machine`] | what the rows of a machine and a graph give: the bytes of a model |
+//! | [`fitted`] | the same, with what is reported of it |
 //! | [`RowsId`] | by what rows are known again |
 //! | `batches` | how rows come as batches of Arrow |
 //! | [`found`] | which files are of which machine |
@@ -33,3 +34,4 @@ pub use machine::{MachineError, MachineFit, fit_machine};
 #[cfg(feature = "arrow")]
 pub use once::Once;
 pub use rows::RowsId;
+pub use worker::fitted;

@@ -9,11 +9,12 @@ use athermal_core::diagnostic::{Diagnostics, Sources, panic_text};
 use athermal_files::Dataset;
 use athermal_run::fit::{FitOptions, Outcome};
 use athermal_run::model::{Card, Model, ModelError};
+use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
 use crate::figure::Figure;
 use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
-use crate::machine::fit_machine;
+use crate::machine::{MachineError, fit_machine};
 use crate::rows::{RowsId, Summed};
 
 /// Works until the input ends.
@@ -84,7 +85,9 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
                     return Ok(Reply::Same);
                 }
             }
-            fitted(setup, graph, &dataset, created.clone())
+            let fitted = fitted(graph, &dataset, setup.memory, created.clone());
+            let fitted = fitted.map_err(|error| error.to_string())?;
+            Ok(Reply::Fitted(Box::new(fitted)))
         }
         (Task::Fit { .. }, None) => Err("no graph was given".to_owned()),
         (Task::Evaluate { model }, _) => {
@@ -94,21 +97,24 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
     }
 }
 
-fn fitted(
-    setup: &Setup,
+/// Fits a graph on the rows of one machine, with all that the manifest of a fleet says of it: for whoever spreads machines over processes,
+/// each of which works on one at a time. So the fit has one thread.
+///
+/// # Errors
+/// As of [`fit_machine`].
+pub fn fitted(
     graph: &Model,
-    dataset: &Dataset,
+    rows: &dyn Recording,
+    memory: usize,
     created: Option<String>,
-) -> Result<Reply, String> {
+) -> Result<Fitted, MachineError> {
     let options = FitOptions {
-        memory: setup.memory,
-        // There are as many workers as are to work at a time.
+        memory,
         threads: 1,
         ..FitOptions::default()
     };
-    let watch = FaultWatch::new(dataset, Purpose::Fit);
-    let fit = fit_machine(graph, &watch, &options, created, &mut |_| {});
-    let fit = fit.map_err(|error| error.to_string())?;
+    let watch = FaultWatch::new(rows, Purpose::Fit);
+    let fit = fit_machine(graph, &watch, &options, created, &mut |_| {})?;
     let failed = fit.report.estimators.iter();
     let unfitted = failed.filter_map(|of| match &of.outcome {
         Outcome::Failed(error) => Some(Unfitted {
@@ -118,8 +124,8 @@ fn fitted(
         Outcome::Fitted(_) => None,
     });
     let bare = fit.bare.iter().filter(|of| !of.has_others);
-    Ok(Reply::Fitted(Box::new(Fitted {
-        model: fit.model.to_text().map_err(|error| error.to_string())?,
+    Ok(Fitted {
+        model: fit.model.to_text()?,
         scores: fit
             .model
             .card
@@ -129,7 +135,7 @@ fn fitted(
         constant: bare.map(|of| of.output.clone()).collect(),
         doubts: doubts(&watch.found(), &fit.report.rejected),
         rows: fit.rows,
-    })))
+    })
 }
 
 fn evaluated(setup: &Setup, model: &Model, dataset: &Dataset) -> Result<Reply, String> {
