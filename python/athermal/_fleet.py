@@ -73,11 +73,8 @@ def wanted(graph: Graph, by: str, time: str | None, there: Iterable[str]) -> dic
     return known_as
 
 
-def save(rows: Iterable[Any], folder: str | os.PathLike[str], by: str = "machine") -> dict[str, str]:
-    """Writes models into a folder as `athermal fleet` reads them, each as `MACHINE.json`. Gives the machines that have none, and why.
-
-    `rows` are those of a fitted fleet: `fitted.toLocalIterator()` of Spark, or `fitted.compute().to_dict("records")` of Dask.
-    """
+def save(rows: Iterable[Any], folder: str | os.PathLike[str], by: str) -> dict[str, str]:
+    """Writes the models of rows that were answered into a folder, each as `MACHINE.json`."""
     folder, failed = Path(folder), {}
     folder.mkdir(parents=True, exist_ok=True)
     for row in rows:

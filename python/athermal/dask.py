@@ -9,7 +9,7 @@ import os
 from typing import Any
 
 from athermal import Graph, _athermal, _fleet, _frames
-from athermal._fleet import Job, save
+from athermal._fleet import Job
 
 __all__ = ["fit", "save"]
 
@@ -43,6 +43,16 @@ def fit(
     meta |= {of: pandas.Series(dtype="Int64" if of == "rows" else object) for of in _fleet.RESULT}
     shuffled = rows.shuffle(on=by, npartitions=partitions)
     return shuffled.map_partitions(_fitted, job, by, times, meta=pandas.DataFrame(meta))
+
+
+def save(fitted: Any, folder: str | os.PathLike[str], by: str = "machine") -> dict[str, str]:
+    """Writes the models of a fitted fleet into a folder as `athermal fleet` reads them, each as `MACHINE.json`.
+
+    Gives the machines that have none, and why. `fitted` is a frame of Dask, or what its `compute` gave.
+    """
+    if hasattr(fitted, "compute"):
+        fitted = fitted.compute()
+    return _fleet.save(fitted.to_dict("records"), folder, by)
 
 
 def _fitted(rows: Any, job: Job, by: str, times: list[str]) -> Any:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from athermal import Graph, _athermal, _fleet
-from athermal._fleet import Job, save
+from athermal._fleet import Job
 
 __all__ = ["fit", "save"]
 
@@ -76,6 +76,22 @@ _SCHEMA = (
     "`doubts` array<struct<`channel`: string, `fault`: string>>"
 )
 """The types of an answer for Spark, behind that of the machine."""
+
+
+def save(fitted: Any, folder: str | os.PathLike[str], by: str = "machine") -> dict[str, str]:
+    """Writes the models of a fitted fleet into a folder as `athermal fleet` reads them, each as `MACHINE.json`.
+
+    Gives the machines that have none, and why. The driver has the models of one part at a time.
+    """
+    is_ours = not fitted.is_cached
+    fitted = fitted.persist() if is_ours else fitted
+    try:
+        # All parts are fitted at a time; the iterator alone would have one fitted after the other.
+        fitted.count()
+        return _fleet.save(fitted.toLocalIterator(), folder, by)
+    finally:
+        if is_ours:
+            fitted.unpersist()
 
 
 def _quoted(column: str) -> str:

@@ -59,10 +59,11 @@ def test_the_models_are_those_of_the_command_line_although_a_worker_is_killed(fl
     # Times come in any order, and the rows of a machine are in all parts.
     rows = rows.assign(nth=rows["time_s"] % 7).set_index("nth").repartition(npartitions=3)
     fitted = athermal.dask.fit(rows, fleet / "graph.toml", by="machine", date=DATE)
-    found = fitted.compute().to_dict("records")
+    fitted = fitted.compute()
+    found = fitted.to_dict("records")
     assert Path(os.environ["KILLED_ONCE"]).exists(), "no worker was killed"
     check_fleet(fleet, found)
-    assert list(athermal.dask.save(found, tmp_path / "models")) == ["m4"]
+    assert list(athermal.dask.save(fitted, tmp_path / "models")) == ["m4"]
 
 
 def test_rows_without_a_machine_and_other_names_are_taken(fleet, client):

@@ -89,13 +89,13 @@ def test_the_models_are_those_of_the_command_line_although_an_executor_is_killed
     monkeypatch.setattr(athermal._fleet, "Job", KilledOnce)
     # Machines and times come in any order.
     rows = spark.read.parquet(str(fleet / "logs")).orderBy(functions.rand(1))
-    fitted = athermal.spark.fit(rows, fleet / "graph.toml", by="machine", date=DATE)
+    fitted = athermal.spark.fit(rows, fleet / "graph.toml", by="machine", date=DATE).cache()
     found = [row.asDict(recursive=True) for row in fitted.collect()]
     assert (tmp_path_factory.getbasetemp() / "killed").exists(), "no executor was killed"
     check_fleet(fleet, [row | {"model": row["model"] and bytes(row["model"])} for row in found])
 
     models = tmp_path / "models"
-    failed = athermal.spark.save(found, models)
+    failed = athermal.spark.save(fitted, models)
     assert list(failed) == ["m4"]
     assert sorted(path.stem for path in models.iterdir()) == MACHINES[:3]
     command = [sys.executable, "-m", "athermal", "fleet", "report", str(models), "-o", str(tmp_path / "fleet.html")]
