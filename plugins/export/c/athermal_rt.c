@@ -1,6 +1,15 @@
 /* The runtime of exported graphs; see athermal_rt.h. */
 #include "athermal_rt.h"
 
+/* For a program with one graph: the file of its header, which says what the graph uses. The rest is then left out. */
+#ifdef ATHERMAL_PLAN
+#include ATHERMAL_PLAN
+#endif
+#ifndef AT_USES
+#define AT_USES 0xffffffffu
+#endif
+#define AT_IS_USED(part) (((AT_USES >> (part)) & 1u) != 0u)
+
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -106,6 +115,21 @@ uint64_t at_hash(uint64_t hash, uint64_t bits)
     return mixed;
 }
 
+/* c0 + x (c1 + x (c2 + ...)). */
+static double at_polynomial(const double coefficients[], int32_t count, double x)
+{
+    double sum = coefficients[count - 1];
+    int32_t nth;
+    for (nth = count - 2; nth >= 0; nth--) {
+        sum = coefficients[nth] + (x * sum);
+    }
+    return sum;
+}
+
+/* Of the exponential of small x, for at_exp and at_pow. */
+static const double at_of_exp[5] = { 1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05,
+                                     -1.65339022054652515390e-06, 4.13813679705723846039e-08 };
+
 /* e^x - 1, after FreeBSD's msun, s_expm1.c:
  *
  * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
@@ -117,11 +141,8 @@ static double at_expm1(double of)
     const double ln2_hi = 6.93147180369123816490e-01;
     const double ln2_lo = 1.90821492927058770002e-10;
     const double inverse_ln2 = 1.44269504088896338700e+00;
-    const double q1 = -3.33333333333331316428e-02;
-    const double q2 = 1.58730158725481460165e-03;
-    const double q3 = -7.93650757867487942473e-05;
-    const double q4 = 4.00821782732936239552e-06;
-    const double q5 = -2.01099218183624371326e-07;
+    static const double q[5] = { -3.33333333333331316428e-02, 1.58730158725481460165e-03, -7.93650757867487942473e-05,
+                                 4.00821782732936239552e-06, -2.01099218183624371326e-07 };
     const uint64_t bits = at_bits(of);
     const uint32_t high = (uint32_t)((bits >> 32) & UINT64_C(0x7fffffff));
     const int negative = ((bits >> 63) != 0u) ? 1 : 0;
@@ -167,7 +188,7 @@ static double at_expm1(double of)
     }
     half = 0.5 * x;
     square = x * half;
-    r1 = 1.0 + (square * (q1 + (square * (q2 + (square * (q3 + (square * (q4 + (square * q5)))))))));
+    r1 = 1.0 + (square * at_polynomial(q, 5, square));
     t = 3.0 - (r1 * half);
     e = square * ((r1 - t) / (6.0 - (x * t)));
     if (k == 0) {
@@ -197,6 +218,550 @@ static double at_expm1(double of)
         y = (x - (e + t)) + 1.0;
     }
     return y * at_number((uint64_t)(0x3ff + k) << 52);
+}
+
+/* ---- Exponentials, logarithms and powers, as the crate `libm` computes them for the engine: those of FreeBSD's msun, of which the C
+ * library of a controller may have others. */
+
+static uint32_t at_high_word(double of)
+{
+    return (uint32_t)(at_bits(of) >> 32);
+}
+
+static double at_with_high_word(double of, uint32_t high)
+{
+    return at_number(((uint64_t)high << 32) | (at_bits(of) & UINT64_C(0xffffffff)));
+}
+
+static double at_without_low_word(double of)
+{
+    return at_number(at_bits(of) & UINT64_C(0xffffffff00000000));
+}
+
+/* x times 2^n, rounded once. */
+static double at_scaled(double x, int32_t n)
+{
+    const double most = at_number(UINT64_C(0x7fe0000000000000));
+    /* 2^-969: what is scaled by it to stay above the least number does not become subnormal. */
+    const double least = at_number(UINT64_C(0x0360000000000000));
+    double y = x;
+    int32_t left = n;
+    int32_t turn;
+    for (turn = 0; (turn < 2) && (left > 1023); turn++) {
+        y = y * most;
+        left -= 1023;
+    }
+    for (turn = 0; (turn < 2) && (left < -1022); turn++) {
+        y = y * least;
+        left += 969;
+    }
+    if (left > 1023) {
+        left = 1023;
+    }
+    if (left < -1022) {
+        left = -1022;
+    }
+    return y * at_number((uint64_t)(0x3ff + left) << 52);
+}
+
+/* e^x, after e_exp.c:
+ *
+ * Copyright (C) 2004 by Sun Microsystems, Inc. All rights reserved.
+ * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved.
+ */
+static double at_exp(double of)
+{
+    const double ln2_hi = 6.93147180369123816490e-01;
+    const double ln2_lo = 1.90821492927058770002e-10;
+    const double inverse_ln2 = 1.44269504088896338700e+00;
+    const uint32_t high = at_high_word(of) & 0x7fffffffu;
+    const int negative = ((at_bits(of) >> 63) != 0u) ? 1 : 0;
+    double x = of;
+    double hi = of;
+    double lo = 0.0;
+    double square;
+    double c;
+    double y;
+    int32_t k = 0;
+    if (high >= 0x4086232bu) {
+        if (isnan(x)) {
+            return x;
+        }
+        if (x > 709.782712893383973096) {
+            return x * at_number(UINT64_C(0x7fe0000000000000));
+        }
+        if (x < -745.13321910194110842) {
+            return 0.0;
+        }
+    }
+    if (high > 0x3fd62e42u) {
+        if (high >= 0x3ff0a2b2u) {
+            k = (int32_t)((inverse_ln2 * x) + ((negative != 0) ? -0.5 : 0.5));
+        } else {
+            k = (negative != 0) ? -1 : 1;
+        }
+        hi = x - ((double)k * ln2_hi);
+        lo = (double)k * ln2_lo;
+        x = hi - lo;
+    } else if (high <= 0x3e300000u) {
+        return 1.0 + x;
+    } else {
+        /* It is small enough. */
+    }
+    square = x * x;
+    c = x - (square * at_polynomial(at_of_exp, 5, square));
+    y = 1.0 + ((((x * c) / (2.0 - c)) - lo) + hi);
+    return (k == 0) ? y : at_scaled(y, k);
+}
+
+/* The natural logarithm, after e_log.c:
+ *
+ * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+ * Developed at SunSoft, a Sun Microsystems, Inc. business.
+ * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved.
+ */
+static double at_log(double of)
+{
+    const double ln2_hi = 6.93147180369123816490e-01;
+    const double ln2_lo = 1.90821492927058770002e-10;
+    static const double odd[4] = { 6.666666666666735130e-01, 2.857142874366239149e-01, 1.818357216161805012e-01,
+                                   1.479819860511658591e-01 };
+    static const double even[3] = { 3.999999999940941908e-01, 2.222219843214978396e-01, 1.531383769920937332e-01 };
+    double x = of;
+    double f;
+    double half;
+    double s;
+    double z;
+    double w;
+    double r;
+    double dk;
+    uint32_t high;
+    int32_t k = 0;
+    if (isnan(x)) {
+        return x;
+    }
+    if (x == 0.0) {
+        return -(double)INFINITY;
+    }
+    if (x < 0.0) {
+        return (double)NAN;
+    }
+    high = at_high_word(x);
+    if (high >= 0x7ff00000u) {
+        return x;
+    }
+    if (x == 1.0) {
+        return 0.0;
+    }
+    if (high < 0x00100000u) {
+        k = -54;
+        x = x * at_number(UINT64_C(0x4350000000000000));
+        high = at_high_word(x);
+    }
+    high += 0x3ff00000u - 0x3fe6a09eu;
+    k += (int32_t)(high >> 20) - 0x3ff;
+    high = (high & 0x000fffffu) + 0x3fe6a09eu;
+    x = at_with_high_word(x, high);
+    f = x - 1.0;
+    half = (0.5 * f) * f;
+    s = f / (2.0 + f);
+    z = s * s;
+    w = z * z;
+    r = (z * at_polynomial(odd, 4, w)) + (w * at_polynomial(even, 3, w));
+    dk = (double)k;
+    return ((((s * (half + r)) + (dk * ln2_lo)) - half) + f) + (dk * ln2_hi);
+}
+
+/* 2^x, after s_exp2.c:
+ *
+ * Copyright (c) 2005 David Schultz <das@FreeBSD.ORG>
+ * All rights reserved.
+ *
+ * Redistribution and use in source and binary forms, with or without
+ * modification, are permitted provided that the following conditions
+ * are met:
+ * 1. Redistributions of source code must retain the above copyright
+ *    notice, this list of conditions and the following disclaimer.
+ * 2. Redistributions in binary form must reproduce the above copyright
+ *    notice, this list of conditions and the following disclaimer in the
+ *    documentation and/or other materials provided with the distribution.
+ *
+ * THIS SOFTWARE IS PROVIDED BY THE AUTHOR AND CONTRIBUTORS ``AS IS'' AND
+ * ANY EXPRESS OR IMPLIED WARRANTIES, INCLUDING, BUT NOT LIMITED TO, THE
+ * IMPLIED WARRANTIES OF MERCHANTABILITY AND FITNESS FOR A PARTICULAR PURPOSE
+ * ARE DISCLAIMED.  IN NO EVENT SHALL THE AUTHOR OR CONTRIBUTORS BE LIABLE
+ * FOR ANY DIRECT, INDIRECT, INCIDENTAL, SPECIAL, EXEMPLARY, OR CONSEQUENTIAL
+ * DAMAGES (INCLUDING, BUT NOT LIMITED TO, PROCUREMENT OF SUBSTITUTE GOODS
+ * OR SERVICES; LOSS OF USE, DATA, OR PROFITS; OR BUSINESS INTERRUPTION)
+ * HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY, WHETHER IN CONTRACT, STRICT
+ * LIABILITY, OR TORT (INCLUDING NEGLIGENCE OR OTHERWISE) ARISING IN ANY WAY
+ * OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF
+ * SUCH DAMAGE.
+ *
+ * The bits of 2^(nth/256 - 1/2) a little beside that place, and the upper half of the bits of how much. */
+#define AT_POWERS 256u
+
+static double at_exp2(double of)
+{
+    static const uint64_t powers[AT_POWERS] = {
+        UINT64_C(0x3fe6a09e667f3d5d), UINT64_C(0x3fe6b052fa751744), UINT64_C(0x3fe6c012750bd9fe), UINT64_C(0x3fe6cfdcddd476bf),
+        UINT64_C(0x3fe6dfb23c651a29), UINT64_C(0x3fe6ef9298593ae3), UINT64_C(0x3fe6ff7df9519386), UINT64_C(0x3fe70f7466f42da3),
+        UINT64_C(0x3fe71f75e8ec5fc3), UINT64_C(0x3fe72f8286eacf05), UINT64_C(0x3fe73f9a48a58152), UINT64_C(0x3fe74fbd35d7ccfc),
+        UINT64_C(0x3fe75feb564267f1), UINT64_C(0x3fe77024b1ab6d48), UINT64_C(0x3fe780694fde5d38), UINT64_C(0x3fe790b938ac1d00),
+        UINT64_C(0x3fe7a11473eb0178), UINT64_C(0x3fe7b17b0976d060), UINT64_C(0x3fe7c1ed0130c133), UINT64_C(0x3fe7d26a62ff8636),
+        UINT64_C(0x3fe7e2f336cf4e3b), UINT64_C(0x3fe7f3878491c3e8), UINT64_C(0x3fe80427543e1b4e), UINT64_C(0x3fe814d2add1071a),
+        UINT64_C(0x3fe82589994ccd7e), UINT64_C(0x3fe8364c1eb942d0), UINT64_C(0x3fe8471a4623cab5), UINT64_C(0x3fe857f4179f5bbc),
+        UINT64_C(0x3fe868d99b4491af), UINT64_C(0x3fe879cad931a395), UINT64_C(0x3fe88ac7d98a65b8), UINT64_C(0x3fe89bd0a4785800),
+        UINT64_C(0x3fe8ace5422aa223), UINT64_C(0x3fe8be05bad619fa), UINT64_C(0x3fe8cf3216b54383), UINT64_C(0x3fe8e06a5e08664c),
+        UINT64_C(0x3fe8f1ae99157807), UINT64_C(0x3fe902fed0282c0e), UINT64_C(0x3fe9145b0b91ff96), UINT64_C(0x3fe925c353aa2ff9),
+        UINT64_C(0x3fe93737b0cdc64a), UINT64_C(0x3fe948b82b5f98ae), UINT64_C(0x3fe95a44cbc852cb), UINT64_C(0x3fe96bdd9a766f21),
+        UINT64_C(0x3fe97d829fde4e2a), UINT64_C(0x3fe98f33e47a23a3), UINT64_C(0x3fe9a0f170ca0604), UINT64_C(0x3fe9b2bb4d53ff89),
+        UINT64_C(0x3fe9c49182a3f15b), UINT64_C(0x3fe9d674194bb8c5), UINT64_C(0x3fe9e86319e3238e), UINT64_C(0x3fe9fa5e8d07f302),
+        UINT64_C(0x3fea0c667b5de54d), UINT64_C(0x3fea1e7aed8eb8f6), UINT64_C(0x3fea309bec4a2e27), UINT64_C(0x3fea42c980460a5d),
+        UINT64_C(0x3fea5503b23e259b), UINT64_C(0x3fea674a8af46213), UINT64_C(0x3fea799e1330b3a7), UINT64_C(0x3fea8bfe53c12e8d),
+        UINT64_C(0x3fea9e6b5579fcd2), UINT64_C(0x3feab0e521356fb8), UINT64_C(0x3feac36bbfd3f381), UINT64_C(0x3fead5ff3a3c2780),
+        UINT64_C(0x3feae89f995ad2a3), UINT64_C(0x3feafb4ce622f367), UINT64_C(0x3feb0e07298db790), UINT64_C(0x3feb20ce6c9a89a9),
+        UINT64_C(0x3feb33a2b84f1a4b), UINT64_C(0x3feb468415b747e7), UINT64_C(0x3feb59728de5593a), UINT64_C(0x3feb6c6e29f1c56a),
+        UINT64_C(0x3feb7f76f2fb5e50), UINT64_C(0x3feb928cf22749b2), UINT64_C(0x3feba5b030a10603), UINT64_C(0x3febb8e0b79a6f66),
+        UINT64_C(0x3febcc1e904bc1ff), UINT64_C(0x3febdf69c3f3a16f), UINT64_C(0x3febf2c25bd71db8), UINT64_C(0x3fec06286141b2e9),
+        UINT64_C(0x3fec199bdd8552e0), UINT64_C(0x3fec2d1cd9fa64ee), UINT64_C(0x3fec40ab5fffd02f), UINT64_C(0x3fec544778fafd15),
+        UINT64_C(0x3fec67f12e57d0cb), UINT64_C(0x3fec7ba88988c1b6), UINT64_C(0x3fec8f6d9406e733), UINT64_C(0x3feca3405751c4df),
+        UINT64_C(0x3fecb720dcef9094), UINT64_C(0x3feccb0f2e6d1689), UINT64_C(0x3fecdf0b555dc412), UINT64_C(0x3fecf3155b5bab3b),
+        UINT64_C(0x3fed072d4a0789bc), UINT64_C(0x3fed1b532b08c8fa), UINT64_C(0x3fed2f87080d8a85), UINT64_C(0x3fed43c8eacaa203),
+        UINT64_C(0x3fed5818dcfba491), UINT64_C(0x3fed6c76e862e6a1), UINT64_C(0x3fed80e316c9834e), UINT64_C(0x3fed955d71ff6090),
+        UINT64_C(0x3feda9e603db32ae), UINT64_C(0x3fedbe7cd63a8325), UINT64_C(0x3fedd321f301b445), UINT64_C(0x3fede7d5641c05bf),
+        UINT64_C(0x3fedfc97337b9aec), UINT64_C(0x3fee11676b197d5e), UINT64_C(0x3fee264614f5a3e7), UINT64_C(0x3fee3b333b16ee5c),
+        UINT64_C(0x3fee502ee78b3fb4), UINT64_C(0x3fee653924676d68), UINT64_C(0x3fee7a51fbc74c44), UINT64_C(0x3fee8f7977cdb726),
+        UINT64_C(0x3feea4afa2a490e8), UINT64_C(0x3feeb9f4867ccae4), UINT64_C(0x3feecf482d8e680d), UINT64_C(0x3feee4aaa2188514),
+        UINT64_C(0x3feefa1bee615a13), UINT64_C(0x3fef0f9c1cb64106), UINT64_C(0x3fef252b376bb963), UINT64_C(0x3fef3ac948dd7275),
+        UINT64_C(0x3fef50765b6e4524), UINT64_C(0x3fef6632798844fd), UINT64_C(0x3fef7bfdad9cbe38), UINT64_C(0x3fef91d802243c82),
+        UINT64_C(0x3fefa7c1819e908e), UINT64_C(0x3fefbdba3692d511), UINT64_C(0x3fefd3c22b8f7194), UINT64_C(0x3fefe9d96b2a23ee),
+        UINT64_C(0x3ff0000000000000), UINT64_C(0x3ff00b1afa5abcbe), UINT64_C(0x3ff0163da9fb3303), UINT64_C(0x3ff02168143b0282),
+        UINT64_C(0x3ff02c9a3e77806c), UINT64_C(0x3ff037d42e11bbca), UINT64_C(0x3ff04315e86e7f89), UINT64_C(0x3ff04e5f72f65467),
+        UINT64_C(0x3ff059b0d315855a), UINT64_C(0x3ff0650a0e3c1f95), UINT64_C(0x3ff0706b29ddf71a), UINT64_C(0x3ff07bd42b72a82d),
+        UINT64_C(0x3ff0874518759bd0), UINT64_C(0x3ff092bdf66607c8), UINT64_C(0x3ff09e3ecac6f383), UINT64_C(0x3ff0a9c79b1f3930),
+        UINT64_C(0x3ff0b5586cf988fc), UINT64_C(0x3ff0c0f145e46c8a), UINT64_C(0x3ff0cc922b724816), UINT64_C(0x3ff0d83b23395dd8),
+        UINT64_C(0x3ff0e3ec32d3d1f3), UINT64_C(0x3ff0efa55fdfa9a6), UINT64_C(0x3ff0fb66affed2f0), UINT64_C(0x3ff1073028d7234b),
+        UINT64_C(0x3ff11301d0125b5b), UINT64_C(0x3ff11edbab5e2af9), UINT64_C(0x3ff12abdc06c31d5), UINT64_C(0x3ff136a814f2047d),
+        UINT64_C(0x3ff1429aaea92de9), UINT64_C(0x3ff14e95934f3138), UINT64_C(0x3ff15a98c8a58e71), UINT64_C(0x3ff166a45471c3df),
+        UINT64_C(0x3ff172b83c7d5211), UINT64_C(0x3ff17ed48695bb9f), UINT64_C(0x3ff18af9388c8d93), UINT64_C(0x3ff1972658375d66),
+        UINT64_C(0x3ff1a35beb6fcba7), UINT64_C(0x3ff1af99f81387e3), UINT64_C(0x3ff1bbe084045d54), UINT64_C(0x3ff1c82f95281c43),
+        UINT64_C(0x3ff1d4873168b9b2), UINT64_C(0x3ff1e0e75eb44031), UINT64_C(0x3ff1ed5022fcd938), UINT64_C(0x3ff1f9c18438cdf7),
+        UINT64_C(0x3ff2063b88628d8f), UINT64_C(0x3ff212be3578a81e), UINT64_C(0x3ff21f49917ddd41), UINT64_C(0x3ff22bdda2791323),
+        UINT64_C(0x3ff2387a6e7561e7), UINT64_C(0x3ff2451ffb821427), UINT64_C(0x3ff251ce4fb2a602), UINT64_C(0x3ff25e85711eceb0),
+        UINT64_C(0x3ff26b4565e27d16), UINT64_C(0x3ff2780e341de00f), UINT64_C(0x3ff284dfe1f5633e), UINT64_C(0x3ff291ba7591bb30),
+        UINT64_C(0x3ff29e9df51fdf09), UINT64_C(0x3ff2ab8a66d10e9b), UINT64_C(0x3ff2b87fd0dada3a), UINT64_C(0x3ff2c57e39771af9),
+        UINT64_C(0x3ff2d285a6e402d9), UINT64_C(0x3ff2df961f641579), UINT64_C(0x3ff2ecafa93e2ecf), UINT64_C(0x3ff2f9d24abd8822),
+        UINT64_C(0x3ff306fe0a31b625), UINT64_C(0x3ff31432edeea50b), UINT64_C(0x3ff32170fc4cd7b8), UINT64_C(0x3ff32eb83ba8e9a2),
+        UINT64_C(0x3ff33c08b2641766), UINT64_C(0x3ff3496266e3fa27), UINT64_C(0x3ff356c55f929f0f), UINT64_C(0x3ff36431a2de88b9),
+        UINT64_C(0x3ff371a7373aaa39), UINT64_C(0x3ff37f26231e74fe), UINT64_C(0x3ff38cae6d05d838), UINT64_C(0x3ff39a401b713ec3),
+        UINT64_C(0x3ff3a7db34e5a020), UINT64_C(0x3ff3b57fbfec6e95), UINT64_C(0x3ff3c32dc313a8f2), UINT64_C(0x3ff3d0e544ede122),
+        UINT64_C(0x3ff3dea64c1234bb), UINT64_C(0x3ff3ec70df1c4ecc), UINT64_C(0x3ff3fa4504ac7e8c), UINT64_C(0x3ff40822c367a0bb),
+        UINT64_C(0x3ff4160a21f72e95), UINT64_C(0x3ff423fb27094646), UINT64_C(0x3ff431f5d950a920), UINT64_C(0x3ff43ffa3f84b9eb),
+        UINT64_C(0x3ff44e0860618919), UINT64_C(0x3ff45c2042a7d201), UINT64_C(0x3ff46a41ed1d0016), UINT64_C(0x3ff4786d668b3326),
+        UINT64_C(0x3ff486a2b5c13c00), UINT64_C(0x3ff494e1e192af04), UINT64_C(0x3ff4a32af0d7d372), UINT64_C(0x3ff4b17dea6db801),
+        UINT64_C(0x3ff4bfdad53629e1), UINT64_C(0x3ff4ce41b817c132), UINT64_C(0x3ff4dcb299fddddb), UINT64_C(0x3ff4eb2d81d8ab96),
+        UINT64_C(0x3ff4f9b2769d2d02), UINT64_C(0x3ff508417f4531c1), UINT64_C(0x3ff516daa2cf662a), UINT64_C(0x3ff5257de83f51ea),
+        UINT64_C(0x3ff5342b569d4eda), UINT64_C(0x3ff542e2f4f6ac1a), UINT64_C(0x3ff551a4ca5d94db), UINT64_C(0x3ff56070dde9116b),
+        UINT64_C(0x3ff56f4736b529de), UINT64_C(0x3ff57e27dbe2c40e), UINT64_C(0x3ff58d12d497c76f), UINT64_C(0x3ff59c0827ff0b4c),
+        UINT64_C(0x3ff5ab07dd485427), UINT64_C(0x3ff5ba11fba87af4), UINT64_C(0x3ff5c9268a59460b), UINT64_C(0x3ff5d84590998e3f),
+        UINT64_C(0x3ff5e76f15ad20e1), UINT64_C(0x3ff5f6a320dcebca), UINT64_C(0x3ff605e1b976dcb8), UINT64_C(0x3ff6152ae6cdf715),
+        UINT64_C(0x3ff6247eb03a5531), UINT64_C(0x3ff633dd1d1929b5), UINT64_C(0x3ff6434634ccc313), UINT64_C(0x3ff652b9febc8efa),
+        UINT64_C(0x3ff6623882553397), UINT64_C(0x3ff671c1c708328e), UINT64_C(0x3ff68155d44ca97e), UINT64_C(0x3ff690f4b19e9471)
+    };
+    static const uint32_t beside[AT_POWERS] = {
+        0x3d398800u, 0x3cd80000u, 0xbd287800u, 0x3d1ec000u, 0xbcd80000u, 0xbcbc0000u, 0xbd2fd800u, 0xbd2c8800u,
+        0x3d13c000u, 0xbd383000u, 0xbd00c000u, 0x3d2f8800u, 0x3d03e000u, 0xbd27d000u, 0xbcdd0000u, 0x3ce30000u,
+        0xbced0000u, 0x3d204000u, 0x3ca00000u, 0xbd269000u, 0xbd02e000u, 0xbd245800u, 0x3d330000u, 0x3d0f0000u,
+        0xbd21c000u, 0x3d29d000u, 0x3d471000u, 0x3d226000u, 0xbd32c400u, 0xbd230000u, 0xbd2a8000u, 0xbced0000u,
+        0x3d332800u, 0x3d42b400u, 0xbd2ed000u, 0xbd205000u, 0x3d282800u, 0xbd1cb000u, 0xbd05e000u, 0x3cf54000u,
+        0x3d172000u, 0xbd090000u, 0x3d256800u, 0xbd36d000u, 0xbd010000u, 0x3d2d0000u, 0xbd38a400u, 0x3d355c00u,
+        0x3d26b800u, 0xbcec0000u, 0x3d17d000u, 0x3d164000u, 0xbcf50000u, 0x3d09e000u, 0x3d2ad800u, 0xbd1af000u,
+        0x3d0b6000u, 0x3d388800u, 0x3d112000u, 0x3d06c000u, 0xbd29b800u, 0x3d2b7000u, 0x3cd90000u, 0x3ce40000u,
+        0xbd2c9000u, 0x3d165000u, 0x3d2fd400u, 0x3d127000u, 0x3d4d4700u, 0xbd383800u, 0x3c980000u, 0x3d0ad000u,
+        0x3cde8000u, 0xbd04c000u, 0xbd0d7000u, 0x3d0d9000u, 0x3d02a000u, 0xbd1f7800u, 0xbd10a000u, 0xbd114000u,
+        0x3d0be000u, 0xbd094000u, 0xbd0ed000u, 0x3d396600u, 0xbd1a1000u, 0xbd584580u, 0xbd1a4800u, 0x3ccb0000u,
+        0x3d014000u, 0x3cf02000u, 0x3cf36000u, 0xbd069000u, 0x3d09a000u, 0xbd15e000u, 0x3d1d2800u, 0x3d01a000u,
+        0x3cdf0000u, 0xbd03a000u, 0xbd0cd800u, 0x3cf4c000u, 0x3cff9000u, 0x3ce98000u, 0xbcf52000u, 0xbd1d7000u,
+        0xbd161400u, 0x3d0b4800u, 0x3d40ce00u, 0x3d0c6800u, 0xbd093000u, 0xbce50000u, 0xbd07f800u, 0xbcf37000u,
+        0x3ce5d000u, 0x3d161a00u, 0x3cf55000u, 0x3cc64000u, 0xbcee8000u, 0xbcfa8800u, 0xbd2c9000u, 0x3caa0000u,
+        0xbcf4f000u, 0x3cca8000u, 0x3cfabc00u, 0xbcd46000u, 0xbd0b0c00u, 0xbcc0e000u, 0xbd10de80u, 0x3cee4300u,
+        0x00000000u, 0xbcb34000u, 0xbd121700u, 0x3cba4000u, 0x3cef9800u, 0xbcc74000u, 0x3cd83000u, 0xbd1a3f00u,
+        0xbd028400u, 0x3cf16000u, 0x3d152400u, 0xbce9a000u, 0x3ce64000u, 0xbd007800u, 0xbc980000u, 0x3cffa000u,
+        0xbcfac800u, 0x3cd9c000u, 0x3d052000u, 0xbcfad000u, 0x3d1bac00u, 0xbd04e800u, 0xbd0d3000u, 0x3cf15000u,
+        0x3cec0000u, 0x3d16bc00u, 0x3ce84000u, 0xbd0ed000u, 0x3ce8e000u, 0x3ceb4000u, 0x3d053000u, 0x3d033800u,
+        0x3d28d400u, 0xbd05d000u, 0xbd1c8800u, 0x3d11f000u, 0x3d104800u, 0xbd473900u, 0x3d24e400u, 0xbd0a2000u,
+        0x3ce38000u, 0x3ceac000u, 0x3d019000u, 0xbd1b7800u, 0x3d2d9400u, 0x3cd80000u, 0x3d2b3400u, 0x3d19f800u,
+        0xbd19c800u, 0x3d023000u, 0xbd134800u, 0x3d127000u, 0x3d11d000u, 0x3d31ee00u, 0xbd14c000u, 0xbd13d800u,
+        0x3d08b000u, 0xbd227c00u, 0x3d2a3400u, 0xbd108000u, 0xbd0ed000u, 0xbcf42000u, 0xbd249800u, 0xbd163000u,
+        0xbd323600u, 0xbd70df80u, 0xbd224800u, 0xbd259800u, 0x3d1ed000u, 0xbcdc0000u, 0xbd30d800u, 0x3d22c800u,
+        0x3d206000u, 0xbd166000u, 0xbd0ae000u, 0xbd447200u, 0x3d082000u, 0x3d3e8000u, 0x3cef8000u, 0xbd17a000u,
+        0x3d263000u, 0xbd48a600u, 0xbd3cdc00u, 0x3d25b800u, 0x3d1ec000u, 0xbd136000u, 0x3d239800u, 0x3cfa0000u,
+        0xbcf6c000u, 0xbd0bc000u, 0xbd128000u, 0x3d30e000u, 0xbd2d4000u, 0x3d0c2000u, 0xbd1e5000u, 0x3d078000u,
+        0xbd138000u, 0x3d008000u, 0x3d2c7000u, 0xbd1ce000u, 0x3d192000u, 0xbd08c000u, 0xbcfa0000u, 0x3d4a0800u,
+        0xbd26d800u, 0xbd324400u, 0x3d483c00u, 0x3d24b000u, 0x3d415a00u, 0xbd29e000u, 0xbd230800u, 0x3d4dec00u,
+        0xbcc40000u, 0x3d300800u, 0xbd26c800u, 0x3d469a00u, 0xbd1b4000u, 0x3d177000u, 0x3d26f800u, 0x3d010000u,
+        0xbd15d000u, 0xbd12d000u, 0xbcea8000u, 0xbd286000u, 0x3d71fe00u, 0xbd372000u, 0x3ce68000u, 0xbd297800u
+    };
+    const double redux = at_number(UINT64_C(0x4338000000000000)) / 256.0;
+    static const double p[5] = { 0x1.62e42fefa39efp-1, 0x1.ebfbdff82c575p-3, 0x1.c6b08d704a0a6p-5,
+                                 0x1.3b2ab88f70400p-7, 0x1.5d88003875c74p-10 };
+    const uint32_t high = at_high_word(of) & 0x7fffffffu;
+    uint64_t bits;
+    uint32_t place;
+    int32_t k;
+    double t;
+    double z;
+    if (isnan(of)) {
+        return of;
+    }
+    if (of >= 1024.0) {
+        return of * at_number(UINT64_C(0x7fe0000000000000));
+    }
+    if (of <= -1075.0) {
+        return 0.0;
+    }
+    if (high < 0x3c900000u) {
+        return 1.0 + of;
+    }
+    bits = at_bits(of + redux);
+    place = (uint32_t)(bits & UINT64_C(0xffffffff)) + (AT_POWERS / 2u);
+    k = (int32_t)(place >> 8) - (((place >> 31) != 0u) ? 16777216 : 0);
+    place = place % AT_POWERS;
+    t = at_number(powers[place]);
+    z = (of - (at_number(bits) - redux)) - at_number((uint64_t)beside[place] << 32);
+    return at_scaled(t + ((t * z) * at_polynomial(p, 5, z)), k);
+}
+
+/* x^y, after e_pow.c:
+ *
+ * Copyright (C) 2004 by Sun Microsystems, Inc. All rights reserved.
+ * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved.
+ */
+
+/* The logarithm of a size to base 2, as the sum of two numbers. */
+typedef struct {
+    double high;
+    double low;
+} at_two;
+
+/* Of a size within 2^-20 of 1. */
+static at_two at_log2_near_one(double size)
+{
+    const double inverse_ln2 = 1.44269504088896338700e+00;
+    const double inverse_ln2_high = 1.44269502162933349609e+00;
+    const double inverse_ln2_low = 1.92596299112661746887e-08;
+    const double t = size - 1.0;
+    const double w = (t * t) * (0.5 - (t * (0.3333333333333333333333 - (t * 0.25))));
+    const double u = inverse_ln2_high * t;
+    const double v = (t * inverse_ln2_low) - (w * inverse_ln2);
+    at_two log2;
+    log2.high = at_without_low_word(u + v);
+    log2.low = v - (log2.high - u);
+    return log2;
+}
+
+static at_two at_log2(double size)
+{
+    static const double l[6] = { 5.99999999999994648725e-01, 4.28571428578550184252e-01, 3.33333329818377432918e-01,
+                                 2.72728123808534006489e-01, 2.30660745775561754067e-01, 2.06975017800338417784e-01 };
+    const double cp = 9.61796693925975554329e-01;
+    const double cp_high = 9.61796700954437255859e-01;
+    const double cp_low = -7.02846165095275826516e-09;
+    double ax = size;
+    double base = 1.0;
+    double base_high = 0.0;
+    double base_low = 0.0;
+    uint32_t ix = at_high_word(ax);
+    uint32_t rest;
+    uint32_t k = 0u;
+    int32_t n = 0;
+    double u;
+    double v;
+    double ss;
+    double s_h;
+    double s_l;
+    double t_h;
+    double t_l;
+    double s2;
+    double r;
+    double p_h;
+    double p_l;
+    double z_h;
+    double z_l;
+    double t;
+    at_two log2;
+    if (ix < 0x00100000u) {
+        ax = ax * 9007199254740992.0;
+        n = -53;
+        ix = at_high_word(ax);
+    }
+    n += (int32_t)(ix >> 20) - 0x3ff;
+    rest = ix & 0x000fffffu;
+    ix = rest | 0x3ff00000u;
+    if (rest <= 0x3988Eu) {
+        k = 0u;
+    } else if (rest < 0xBB67Au) {
+        k = 1u;
+        base = 1.5;
+        base_high = 5.84962487220764160156e-01;
+        base_low = 1.35003920212974897128e-08;
+    } else {
+        n++;
+        ix -= 0x00100000u;
+    }
+    ax = at_with_high_word(ax, ix);
+    u = ax - base;
+    v = 1.0 / (ax + base);
+    ss = u * v;
+    s_h = at_without_low_word(ss);
+    t_h = at_with_high_word(0.0, (((ix >> 1) | 0x20000000u) + 0x00080000u) + (k << 18));
+    t_l = ax - (t_h - base);
+    s_l = v * ((u - (s_h * t_h)) - (s_h * t_l));
+    s2 = ss * ss;
+    r = (s2 * s2) * at_polynomial(l, 6, s2);
+    r = r + (s_l * (s_h + ss));
+    s2 = s_h * s_h;
+    t_h = at_without_low_word((3.0 + s2) + r);
+    t_l = r - ((t_h - 3.0) - s2);
+    u = s_h * t_h;
+    v = (s_l * t_h) + (t_l * ss);
+    p_h = at_without_low_word(u + v);
+    p_l = v - (p_h - u);
+    z_h = cp_high * p_h;
+    z_l = ((cp_low * p_h) + (p_l * cp)) + base_low;
+    t = (double)n;
+    log2.high = at_without_low_word(((z_h + z_l) + base_high) + t);
+    log2.low = z_l - (((log2.high - t) - base_high) - z_h);
+    return log2;
+}
+
+/* 2^(p_h + p_l), of which z is the sum. */
+static double at_exp2_of_two(double z, double p_h, double p_l)
+{
+    const double lg2 = 6.93147180559945286227e-01;
+    const double lg2_high = 6.93147182464599609375e-01;
+    const double lg2_low = -1.90465429995776804525e-09;
+    const uint32_t word = at_high_word(z);
+    const uint32_t size = word & 0x7fffffffu;
+    double high = p_h;
+    double t;
+    double u;
+    double v;
+    double w;
+    double y;
+    double t1;
+    double r;
+    int32_t n = 0;
+    int32_t j;
+    if (size > 0x3fe00000u) {
+        const uint32_t rounded = word + (0x00100000u >> ((size >> 20) - 0x3feu));
+        const uint32_t k = ((rounded & 0x7fffffffu) >> 20) - 0x3ffu;
+        t = at_with_high_word(0.0, rounded & ~(0x000fffffu >> k));
+        n = (int32_t)(((rounded & 0x000fffffu) | 0x00100000u) >> (20u - k));
+        if ((word >> 31) != 0u) {
+            n = -n;
+        }
+        high = high - t;
+    }
+    t = at_without_low_word(p_l + high);
+    u = t * lg2_high;
+    v = ((p_l - (t - high)) * lg2) + (t * lg2_low);
+    y = u + v;
+    w = v - (y - u);
+    t = y * y;
+    t1 = y - (t * at_polynomial(at_of_exp, 5, t));
+    r = ((y * t1) / (t1 - 2.0)) - (w + (y * w));
+    y = 1.0 - (r - y);
+    j = (int32_t)at_high_word(y) + (n * 0x00100000);
+    return (j < 0x00100000) ? at_scaled(y, n) : at_with_high_word(y, (uint32_t)j);
+}
+
+#define AT_NO_INTEGER 0
+#define AT_ODD 1
+#define AT_EVEN 2
+
+static int at_parity(double y)
+{
+    const double size = fabs(y);
+    int parity = AT_NO_INTEGER;
+    if (size >= 9007199254740992.0) {
+        parity = AT_EVEN;
+    } else if (floor(size) == size) {
+        parity = (floor(0.5 * size) == (0.5 * size)) ? AT_EVEN : AT_ODD;
+    } else {
+        /* It is none. */
+    }
+    return parity;
+}
+
+/* The power of a size that is neither 0, 1 nor infinite, to a finite y. */
+static double at_pow_of_size(double size, double y)
+{
+    /* -(1024 - log2(the largest number + half of its last digit)). */
+    const double overflow = 8.0085662595372944372e-017;
+    const uint32_t of_size = at_high_word(size);
+    const uint32_t of_y = at_high_word(fabs(y));
+    const double y1 = at_without_low_word(y);
+    at_two log2;
+    double p_h;
+    double p_l;
+    double z;
+    if ((of_y > 0x41e00000u)
+        && ((of_y > 0x43f00000u) || (of_size < 0x3fefffffu) || (of_size > 0x3ff00000u))) {
+        return ((of_size < 0x3ff00000u) == (y < 0.0)) ? (double)INFINITY : 0.0;
+    }
+    log2 = (of_y > 0x41e00000u) ? at_log2_near_one(size) : at_log2(size);
+    p_l = ((y - y1) * log2.high) + (y * log2.low);
+    p_h = y1 * log2.high;
+    z = p_l + p_h;
+    if (z >= 1024.0) {
+        if ((z > 1024.0) || ((p_l + overflow) > (z - p_h))) {
+            return (double)INFINITY;
+        }
+    } else if (z <= -1075.0) {
+        if ((z < -1075.0) || (p_l <= (z - p_h))) {
+            return 0.0;
+        }
+    } else {
+        /* It is a number. */
+    }
+    return at_exp2_of_two(z, p_h, p_l);
+}
+
+static double at_pow(double x, double y)
+{
+    const double size = fabs(x);
+    const int parity = (signbit(x) != 0) ? at_parity(y) : AT_EVEN;
+    double power;
+    if ((y == 0.0) || (x == 1.0)) {
+        power = 1.0;
+    } else if (isnan(x) || isnan(y)) {
+        power = x + y;
+    } else if (isinf(y)) {
+        if (size == 1.0) {
+            power = 1.0;
+        } else {
+            power = ((size > 1.0) == (y > 0.0)) ? (double)INFINITY : 0.0;
+        }
+    } else if (y == 1.0) {
+        power = x;
+    } else if (y == -1.0) {
+        power = 1.0 / x;
+    } else if (y == 2.0) {
+        power = x * x;
+    } else if ((y == 0.5) && (signbit(x) == 0)) {
+        power = sqrt(x);
+    } else if ((parity == AT_NO_INTEGER) && (x < 0.0) && (isinf(x) == 0)) {
+        power = (double)NAN;
+    } else if ((size == 0.0) || (size == 1.0) || (isinf(size) != 0)) {
+        power = (y < 0.0) ? (1.0 / size) : size;
+        power = (parity == AT_ODD) ? -power : power;
+    } else {
+        power = at_pow_of_size(size, y);
+        power = (parity == AT_ODD) ? -power : power;
+    }
+    return power;
 }
 
 /* ---- Slots: what every channel was given last, with which stamp, and at which tick. */
@@ -1011,8 +1576,12 @@ static void at_run_linear(const at_plan *p, const at_linear *l, at_memory m)
 
 /* ---- Votes. Of integers: how many runs there were and the number of the first that counts; where the oldest waiting truth lies and
  * how many wait; the state that is followed, another one and since when; times of runs; of waiting truths the arrival and the run; of
- * each voter where its oldest error lies and how many there are; arrivals of errors. Of numbers: rows of runs, waiting truths, squares of
- * errors; of each voter the sum and the mean of these, and what it counts by its novelty. */
+ * each ring of errors where the oldest lies and how many there are; arrivals of errors. Of numbers: rows of runs, waiting truths, squares
+ * of errors; of each voter the sum and the mean of these and how many there are, and what it counts by its novelty.
+ *
+ * Where errors count for a time, all voters have one ring, and the square of one that said nothing is absent; else each has its own. Of
+ * errors that fade each ring has the last. A hedge has no errors: its ring says whether a truth has come, and when; its squares are the
+ * two sums of all voters, its sums those of each. */
 
 #define AT_RUNS 0
 #define AT_FIRST_RUN 1
@@ -1041,6 +1610,7 @@ typedef struct {
     at_real *squares;
     at_real *sums;
     at_real *means;
+    at_real *counts;
     at_real *trust;
     at_real *votes;
     at_real *weights;
@@ -1055,84 +1625,325 @@ static at_ballot at_ballot_of(const at_plan *p, const at_vote *v, at_memory m)
     b.arrived = &b.run_times[v->runs];
     b.run_of = &b.arrived[v->waiting];
     b.rings = &b.run_of[v->waiting];
-    b.error_times = &b.rings[2 * b.judged];
+    b.error_times = &b.rings[2 * v->rings];
     b.rows = &m.r[v->reals];
     b.truths = &b.rows[v->runs * b.voters];
     b.squares = &b.truths[v->waiting];
     b.sums = &b.squares[b.judged * v->errors];
     b.means = &b.sums[b.judged];
-    b.trust = &b.means[b.judged];
+    b.counts = &b.means[b.judged];
+    b.trust = &b.counts[b.judged];
     b.votes = &m.r[p->scratch];
     b.weights = &b.votes[b.voters];
     return b;
 }
 
-static int32_t at_error_place(const at_vote *v, const at_ballot *b, int32_t voter, int64_t nth)
+/* The ring of a voter. */
+static int32_t at_ring(const at_vote *v, int32_t voter)
 {
-    int64_t place = b->rings[2 * voter] + nth;
+    return (v->memory == AT_BY_TIME) ? 0 : voter;
+}
+
+/* Where an error lies within a ring, the oldest being the first. */
+static int32_t at_error_place(const at_vote *v, const at_ballot *b, int32_t ring, int64_t nth)
+{
+    int64_t place = b->rings[2 * ring] + nth;
     if (place >= (int64_t)v->errors) {
         place -= (int64_t)v->errors;
     }
-    return (voter * v->errors) + (int32_t)place;
+    return (int32_t)place;
 }
 
-static void at_forget_error(const at_vote *v, const at_ballot *b, int32_t voter)
+static at_real *at_square_of(const at_vote *v, const at_ballot *b, int32_t voter, int64_t nth)
 {
-    b->rings[2 * voter] = (b->rings[2 * voter] + 1) % (int64_t)v->errors;
-    b->rings[(2 * voter) + 1]--;
+    return &b->squares[(voter * v->errors) + at_error_place(v, b, at_ring(v, voter), nth)];
 }
 
-/* Takes the mean of what is in memory afresh. */
-static void at_refresh(const at_vote *v, const at_ballot *b, int32_t voter)
+static void at_forget_error(const at_vote *v, const at_ballot *b, int32_t ring)
 {
-    const int64_t count = b->rings[(2 * voter) + 1];
+    b->rings[2 * ring] = (b->rings[2 * ring] + 1) % (int64_t)v->errors;
+    b->rings[(2 * ring) + 1]--;
+}
+
+/* Takes the sum and the mean of what is in memory afresh, without the first so many. */
+static void at_refresh(const at_vote *v, const at_ballot *b, int32_t voter, int64_t without)
+{
+    const int64_t rows = b->rings[(2 * at_ring(v, voter)) + 1];
     at_real sum = AT_R(0.0);
+    at_real count = AT_R(0.0);
     int64_t nth;
-    for (nth = 0; nth < count; nth++) {
-        sum = sum + b->squares[at_error_place(v, b, voter, nth)];
+    for (nth = without; nth < rows; nth++) {
+        const at_real square = *at_square_of(v, b, voter, nth);
+        if (at_is_absent(square) == 0) {
+            sum = sum + square;
+            count = count + AT_R(1.0);
+        }
     }
     b->sums[voter] = sum;
-    b->means[voter] = (count > 0) ? (sum / (at_real)count) : AT_NAN;
+    b->counts[voter] = count;
+    b->means[voter] = (count > AT_R(0.0)) ? (sum / count) : AT_NAN;
 }
 
-static void at_observe_one(const at_vote *v, const at_ballot *b, at_memory m, int32_t voter, at_real vote,
-                           at_real truth, int64_t arrived)
+/* What is left after a time of an error that fades. */
+static at_real at_left(const at_vote *v, int64_t after)
 {
-    const int64_t count = b->rings[(2 * voter) + 1];
+    at_real left = AT_R(1.0);
+    if (AT_IS_USED(AT_FADES)) {
+        const at_real power = (at_real)at_exp2((double)(-at_seconds(after) / v->half_life));
+        left = (power < left) ? power : left;
+    }
+    return left;
+}
+
+/* Lets the first so many errors of all voters go. */
+static void at_forget_rows(const at_vote *v, const at_ballot *b, int64_t dropped)
+{
+    int32_t voter;
+    for (voter = 0; voter < b->judged; voter++) {
+        int any = 0;
+        int64_t nth;
+        for (nth = 0; nth < dropped; nth++) {
+            if (at_is_absent(*at_square_of(v, b, voter, nth)) == 0) {
+                any = 1;
+            }
+        }
+        if (any != 0) {
+            at_refresh(v, b, voter, dropped);
+        }
+    }
+    b->rings[0] = (b->rings[0] + dropped) % (int64_t)v->errors;
+    b->rings[1] -= dropped;
+}
+
+/* The square of the error of a voter; absent where it does not count. */
+static at_real at_judged(const at_ballot *b, int32_t voter, const at_real row[], at_real truth)
+{
+    const at_real vote = (voter < b->voters) ? row[voter] : AT_R(0.0);
     at_real square = (vote - truth) * (vote - truth);
-    int afresh = 0;
-    int32_t place;
-    if (!((truth * truth) <= AT_LARGEST) || (at_is_absent(square) != 0)) {
+    if (!((truth * truth) <= AT_LARGEST) || (at_is_absent(row[voter % b->voters]) != 0)) {
+        square = AT_NAN;
+    } else if (square > AT_LARGEST) {
+        square = AT_LARGEST;
+    } else {
+        /* It counts as it is. */
+    }
+    return square;
+}
+
+/* Remembers the errors of all voters at one truth, where they count for a time. */
+static void at_remember_row(const at_vote *v, const at_ballot *b, at_memory m, const at_real row[], at_real truth,
+                            int64_t arrived)
+{
+    int any = 0;
+    int32_t voter;
+    for (voter = 0; voter < b->judged; voter++) {
+        if (at_is_absent(at_judged(b, voter, row, truth)) == 0) {
+            any = 1;
+        }
+    }
+    if (any == 0) {
         return;
     }
-    if (square > AT_LARGEST) {
-        square = AT_LARGEST;
-    }
-    if ((v->memory == AT_BY_COUNT) && (count >= v->longest)) {
-        at_forget_error(v, b, voter);
-        afresh = 1;
-    } else if (count >= (int64_t)v->errors) {
-        at_forget_error(v, b, voter);
+    if (b->rings[1] >= (int64_t)v->errors) {
+        at_forget_rows(v, b, 1);
         m.i[AT_FLAGS] |= (int64_t)AT_FULL;
-        afresh = 1;
-    } else {
-        /* There is room. */
     }
-    place = at_error_place(v, b, voter, b->rings[(2 * voter) + 1]);
-    b->error_times[place] = arrived;
-    b->squares[place] = square;
-    b->rings[(2 * voter) + 1]++;
-    if (afresh != 0) {
-        at_refresh(v, b, voter);
+    b->error_times[at_error_place(v, b, 0, b->rings[1])] = arrived;
+    for (voter = 0; voter < b->judged; voter++) {
+        const at_real square = at_judged(b, voter, row, truth);
+        *at_square_of(v, b, voter, b->rings[1]) = square;
+        if (at_is_absent(square) == 0) {
+            b->sums[voter] = b->sums[voter] + square;
+            b->counts[voter] = b->counts[voter] + AT_R(1.0);
+            b->means[voter] = b->sums[voter] / b->counts[voter];
+        }
+    }
+    b->rings[1]++;
+}
+
+/* Remembers an error of a voter that has a ring of its own. */
+static void at_remember(const at_vote *v, const at_ballot *b, int32_t voter, at_real square, int64_t arrived)
+{
+    int64_t *ring = &b->rings[2 * voter];
+    if (v->memory == AT_FADING) {
+        const at_real left = (ring[1] > 0) ? at_left(v, at_minus(arrived, b->error_times[voter])) : AT_R(0.0);
+        const at_real mean = (at_is_absent(b->means[voter]) != 0) ? square : b->means[voter];
+        b->counts[voter] = (b->counts[voter] * left) + AT_R(1.0);
+        b->means[voter] = mean + ((square - mean) / b->counts[voter]);
+        b->error_times[voter] = arrived;
+        b->squares[voter] = square;
+        ring[1] = 1;
     } else {
-        b->sums[voter] = b->sums[voter] + square;
-        b->means[voter] = b->sums[voter] / (at_real)b->rings[(2 * voter) + 1];
+        const int full = (ring[1] >= (int64_t)v->errors) ? 1 : 0;
+        if (full != 0) {
+            at_forget_error(v, b, voter);
+        }
+        b->error_times[(voter * v->errors) + at_error_place(v, b, voter, ring[1])] = arrived;
+        *at_square_of(v, b, voter, ring[1]) = square;
+        ring[1]++;
+        if (full != 0) {
+            at_refresh(v, b, voter, 0);
+        } else {
+            b->sums[voter] = b->sums[voter] + square;
+            b->counts[voter] = b->counts[voter] + AT_R(1.0);
+            b->means[voter] = b->sums[voter] / b->counts[voter];
+        }
+    }
+}
+
+static void at_observe_errors(const at_vote *v, const at_ballot *b, at_memory m, const at_real row[], at_real truth,
+                              int64_t arrived)
+{
+    if (v->memory == AT_BY_TIME) {
+        at_remember_row(v, b, m, row, truth, arrived);
+    } else {
+        int32_t voter;
+        for (voter = 0; voter < b->judged; voter++) {
+            const at_real square = at_judged(b, voter, row, truth);
+            if (at_is_absent(square) == 0) {
+                at_remember(v, b, voter, square, arrived);
+            }
+        }
     }
 }
 
 static int at_keeps_errors(const at_vote *v)
 {
     return ((v->rule == AT_AUTO_WEIGHTED) || (v->rule == AT_BEST) || (v->rule == AT_GUARD)) ? 1 : 0;
+}
+
+/* What the voters of a hedge have lost beyond the best, the sum of what their mean has lost to their mixture, and their largest difference. */
+#define AT_GAP 0
+#define AT_WIDEST 1
+
+/* The rate of a hedge, infinite while voters that are not the best deserve nothing. */
+static at_real at_hedge_rate(const at_vote *v, const at_ballot *b)
+{
+    return v->rate / b->squares[(v->adaptive != 0) ? AT_GAP : AT_WIDEST];
+}
+
+static void at_divide(const at_ballot *b, at_real total)
+{
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        b->weights[voter] = b->weights[voter] / total;
+    }
+}
+
+static at_real at_hedge_share(at_real rate, at_real behind)
+{
+    return (behind == AT_R(0.0)) ? AT_R(1.0) : (at_real)at_exp((double)(-rate * behind));
+}
+
+static void at_hedge_weigh(const at_ballot *b, at_real rate)
+{
+    at_real best = (at_real)INFINITY;
+    at_real total = AT_R(0.0);
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        if ((at_is_absent(b->votes[voter]) == 0) && (b->sums[voter] < best)) {
+            best = b->sums[voter];
+        }
+    }
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            b->weights[voter] = at_hedge_share(rate, b->sums[voter] - best);
+            total = total + b->weights[voter];
+        }
+    }
+    at_divide(b, total);
+}
+
+static at_real at_loss_of(const at_ballot *b, int32_t voter, at_real truth)
+{
+    return (b->votes[voter] - truth) * (b->votes[voter] - truth);
+}
+
+/* What the mixture of the voters has lost where each has lost so much; taken relative to the least. */
+static at_real at_hedge_mix(const at_ballot *b, at_real rate, const at_real lost[])
+{
+    at_real least = (at_real)INFINITY;
+    at_real sum = AT_R(-0.0);
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        if ((at_is_absent(b->votes[voter]) == 0) && (lost[voter] < least)) {
+            least = lost[voter];
+        }
+    }
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            sum = sum + at_hedge_share(rate, lost[voter] - least);
+        }
+    }
+    return least - ((at_real)at_log((double)sum) / rate);
+}
+
+/* Adds what the votes of a run have lost by a truth; those that were absent lose what the others do. */
+static void at_hedge_lose(const at_vote *v, const at_ballot *b, at_real truth)
+{
+    at_real least = (at_real)INFINITY;
+    at_real most = -(at_real)INFINITY;
+    at_real mean = AT_R(-0.0);
+    at_real best = (at_real)INFINITY;
+    at_real mixed;
+    at_real rate;
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            const at_real loss = at_loss_of(b, voter, truth);
+            least = (loss < least) ? loss : least;
+            most = (loss > most) ? loss : most;
+        }
+    }
+    if (!isfinite(most - least)) {
+        return;
+    }
+    if ((most - least) > b->squares[AT_WIDEST]) {
+        b->squares[AT_WIDEST] = most - least;
+    }
+    rate = at_hedge_rate(v, b);
+    at_hedge_weigh(b, rate);
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            const at_real loss = at_loss_of(b, voter, truth) - least;
+            mean = mean + (b->weights[voter] * loss);
+            b->weights[voter] = b->sums[voter] + loss;
+        }
+    }
+    mixed = at_hedge_mix(b, rate, b->weights) - at_hedge_mix(b, rate, b->sums);
+    /* Written so that what is none counts as 0. */
+    if (!(mixed > AT_R(0.0))) {
+        mixed = AT_R(0.0);
+    }
+    if ((mean - mixed) > AT_R(0.0)) {
+        b->squares[AT_GAP] = b->squares[AT_GAP] + (mean - mixed);
+    }
+    for (voter = 0; voter < b->voters; voter++) {
+        b->sums[voter] = (at_is_absent(b->votes[voter]) != 0) ? (b->sums[voter] + mixed) : b->weights[voter];
+        best = (b->sums[voter] < best) ? b->sums[voter] : best;
+    }
+    for (voter = 0; voter < b->voters; voter++) {
+        b->sums[voter] = b->sums[voter] - best;
+    }
+}
+
+static void at_hedge_observe(const at_vote *v, const at_ballot *b, const at_real row[], at_real truth, int64_t arrived)
+{
+    int32_t voter;
+    if ((v->half_life > AT_R(0.0)) && (b->rings[1] > 0)) {
+        const at_real left = at_left(v, at_minus(arrived, b->error_times[0]));
+        b->squares[AT_GAP] = b->squares[AT_GAP] * left;
+        b->squares[AT_WIDEST] = b->squares[AT_WIDEST] * left;
+        for (voter = 0; voter < b->voters; voter++) {
+            b->sums[voter] = b->sums[voter] * left;
+        }
+    }
+    b->rings[1] = 1;
+    b->error_times[0] = arrived;
+    for (voter = 0; voter < b->voters; voter++) {
+        b->votes[voter] = row[voter];
+    }
+    at_hedge_lose(v, b, truth);
 }
 
 /* Hands over every truth that arrived up to `newest`. */
@@ -1142,7 +1953,7 @@ static void at_hand_over(const at_vote *v, const at_ballot *b, at_memory m, int6
         const int32_t place = (int32_t)m.i[v->ints + AT_WAITING_FROM];
         const int64_t run = b->run_of[place];
         const int64_t kept = m.i[v->ints + AT_RUNS] - run;
-        int32_t voter;
+        const at_real *row = &b->rows[(int32_t)(run % (int64_t)v->runs) * b->voters];
         if (b->arrived[place] > newest) {
             break;
         }
@@ -1150,16 +1961,12 @@ static void at_hand_over(const at_vote *v, const at_ballot *b, at_memory m, int6
         m.i[v->ints + AT_WAITING]--;
         if (kept > (int64_t)v->runs) {
             m.i[AT_FLAGS] |= (int64_t)AT_FULL;
-            continue;
-        }
-        for (voter = 0; (voter < b->voters) && (at_keeps_errors(v) != 0); voter++) {
-            const at_real vote = b->rows[((int32_t)(run % (int64_t)v->runs) * b->voters) + voter];
-            if (at_is_absent(vote) == 0) {
-                at_observe_one(v, b, m, voter, vote, b->truths[place], b->arrived[place]);
-                if (v->rule == AT_GUARD) {
-                    at_observe_one(v, b, m, b->voters + voter, AT_R(0.0), b->truths[place], b->arrived[place]);
-                }
-            }
+        } else if (at_keeps_errors(v) != 0) {
+            at_observe_errors(v, b, m, row, b->truths[place], b->arrived[place]);
+        } else if (AT_IS_USED(AT_HEDGES) && (v->rule == AT_HEDGE)) {
+            at_hedge_observe(v, b, row, b->truths[place], b->arrived[place]);
+        } else {
+            /* It goes by no truths. */
         }
     }
 }
@@ -1167,18 +1974,36 @@ static void at_hand_over(const at_vote *v, const at_ballot *b, at_memory m, int6
 static void at_forget_errors(const at_vote *v, const at_ballot *b, int64_t newest)
 {
     const int64_t forgotten = at_minus(newest, v->longest);
-    int32_t voter;
-    for (voter = 0; voter < b->judged; voter++) {
-        int any = 0;
-        while ((b->rings[(2 * voter) + 1] > 0)
-               && (b->error_times[at_error_place(v, b, voter, 0)] <= forgotten)) {
-            at_forget_error(v, b, voter);
-            any = 1;
+    if (v->memory == AT_BY_TIME) {
+        int64_t dropped = 0;
+        while ((dropped < b->rings[1]) && (b->error_times[at_error_place(v, b, 0, dropped)] <= forgotten)) {
+            dropped++;
         }
-        if (any != 0) {
-            at_refresh(v, b, voter);
+        if (dropped > 0) {
+            at_forget_rows(v, b, dropped);
         }
+    } else if (v->memory == AT_FADING) {
+        int32_t voter;
+        for (voter = 0; voter < b->judged; voter++) {
+            if ((b->rings[(2 * voter) + 1] > 0) && (b->error_times[voter] <= forgotten)) {
+                at_forget_error(v, b, voter);
+                at_refresh(v, b, voter, 0);
+            }
+        }
+    } else {
+        /* So many count, however old they are. */
     }
+}
+
+/* How many errors of a voter there are: of those that fade, what they come to by now. */
+static at_real at_errors_of(const at_vote *v, const at_ballot *b, int32_t voter, int64_t newest)
+{
+    at_real count = b->counts[voter];
+    if ((v->memory == AT_FADING) && (b->rings[(2 * voter) + 1] > 0)) {
+        const int64_t idle = at_minus(newest, b->error_times[voter]);
+        count = count * at_left(v, (idle > 0) ? idle : 0);
+    }
+    return count;
 }
 
 static at_real at_mean_of(const at_ballot *b)
@@ -1230,6 +2055,20 @@ static int at_any_outside(const at_vote *v, const at_ballot *b)
         }
     }
     return any;
+}
+
+/* Lets each vote count by its novelty; the sum of the weights. */
+static at_real at_distrust(const at_ballot *b)
+{
+    at_real total = AT_R(-0.0);
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            b->weights[voter] = b->weights[voter] * b->trust[voter];
+            total = total + b->weights[voter];
+        }
+    }
+    return total;
 }
 
 /* Draws weights towards equal ones, and makes them add up to one. */
@@ -1294,9 +2133,13 @@ static void at_raise(const at_vote *v, const at_ballot *b)
 static at_real at_weight_of(const at_vote *v, at_real mean, at_real best, at_real roots, at_real known)
 {
     at_real weight;
-    if ((v->form == AT_INVERSE_POWER) || (v->form == AT_INVERSE_FOURTH_POWER)) {
+    if (v->form == AT_INVERSE_POWER) {
         const at_real ratio = best / ((mean > AT_SMALLEST) ? mean : AT_SMALLEST);
-        weight = (v->form == AT_INVERSE_POWER) ? ratio : (ratio * ratio);
+        /* Of the mean square, so half of the power. */
+        weight = ratio;
+        if (AT_IS_USED(AT_ANY_POWER) && (v->power != AT_R(1.0))) {
+            weight = (at_real)at_pow((double)ratio, (double)v->power);
+        }
     } else if (roots > AT_R(0.0)) {
         weight = mean / (roots * roots);
     } else {
@@ -1359,13 +2202,7 @@ static at_real at_weigh(const at_vote *v, const at_ballot *b)
         /* As they are. */
     }
     if ((v->form != AT_AS_PRINTED_RAW) && (at_any_outside(v, b) != 0)) {
-        total = AT_R(-0.0);
-        for (voter = 0; voter < b->voters; voter++) {
-            if (at_is_absent(b->votes[voter]) == 0) {
-                b->weights[voter] = b->weights[voter] * b->trust[voter];
-                total = total + b->weights[voter];
-            }
-        }
+        total = at_distrust(b);
     }
     return total;
 }
@@ -1379,11 +2216,31 @@ static at_real at_auto_weighted(const at_vote *v, const at_ballot *b)
     for (voter = 0; voter < b->voters; voter++) {
         if (at_is_absent(b->votes[voter]) == 0) {
             sum = sum + (b->weights[voter] * b->votes[voter]);
-            b->weights[voter] = b->weights[voter] / total;
             any = 1;
         }
     }
+    at_divide(b, total);
     return ((any != 0) && (total != AT_R(0.0))) ? (sum / total) : AT_NAN;
+}
+
+static at_real at_hedge(const at_vote *v, const at_ballot *b)
+{
+    at_real sum = AT_R(-0.0);
+    int32_t voter;
+    if (at_present(b) == 0) {
+        return AT_NAN;
+    }
+    at_hedge_weigh(b, at_hedge_rate(v, b));
+    at_raise(v, b);
+    if (at_any_outside(v, b) != 0) {
+        at_divide(b, at_distrust(b));
+    }
+    for (voter = 0; voter < b->voters; voter++) {
+        if (at_is_absent(b->votes[voter]) == 0) {
+            sum = sum + (b->weights[voter] * b->votes[voter]);
+        }
+    }
+    return sum;
 }
 
 /* The mean of the votes in the middle. */
@@ -1448,7 +2305,7 @@ static int32_t at_best(const at_vote *v, const at_ballot *b)
     return chosen;
 }
 
-static at_real at_judge(const at_vote *v, const at_ballot *b)
+static at_real at_judge(const at_vote *v, const at_ballot *b, int64_t newest)
 {
     const int outside = at_any_outside(v, b);
     at_real judged = AT_HARMLESS;
@@ -1461,7 +2318,7 @@ static at_real at_judge(const at_vote *v, const at_ballot *b)
                 break;
             }
             if ((at_is_absent(b->means[voter]) == 0) && (at_is_absent(b->means[zero]) == 0)
-                && ((at_real)b->rings[(2 * zero) + 1] >= v->min_truths)) {
+                && (at_errors_of(v, b, zero, newest) >= v->min_truths)) {
                 if (b->means[voter] >= b->means[zero]) {
                     judged = AT_HARMS;
                     break;
@@ -1474,10 +2331,10 @@ static at_real at_judge(const at_vote *v, const at_ballot *b)
     return judged;
 }
 
-static at_real at_guard(const at_vote *v, const at_ballot *b, at_real *reason)
+static at_real at_guard(const at_vote *v, const at_ballot *b, int64_t newest, at_real *reason)
 {
     const int32_t count = at_present(b);
-    const at_real judged = at_judge(v, b);
+    const at_real judged = at_judge(v, b, newest);
     const int passes = ((judged == AT_HARMS) || (judged == AT_NOVEL)) ? 0 : 1;
     at_real value = at_mean_of(b);
     int32_t voter;
@@ -1561,7 +2418,9 @@ static at_real at_combine(const at_vote *v, const at_ballot *b, at_memory m, at_
     } else if (v->rule == AT_MIDDLE) {
         value = at_middle(v, b);
     } else if (v->rule == AT_GUARD) {
-        value = at_guard(v, b, reason);
+        value = at_guard(v, b, at_minus(m.i[AT_LAST], v->embargo), reason);
+    } else if (AT_IS_USED(AT_HEDGES) && (v->rule == AT_HEDGE)) {
+        value = at_hedge(v, b);
     } else if (v->rule == AT_STATE_GATE) {
         value = at_state_gate(v, b, m, reason);
     } else if (v->rule == AT_MEAN) {
@@ -1629,7 +2488,7 @@ static void at_run_vote(const at_plan *p, const at_vote *v, at_memory m)
     if (v->truth >= 0) {
         const int64_t newest = at_minus(now, v->embargo);
         at_hand_over(v, &b, m, newest);
-        if ((at_keeps_errors(v) != 0) && (v->memory == AT_BY_TIME)) {
+        if (at_keeps_errors(v) != 0) {
             at_forget_errors(v, &b, newest);
         }
     }
@@ -1731,13 +2590,13 @@ static void at_segment_vote(const at_plan *p, const at_vote *v, at_memory m)
 static void at_shift_vote(const at_plan *p, const at_vote *v, at_memory m, int64_t shift)
 {
     const at_ballot b = at_ballot_of(p, v, m);
-    int32_t voter;
+    int32_t ring;
     m.i[v->ints + AT_FOLLOWED] = -1;
     m.i[v->ints + AT_OTHER] = -1;
-    for (voter = 0; (voter < b.judged) && (at_keeps_errors(v) != 0); voter++) {
+    for (ring = 0; ring < v->rings; ring++) {
         int64_t nth;
-        for (nth = 0; nth < b.rings[(2 * voter) + 1]; nth++) {
-            int64_t *arrived = &b.error_times[at_error_place(v, &b, voter, nth)];
+        for (nth = 0; nth < b.rings[(2 * ring) + 1]; nth++) {
+            int64_t *arrived = &b.error_times[(ring * v->errors) + at_error_place(v, &b, ring, nth)];
             *arrived = at_plus(*arrived, shift);
         }
     }
@@ -2137,6 +2996,209 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
     }
 }
 
+/* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at and since
+ * when it contradicts the others, each behind whether it is known; whether it is out, whether its last value passed; whether it agrees
+ * again, and since when. Within a step: the values, what of the form is left without the columns that are not there, the standardised
+ * columns, and what pulls at each. */
+
+#define AT_HAS_LOOKED 0
+#define AT_LOOKED 1
+#define AT_CONTRADICTS 2
+#define AT_CONTRADICTS_SINCE 3
+#define AT_IS_OUT 4
+#define AT_PASSES 5
+#define AT_AGREES 6
+#define AT_AGREES_SINCE 7
+#define AT_OF_SENSOR 8
+
+/* Whether something has lasted for so long; it begins now where it had not. */
+static int at_lasts(int64_t since[], int64_t now, int64_t length)
+{
+    if (since[0] == 0) {
+        since[0] = 1;
+        since[1] = now;
+    }
+    return (at_minus(now, since[1]) >= length) ? 1 : 0;
+}
+
+/* Takes a column out of a symmetric form: it is then whatever makes the form smallest. */
+static void at_free(at_real matrix[], int32_t columns, int32_t column)
+{
+    const at_real *own = &matrix[column * columns];
+    int32_t row;
+    int32_t nth;
+    if (own[column] > AT_R(0.0)) {
+        for (row = 0; row < columns; row++) {
+            at_real *other = &matrix[row * columns];
+            if (row != column) {
+                const at_real along = other[column] / own[column];
+                for (nth = 0; nth < columns; nth++) {
+                    other[nth] = other[nth] - (along * own[nth]);
+                }
+            }
+        }
+        for (row = 0; row < columns; row++) {
+            matrix[(row * columns) + column] = AT_R(0.0);
+            matrix[(column * columns) + row] = AT_R(0.0);
+        }
+    }
+}
+
+/* How far values are apart without the channels that are out, but with this one. */
+static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, int32_t with)
+{
+    const int32_t n = c->columns;
+    const at_real *values = &m.r[p->scratch];
+    at_real *matrix = &m.r[p->scratch + (2 * c->channels)];
+    at_real *z = &matrix[n * n];
+    at_real *pull = &z[n];
+    const at_real *lower = c->matrix;
+    at_real total = AT_R(-0.0);
+    int32_t row;
+    int32_t nth;
+    for (row = 0; row < n; row++) {
+        for (nth = 0; nth <= row; nth++) {
+            matrix[(row * n) + nth] = lower[nth];
+            matrix[(nth * n) + row] = lower[nth];
+        }
+        lower = &lower[row + 1];
+    }
+    for (nth = 0; nth < n; nth++) {
+        const int32_t place = c->places[nth];
+        const int32_t channel = place % c->channels;
+        z[nth] = (values[place] - c->mean[nth]) / c->scale[nth];
+        if ((at_is_absent(z[nth]) != 0)
+            || ((channel != with) && (m.i[c->ints + (AT_OF_SENSOR * channel) + AT_IS_OUT] != 0))) {
+            z[nth] = AT_R(0.0);
+            at_free(matrix, n, nth);
+        }
+    }
+    for (row = 0; row < n; row++) {
+        pull[row] = AT_R(-0.0);
+        for (nth = 0; nth < n; nth++) {
+            pull[row] = pull[row] + (matrix[(row * n) + nth] * z[nth]);
+        }
+    }
+    for (nth = 0; nth < n; nth++) {
+        total = total + (pull[nth] * z[nth]);
+    }
+    return ((total > AT_R(0.0)) ? total : AT_R(0.0)) / c->usual;
+}
+
+static at_real at_part(at_real pull, at_real own)
+{
+    return (own > AT_R(0.0)) ? ((pull * pull) / own) : AT_R(0.0);
+}
+
+/* How much of that one channel has in it. */
+static at_real at_share(const at_plan *p, const at_cross_check *c, at_memory m, int32_t channel)
+{
+    const int32_t n = c->columns;
+    const int32_t first = c->own[2 * channel];
+    const int32_t second = c->own[(2 * channel) + 1];
+    const at_real *matrix = &m.r[p->scratch + (2 * c->channels)];
+    const at_real *pull = &matrix[(n * n) + n];
+    at_real share = AT_R(0.0);
+    if (first >= 0) {
+        const at_real *own = &matrix[first * n];
+        share = at_part(pull[first], own[first]);
+        if (second >= 0) {
+            const at_real along = (own[first] > AT_R(0.0)) ? (own[second] / own[first]) : AT_R(0.0);
+            share = share
+                + at_part(pull[second] - (along * pull[first]), matrix[(second * n) + second] - (along * own[second]));
+        }
+        share = share / c->usual;
+    }
+    return share;
+}
+
+/* Finds which sensors contradict the others. */
+static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    at_real apart = at_apart(p, c, m, -1);
+    at_real most = at_share(p, c, m, 0);
+    int32_t suspect = 0;
+    int32_t nth;
+    for (nth = 1; nth < c->channels; nth++) {
+        const at_real share = at_share(p, c, m, nth);
+        if (share > most) {
+            most = share;
+            suspect = nth;
+        }
+    }
+    if (!((apart > c->limit) && ((apart - most) <= c->limit))) {
+        suspect = -1;
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        if (suspect != nth) {
+            sensor[AT_CONTRADICTS] = 0;
+        } else if (at_lasts(&sensor[AT_CONTRADICTS], now, c->after) != 0) {
+            sensor[AT_IS_OUT] = 1;
+            sensor[AT_CONTRADICTS] = 0;
+        } else {
+            /* Not for long enough. */
+        }
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        if ((sensor[AT_IS_OUT] != 0) && (at_is_absent(m.r[p->scratch + nth]) == 0)) {
+            apart = at_apart(p, c, m, nth);
+            if (apart > c->limit) {
+                sensor[AT_AGREES] = 0;
+            } else if (at_lasts(&sensor[AT_AGREES], now, c->recover) != 0) {
+                sensor[AT_IS_OUT] = 0;
+                sensor[AT_AGREES] = 0;
+            } else {
+                /* Not for long enough. */
+            }
+        }
+    }
+}
+
+static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    int64_t stamp;
+    int32_t nth;
+    for (nth = 0; nth < (2 * c->channels); nth++) {
+        m.r[p->scratch + nth] = at_port(p, m, c->signal, nth, &stamp);
+    }
+    if (c->columns > 0) {
+        at_compare(p, c, m);
+    }
+    for (nth = 0; nth < c->channels; nth++) {
+        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+        const at_real value = at_port(p, m, c->signal, nth, &stamp);
+        const int there = (at_is_absent(value) == 0) ? 1 : 0;
+        const int is_new =
+            ((there != 0) && ((sensor[AT_HAS_LOOKED] == 0) || (sensor[AT_LOOKED] < stamp))) ? 1 : 0;
+        const int passes = ((there != 0) && (sensor[AT_IS_OUT] == 0)) ? 1 : 0;
+        at_real reason = AT_R(0.0);
+        if (is_new != 0) {
+            sensor[AT_HAS_LOOKED] = 1;
+            sensor[AT_LOOKED] = stamp;
+        }
+        if ((passes != 0) && (is_new != 0)) {
+            at_give(p, m, c->slot + nth, value, stamp);
+        } else if ((passes == 0) && (sensor[AT_PASSES] != 0)) {
+            at_give(p, m, c->slot + nth, AT_NAN, now);
+        } else {
+            /* As it was. */
+        }
+        sensor[AT_PASSES] = (int64_t)passes;
+        if (c->columns == 0) {
+            reason = AT_R(3.0);
+        } else if (sensor[AT_IS_OUT] != 0) {
+            reason = (sensor[AT_AGREES] != 0) ? AT_R(2.0) : AT_R(1.0);
+        } else {
+            /* It agrees. */
+        }
+        at_give(p, m, c->slot + c->channels + nth, reason, now);
+    }
+}
+
 /* ---- The plan. */
 
 static void at_run(const at_plan *p, at_memory m, const at_step *step)
@@ -2146,40 +3208,69 @@ static void at_run(const at_plan *p, at_memory m, const at_step *step)
         at_look(p, m, step->nth);
         break;
     case AT_SLOPE:
-        at_run_slope(p, &p->slope[step->nth], m);
+        if (AT_IS_USED(AT_SLOPE)) {
+            at_run_slope(p, &p->slope[step->nth], m);
+        }
         break;
     case AT_LAG:
-        at_run_lag(p, &p->lag[step->nth], m);
+        if (AT_IS_USED(AT_LAG)) {
+            at_run_lag(p, &p->lag[step->nth], m);
+        }
         break;
     case AT_FIRST_ORDER:
-        at_run_first_order(p, &p->first_order[step->nth], m);
+        if (AT_IS_USED(AT_FIRST_ORDER)) {
+            at_run_first_order(p, &p->first_order[step->nth], m);
+        }
         break;
     case AT_LINEAR:
-        at_run_linear(p, &p->linear[step->nth], m);
+        if (AT_IS_USED(AT_LINEAR)) {
+            at_run_linear(p, &p->linear[step->nth], m);
+        }
         break;
     case AT_VOTE:
-        at_run_vote(p, &p->vote[step->nth], m);
+        if (AT_IS_USED(AT_VOTE)) {
+            at_run_vote(p, &p->vote[step->nth], m);
+        }
         break;
     case AT_COMPENSATE:
-        at_run_compensate(p, &p->compensate[step->nth], m);
+        if (AT_IS_USED(AT_COMPENSATE)) {
+            at_run_compensate(p, &p->compensate[step->nth], m);
+        }
         break;
     case AT_STABILITY:
-        at_run_stability(p, &p->stability[step->nth], m);
+        if (AT_IS_USED(AT_STABILITY)) {
+            at_run_stability(p, &p->stability[step->nth], m);
+        }
         break;
     case AT_SAFE_STATE:
-        at_run_safe_state(p, &p->safe_state[step->nth], m);
+        if (AT_IS_USED(AT_SAFE_STATE)) {
+            at_run_safe_state(p, &p->safe_state[step->nth], m);
+        }
         break;
     case AT_UNCORRECTED:
-        at_run_uncorrected(p, &p->uncorrected[step->nth], m);
+        if (AT_IS_USED(AT_UNCORRECTED)) {
+            at_run_uncorrected(p, &p->uncorrected[step->nth], m);
+        }
         break;
     case AT_LOSS:
-        at_run_loss(p, &p->loss[step->nth], m);
+        if (AT_IS_USED(AT_LOSS)) {
+            at_run_loss(p, &p->loss[step->nth], m);
+        }
         break;
     case AT_SETTLED:
-        at_run_settled(p, &p->settled[step->nth], m);
+        if (AT_IS_USED(AT_SETTLED)) {
+            at_run_settled(p, &p->settled[step->nth], m);
+        }
+        break;
+    case AT_CROSS_CHECK:
+        if (AT_IS_USED(AT_CROSS_CHECK)) {
+            at_run_cross_check(p, &p->cross_check[step->nth], m);
+        }
         break;
     default:
-        at_run_pick(p, &p->pick[step->nth], m);
+        if (AT_IS_USED(AT_PICK)) {
+            at_run_pick(p, &p->pick[step->nth], m);
+        }
         break;
     }
 }
@@ -2219,6 +3310,11 @@ static void at_begin(const at_plan *p, at_memory m, const at_step *step, int seg
     case AT_SETTLED:
         for (nth = 0; nth <= AT_NEWEST_LOSS; nth++) {
             m.i[p->settled[step->nth].ints + nth] = 0;
+        }
+        break;
+    case AT_CROSS_CHECK:
+        for (nth = 0; nth < (AT_OF_SENSOR * p->cross_check[step->nth].channels); nth++) {
+            m.i[p->cross_check[step->nth].ints + nth] = 0;
         }
         break;
     default:
@@ -2323,7 +3419,7 @@ uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in
 /* ---- Saved states: a name, the revision, how much there is, the integers, the numbers as those of double precision, a checksum. */
 
 #define AT_HEADER 5
-#define AT_NAME UINT64_C(0x3120432068746120) /* " ath C 1" */
+#define AT_NAME UINT64_C(0x3220432068746120) /* " ath C 2" */
 
 static void at_put_word(uint8_t bytes[], size_t nth, uint64_t word)
 {

@@ -138,14 +138,15 @@ typedef struct {
 #define AT_FALLBACK 4
 #define AT_GUARD 5
 #define AT_STATE_GATE 6
+#define AT_HEDGE 7
 
 #define AT_BY_TIME 0
 #define AT_BY_COUNT 1
+#define AT_FADING 2
 
 #define AT_INVERSE_POWER 0
 #define AT_AS_PRINTED 1
 #define AT_AS_PRINTED_RAW 2
-#define AT_INVERSE_FOURTH_POWER 3
 
 typedef struct {
     int32_t rule;
@@ -161,12 +162,17 @@ typedef struct {
     int64_t ahead;
     int64_t limit;
     int64_t embargo;
-    int32_t runs;    /* room for so many runs and truths that wait, and for the errors of each voter */
+    int32_t runs;    /* room for so many runs and truths that wait, and for so many errors in so many rings */
     int32_t waiting;
     int32_t errors;
+    int32_t rings;
     int32_t memory;
-    int64_t longest; /* how long errors count, or how many */
+    int64_t longest; /* how long errors count */
+    at_real half_life; /* of errors that fade, in seconds; 0 where they do not */
     int32_t form;
+    at_real power;    /* of the mean square of the errors */
+    at_real rate;     /* of a hedge, and whether it is found on the way */
+    int32_t adaptive;
     at_real shrinkage;
     at_real floor;
     at_real share;
@@ -261,6 +267,24 @@ typedef struct {
     int32_t channels;
 } at_pick;
 
+/* How sensors go together. */
+typedef struct {
+    int32_t signal; /* all channels now, then all of them a lag ago */
+    int32_t slot;
+    int32_t channels;
+    int32_t columns;        /* of the fit; 0 where nothing was learned */
+    const int32_t *places;  /* of each column among these values */
+    const int32_t *own;     /* of each channel its two columns; -1 where there is none */
+    const at_real *mean;
+    const at_real *scale;
+    const at_real *matrix;  /* a lower triangle row by row */
+    at_real usual;
+    at_real limit;
+    int64_t after;
+    int64_t recover;
+    int32_t ints;
+} at_cross_check;
+
 #define AT_SLOPE 0
 #define AT_LAG 1
 #define AT_FIRST_ORDER 2
@@ -273,7 +297,12 @@ typedef struct {
 #define AT_LOSS 9
 #define AT_SETTLED 10
 #define AT_PICK 11
-#define AT_GATHER 12 /* as a step: reads whether anything in a gather is new */
+#define AT_CROSS_CHECK 12
+/* Parts of votes, beside these kinds, that a graph may do without. */
+#define AT_HEDGES 13
+#define AT_ANY_POWER 14
+#define AT_FADES 15
+#define AT_GATHER 16 /* as a step: reads whether anything in a gather is new */
 
 /* What is done at a tick, in order: a kind and the number of its parameters in the table of that kind. */
 typedef struct {
@@ -316,6 +345,7 @@ typedef struct {
     const at_loss *loss;
     const at_settled *settled;
     const at_pick *pick;
+    const at_cross_check *cross_check;
 } at_plan;
 
 /* The state of a plan. */

@@ -62,17 +62,54 @@ pub enum ExportError {
 /// A node that is not exported.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The node.
+    /// The node; of several instances that are refused alike their common name.
     pub node: String,
+    /// How many instances of it.
+    pub instances: usize,
     /// What cannot be exported.
     pub why: String,
     /// What to do.
     pub way: String,
 }
 
+impl Refusal {
+    /// One more instance of a node among those that are refused: what is the same for several is one refusal.
+    pub(crate) fn count(
+        all: &mut Vec<Self>,
+        name: &str,
+        instance: String,
+        why: String,
+        way: String,
+    ) {
+        let is_of_node = |node: &str| {
+            node.strip_prefix(name)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let known = all
+            .iter_mut()
+            .find(|known| is_of_node(&known.node) && known.why == why && known.way == way);
+        match known {
+            Some(known) => {
+                name.clone_into(&mut known.node);
+                known.instances += 1;
+            }
+            None => all.push(Self {
+                node: instance,
+                instances: 1,
+                why,
+                way,
+            }),
+        }
+    }
+}
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "`{}`: {}; {}", self.node, self.why, self.way)
+        write!(f, "`{}`", self.node)?;
+        if self.instances > 1 {
+            write!(f, " ({} instances)", self.instances)?;
+        }
+        write!(f, ": {}; {}", self.why, self.way)
     }
 }
 

@@ -80,6 +80,15 @@ impl Layout {
 pub const GUARD: i64 = 5;
 /// See [`GUARD`].
 pub const STATE_GATE: i64 = 6;
+/// See [`GUARD`].
+pub const HEDGE: i64 = 7;
+
+/// How long errors count, by its number in the runtime: for a time.
+pub const BY_TIME: i64 = 0;
+/// So many of them.
+pub const BY_COUNT: i64 = 1;
+/// Ever less.
+pub const FADING: i64 = 2;
 
 impl Form {
     /// How many votes a vote has, and of how many it keeps errors: a guard compares each with predicting zero.
@@ -236,6 +245,15 @@ impl Record {
     #[must_use]
     pub fn place_of(&self, name: &str) -> usize {
         usize::try_from(self.int_of(name)).unwrap_or(0)
+    }
+
+    /// A number; 0 where the kind has none of the name.
+    #[must_use]
+    pub fn real_of(&self, name: &str) -> f64 {
+        match self.field(name) {
+            Some(Field::Real(value)) => *value,
+            _ => 0.0,
+        }
     }
 
     /// Whole numbers; none where the kind has none of the name.

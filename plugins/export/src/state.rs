@@ -6,6 +6,7 @@
 mod image;
 mod nodes;
 mod snapshot;
+mod votes;
 
 use athermal_core::engine::{Engine, fnv_1a};
 use thiserror::Error;

@@ -171,8 +171,13 @@ pub fn operations(form: &Form) -> usize {
             });
             2 * width + novelty.map_or(0, |directions| width * (4 + 2 * directions))
         }
-        // The memory of every voter is summed anew.
-        "vote" => 2 * form.voters(node).1 * node.place_of("errors") + 40,
+        // The memory of every voter is summed anew, and each weight is a power or an exponential.
+        "vote" => form.voters(node).1 * (2 * node.place_of("errors") + 80) + 40,
+        // Of every column that is not there the form is made anew, once for all and once for each sensor that is out.
+        "cross_check" => {
+            let (columns, channels) = (node.place_of("columns"), node.place_of("channels"));
+            (channels + 1) * columns * columns * (2 * columns + 4)
+        }
         _ => 40,
     };
     form.nodes.iter().map(of_node).sum()
@@ -250,6 +255,19 @@ fn header(form: &Form) -> String {
         crate::ticks::TICKS,
         form.period_ns,
         window_ticks(form),
+    );
+    let used: Vec<String> = (tables::used(form).iter())
+        .map(|part| format!("(1u << {part})"))
+        .collect();
+    let _ = write!(
+        text,
+        "/* What the graph uses of the runtime, for a program with this graph alone. */\n\
+         #ifdef ATHERMAL_PLAN\n#define AT_USES ({})\n#endif\n\n",
+        if used.is_empty() {
+            "0u".to_owned()
+        } else {
+            used.join(" | ")
+        }
     );
     for (what, ports) in [("IN", &form.sources), ("OUT", &form.outputs)] {
         let _ = writeln!(text, "enum {{");

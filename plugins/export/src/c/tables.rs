@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use athermal_core::engine::fnv_1a;
 
-use crate::form::{Bundle, Entry, Field, Form, Record, Step};
+use crate::form::{Bundle, Entry, Field, Form, HEDGE, Record, Step};
 
 /// The kinds of the runtime, in the order of its table of plans, and as its steps name them.
-const KINDS: [(&str, &str); 12] = [
+const KINDS: [(&str, &str); 13] = [
     ("slope", "AT_SLOPE"),
     ("lag", "AT_LAG"),
     ("first_order", "AT_FIRST_ORDER"),
@@ -20,7 +20,34 @@ const KINDS: [(&str, &str); 12] = [
     ("loss", "AT_LOSS"),
     ("settled", "AT_SETTLED"),
     ("pick", "AT_PICK"),
+    ("cross_check", "AT_CROSS_CHECK"),
 ];
+
+/// The rule of votes, and their form of weights, that take a power.
+const AUTO_WEIGHTED: i64 = 0;
+const INVERSE_POWER: i64 = 0;
+
+/// What a graph uses of the runtime: the kinds of its nodes, and of votes what not all of them need.
+pub(super) fn used(form: &Form) -> Vec<&'static str> {
+    let any = |is: &dyn Fn(&Record) -> bool| form.nodes.iter().any(is);
+    let kinds = KINDS.iter().filter(|(kind, _)| any(&|of| of.kind == *kind));
+    let of_votes = [
+        ("AT_HEDGES", any(&|of| of.int_of("rule") == HEDGE)),
+        (
+            "AT_ANY_POWER",
+            any(&|of| {
+                (of.int_of("rule"), of.int_of("form")) == (AUTO_WEIGHTED, INVERSE_POWER)
+                    && of.real_of("power") != 1.0
+            }),
+        ),
+        ("AT_FADES", any(&|of| of.real_of("half_life") > 0.0)),
+    ];
+    let of_votes = of_votes.into_iter().filter(|(_, is)| *is);
+    kinds
+        .map(|(_, part)| *part)
+        .chain(of_votes.map(|(part, _)| part))
+        .collect()
+}
 
 /// A number with all of its bits.
 pub(super) fn hex(value: f64) -> String {

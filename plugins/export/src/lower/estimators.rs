@@ -5,7 +5,7 @@ use athermal_core::engine::Engine;
 use athermal_core::node::Predictor;
 use serde::Deserialize;
 
-use super::{Lowering, Options, Refused, first, refuse, unread};
+use super::{Lowering, Options, Refused, first, refuse, unfitted, unknown, unread};
 use crate::form::{Entry, Field, Record};
 
 /// How far a row is outside, as models hold it.
@@ -71,12 +71,7 @@ impl Lowering<'_> {
         for name in &used {
             match names().position(|known| known == name) {
                 Some(place) => entries.push(all[place]),
-                None => {
-                    return refuse(
-                        format!("its fit uses `{name}`, which the graph does not have"),
-                        "fit it again",
-                    );
-                }
+                None => return unknown(name),
             }
         }
         let directions = found
@@ -123,10 +118,7 @@ fn fixed(node: &PlannedNode, regressors: Vec<String>) -> Result<(Fit, Vec<String
             };
             Ok((same, regressors))
         }
-        _ => refuse(
-            "it has not been fitted",
-            "fit the graph first: `athermal fit`",
-        ),
+        _ => unfitted(),
     }
 }
 

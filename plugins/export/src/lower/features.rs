@@ -1,11 +1,12 @@
 //! Features: what runs on a controller of each kind, with its limits in the units of its channels.
 
 use athermal_control::{
-    Compensate, OpticalLoss, SafeState, Settled, Stability, Uncorrected, UntilFirst, WhenLost,
-    optical_loss,
+    Compensate, CrossCheck, OpticalLoss, SafeState, Settled, Stability, Uncorrected, UntilFirst,
+    WhenLost, optical_loss,
 };
 use athermal_core::channel::Channel;
-use athermal_core::compile::{PlannedNode, PlannedRole};
+use athermal_core::compile::{PlannedFit, PlannedNode, PlannedRole};
+use athermal_core::engine::Engine;
 use athermal_core::node::Inputs;
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
@@ -13,9 +14,10 @@ use athermal_core::unit::Unit;
 use athermal_features::slope::Cold;
 use athermal_features::slope::kernel::{FEWEST_ROWS, MOST_ROWS};
 use athermal_features::{FirstOrder, FirstOrderOutput, Lag, Slope};
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::{Lowering, Refused, SPARE, first, refuse, samples, unread};
+use super::{Lowering, Refused, SPARE, first, refuse, samples, unfitted, unknown, unread};
 use crate::form::{Field, Record};
 
 /// Sums over a run of rows of each channel.
@@ -46,6 +48,37 @@ impl Planned<'_> {
     }
 }
 
+/// How sensors go together, as models hold it.
+#[derive(Deserialize)]
+struct Learned {
+    uses: Vec<String>,
+    #[serde(default)]
+    agreement: Option<Agreement>,
+}
+
+/// Nothing was learned where it has no columns.
+#[derive(Default, Deserialize)]
+struct Agreement {
+    means: Vec<f64>,
+    scales: Vec<f64>,
+    matrix: Vec<f64>,
+    usual: f64,
+}
+
+/// The fit of a node that compares sensors.
+fn learned(engine: &Engine, node: &PlannedNode) -> Result<Learned, Refused> {
+    let Some(predictor) = engine.fitted().get(&node.instance()) else {
+        return unfitted();
+    };
+    let written = serde_json::to_value(&**predictor).and_then(serde_json::from_value);
+    written.or_else(|error| {
+        refuse(
+            format!("its fit cannot be read: {error}"),
+            "export it with the version that knows it",
+        )
+    })
+}
+
 /// The parameters of a node; the kind has been looked up, so that they are its own.
 pub(super) fn parameters<T: DeserializeOwned>(node: &PlannedNode) -> Result<T, Refused> {
     serde_json::from_value(node.spec.parameters()).or_else(|error| {
@@ -65,7 +98,11 @@ fn fits<T>(value: Option<T>) -> Result<T, Refused> {
 }
 
 impl Lowering<'_> {
-    pub(super) fn feature(&mut self, node: &PlannedNode) -> Result<Record, Refused> {
+    pub(super) fn feature(
+        &mut self,
+        engine: &Engine,
+        node: &PlannedNode,
+    ) -> Result<Record, Refused> {
         let PlannedRole::Feature {
             inputs,
             gathers,
@@ -83,10 +120,10 @@ impl Lowering<'_> {
             wanted,
         };
         match (node.kind.package, node.kind.name) {
-            ("athermal-control", "cross_check") => refuse(
-                "sensors cannot be compared with each other there",
-                "fit a graph that `extends` this one without the node, and with the sensors themselves where it is read",
-            ),
+            ("athermal-control", "cross_check") => {
+                let learned = learned(engine, node)?;
+                self.cross_check(&planned, &parameters(node)?, fit.as_ref(), learned)
+            }
             _ if fit.is_some() => refuse(
                 format!("a fitted `{}` cannot be exported", node.kind.name),
                 "use slopes, lags or first-order lags as features",
@@ -113,6 +150,52 @@ impl Lowering<'_> {
                 "leave it out of what is exported, by a graph whose outputs do not need it, or run the graph with `athermal serve`",
             ),
         }
+    }
+
+    fn cross_check(
+        &mut self,
+        of: &Planned<'_>,
+        spec: &CrossCheck,
+        fit: Option<&PlannedFit>,
+        Learned { uses, agreement }: Learned,
+    ) -> Result<Record, Refused> {
+        let (channels, signal) = of.port("signal");
+        let count = channels.len();
+        let regressors = fit.map_or(&[][..], |fit| &fit.regressors);
+        let mut places = Vec::with_capacity(uses.len());
+        for name in &uses {
+            match regressors.iter().position(|known| known.name == *name) {
+                Some(place) => places.push(place as i64),
+                None => return unknown(name),
+            }
+        }
+        let agreement = agreement.unwrap_or_default();
+        let columns = agreement.means.len();
+        places.truncate(columns);
+        let mut own = Vec::with_capacity(2 * count);
+        for channel in 0..count {
+            let of_channel = |&(_, &place): &(usize, &i64)| place as usize % count == channel;
+            let mut columns = places.iter().enumerate().filter(of_channel);
+            let mut next = || columns.next().map_or(-1, |(column, _)| column as i64);
+            own.extend([next(), next()]);
+        }
+        self.scratch(2 * count + columns * columns + 2 * columns);
+        Ok(of
+            .record("cross_check")
+            .int("signal", signal)
+            .int("slot", of.slot())
+            .int("channels", count)
+            .int("columns", columns)
+            .with("places", Field::Ints(places))
+            .with("own", Field::Ints(own))
+            .reals("mean", agreement.means)
+            .reals("scale", agreement.scales)
+            .reals("matrix", agreement.matrix)
+            .real("usual", agreement.usual)
+            .real("limit", spec.limit)
+            .with("after", Field::Int(spec.after.as_ns()))
+            .with("recover", Field::Int(spec.recover.as_ns()))
+            .int("ints", self.ints(8 * count)))
     }
 
     fn slope(&mut self, of: &Planned<'_>, spec: &Slope) -> Result<Record, Refused> {

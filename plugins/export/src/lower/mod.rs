@@ -50,19 +50,17 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
         places.push(nodes.len());
         match lowering.node(engine, node, options) {
             Ok(record) => nodes.push(record),
-            Err((why, way)) => refusals.push(Refusal {
-                node: node.instance(),
-                why,
-                way,
-            }),
+            Err((why, way)) => {
+                Refusal::count(&mut refusals, &node.name, node.instance(), why, way);
+            }
         }
     }
-    let planned = plan.sources.iter().filter(|of| of.planned.is_some());
-    refusals.extend(planned.map(|source| Refusal {
-        node: source.name.clone(),
-        why: "a signal that is known ahead cannot be exported".to_owned(),
-        way: "leave out `known_ahead`, and read it as it is measured".to_owned(),
-    }));
+    for source in plan.sources.iter().filter(|of| of.planned.is_some()) {
+        let signal = source.name.split('.').next().unwrap_or(&source.name);
+        let why = "a signal that is known ahead cannot be exported".to_owned();
+        let way = "leave out `known_ahead`, and read it as it is measured".to_owned();
+        Refusal::count(&mut refusals, signal, source.name.clone(), why, way);
+    }
     if !refusals.is_empty() {
         return Err(ExportError::Nodes(refusals));
     }
@@ -243,7 +241,7 @@ impl<'a> Lowering<'a> {
         options: &Options,
     ) -> Result<Record, Refused> {
         match &node.role {
-            PlannedRole::Feature { .. } => self.feature(node),
+            PlannedRole::Feature { .. } => self.feature(engine, node),
             PlannedRole::Estimator { .. } => self.estimator(engine, node, options),
             PlannedRole::Combiner { .. } => self.combiner(node),
         }
@@ -260,6 +258,22 @@ fn samples(time: Duration, period: i64, spare: usize) -> usize {
 /// A refusal of one kind.
 fn refuse<T>(why: impl Into<String>, way: impl Into<String>) -> Result<T, Refused> {
     Err((why.into(), way.into()))
+}
+
+/// Refuses a node that has no fit.
+fn unfitted<T>() -> Result<T, Refused> {
+    refuse(
+        "it has not been fitted",
+        "fit the graph first: `athermal fit`",
+    )
+}
+
+/// Refuses a fit of another graph.
+fn unknown<T>(name: &str) -> Result<T, Refused> {
+    refuse(
+        format!("its fit uses `{name}`, which the graph does not have"),
+        "fit it again",
+    )
 }
 
 /// Refuses an output port that somebody reads.

@@ -135,6 +135,17 @@ impl Periods {
                     }
                     return;
                 }
+                if node.kind.name == "cross_check"
+                    && let Some(&gather) = gathers.first()
+                {
+                    // What passes comes as its input does, and reasons at every tick.
+                    self.slots[node.slots.clone()].fill(self.tick);
+                    let inputs = &plan.gathers[gather].entries;
+                    for (slot, input) in node.slots.clone().zip(&inputs[..inputs.len() / 2]) {
+                        self.slots[slot] = self.slots[input.slot];
+                    }
+                    return;
+                }
                 let all = gathers.iter().map(|&gather| self.of_gather(plan, gather));
                 if *every_tick {
                     self.tick

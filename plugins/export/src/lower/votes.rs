@@ -1,42 +1,33 @@
 //! Combiners: which rule a vote follows, and how many runs, truths and errors it remembers.
 
 use athermal_combiners::share::trust;
-use athermal_combiners::{AutoWeighted, Best, Guard, Memory, StateGate, Trimmed, Weighting};
+use athermal_combiners::{AutoWeighted, Best, Guard, Hedge, Memory, StateGate, Trimmed, Weighting};
 use athermal_core::compile::{PlannedNode, PlannedRole, TruthLink};
+use athermal_core::node::Combiner;
 use athermal_core::time::Duration;
 
 use super::features::parameters;
 use super::{Lowering, Refused, SPARE, first, refuse, samples, unread};
-use crate::form::{Field, GUARD, Record, STATE_GATE};
+use crate::form::{BY_COUNT, BY_TIME, FADING, Field, GUARD, HEDGE, Record, STATE_GATE};
 
 /// What a vote follows, beside what it reads.
 #[derive(Default)]
 struct Rule {
     number: i64,
     memory: Option<Memory>,
+    /// How long errors count.
+    longest: Duration,
     form: usize,
+    power: f64,
+    rate: Option<f64>,
+    /// Of a hedge; what the memory of other votes has is its own.
+    half_life: Duration,
     shrinkage: f64,
     floor: f64,
     share: f64,
     min_truths: f64,
     least_trust: f64,
     dwell: Duration,
-}
-
-/// What no vote of the runtime does, and what to write instead.
-const POWER: (&str, &str) = (
-    "a `power` other than 2 and 4",
-    "use 2, which is the default, or 4",
-);
-const HALF_LIFE: (&str, &str) = (
-    "a memory with a `half_life`",
-    "use a time, such as `memory = \"15min\"`, or `{ truths = 12 }`",
-);
-
-fn cannot<T>(reasons: &[(&str, &str)]) -> Result<T, Refused> {
-    let (what, ways): (Vec<&str>, Vec<&str>) = reasons.iter().copied().unzip();
-    let what = what.join(" and ");
-    refuse(format!("{what} cannot be exported"), ways.join("; "))
 }
 
 fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
@@ -47,15 +38,12 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
     match (node.kind.package, node.kind.name) {
         ("athermal-combiners", "auto_weighted") => {
             let spec: AutoWeighted = parameters(node)?;
-            let power = spec.power.unwrap_or(2.0);
-            let fades = matches!(spec.memory, Memory::HalfLife(_));
-            if power != 2.0 && power != 4.0 {
-                return cannot(&[POWER, HALF_LIFE][..1 + usize::from(fades)]);
-            }
             Ok(Rule {
                 memory: Some(spec.memory),
+                longest: Combiner::memory(&spec),
+                // Of mean squares.
+                power: 0.5 * spec.power.unwrap_or(2.0),
                 form: match spec.weights {
-                    Weighting::InversePower if power == 4.0 => 3,
                     Weighting::InversePower => 0,
                     Weighting::AsPrinted => 1,
                     Weighting::AsPrintedRaw => 2,
@@ -74,15 +62,20 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
             share: parameters::<Trimmed>(node)?.share,
             ..plain(2)
         }),
-        ("athermal-combiners", "best") => Ok(Rule {
-            memory: Some(parameters::<Best>(node)?.memory),
-            ..plain(3)
-        }),
+        ("athermal-combiners", "best") => {
+            let spec: Best = parameters(node)?;
+            Ok(Rule {
+                memory: Some(spec.memory),
+                longest: Combiner::memory(&spec),
+                ..plain(3)
+            })
+        }
         ("athermal-combiners", "fallback") => Ok(plain(4)),
         ("athermal-combiners", "guard") => {
             let spec: Guard = parameters(node)?;
             Ok(Rule {
                 memory: Some(spec.memory),
+                longest: Combiner::memory(&spec),
                 min_truths: spec.min_truths as f64,
                 // As a vote at the most novelty counts.
                 least_trust: trust(spec.most_novel),
@@ -93,9 +86,18 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
             dwell: parameters::<StateGate>(node)?.dwell,
             ..plain(STATE_GATE)
         }),
+        ("athermal-combiners", "hedge") => {
+            let spec: Hedge = parameters(node)?;
+            Ok(Rule {
+                rate: spec.rate,
+                half_life: spec.half_life.unwrap_or_default(),
+                floor: spec.floor,
+                ..plain(HEDGE)
+            })
+        }
         (package, kind) => refuse(
             format!("the kind `{kind}` of {package} cannot be exported"),
-            "use `auto_weighted`, `mean`, `median`, `trimmed`, `best`, `fallback`, `guard` or `state_gate`",
+            "use `auto_weighted`, `hedge`, `mean`, `median`, `trimmed`, `best`, `fallback`, `guard` or `state_gate`",
         ),
     }
 }
@@ -105,8 +107,9 @@ struct Rooms {
     runs: usize,
     waiting: usize,
     errors: usize,
-    by_count: bool,
+    memory: i64,
     longest: i64,
+    half_life: Duration,
 }
 
 impl Lowering<'_> {
@@ -127,19 +130,22 @@ impl Lowering<'_> {
             unread(node, "std_dev")?;
         }
         let period = self.periods.of_votes(self.plan, *voters, *state);
-        let rooms = self.rooms(&rule, truth.as_ref(), period)?;
+        let rooms = self.rooms(&rule, truth.as_ref(), period);
         let count = self.gathers[*voters].entries.len();
         let judged = if rule.number == GUARD {
             2 * count
         } else {
             count
         };
+        // Errors that count for a time come and go for all voters at once.
+        let rings = if rooms.memory == BY_TIME { 1 } else { judged };
+        let times = rings.saturating_mul(rooms.errors);
         let errors = judged.saturating_mul(rooms.errors);
         let (runs, waiting) = (rooms.runs, rooms.waiting);
         let sum = |of: &[usize]| of.iter().fold(0, |sum: usize, of| sum.saturating_add(*of));
-        let ints = self.ints(sum(&[7, runs, waiting, waiting, 2 * judged, errors]));
+        let ints = self.ints(sum(&[7, runs, waiting, waiting, 2 * rings, times]));
         let rows = runs.saturating_mul(count);
-        let reals = self.reals(sum(&[rows, waiting, errors, 2 * judged, count]));
+        let reals = self.reals(sum(&[rows, waiting, errors, 3 * judged, count]));
         self.scratch(4 * count);
         let heeded = beside.novelties.and(novelties.as_ref());
         let which = heeded.map_or(&[][..], |(_, which)| which);
@@ -164,9 +170,14 @@ impl Lowering<'_> {
             .int("runs", rooms.runs)
             .int("waiting", rooms.waiting)
             .int("errors", rooms.errors)
-            .int("memory", usize::from(rooms.by_count))
+            .int("rings", rings)
+            .with("memory", Field::Int(rooms.memory))
             .with("longest", Field::Int(rooms.longest))
+            .real("half_life", rooms.half_life.secs())
             .int("form", rule.form)
+            .real("power", rule.power)
+            .real("rate", rule.rate.unwrap_or_else(|| libm::log(count as f64)))
+            .int("adaptive", usize::from(rule.rate.is_none()))
             .real("shrinkage", rule.shrinkage)
             .real("floor", rule.floor)
             .real("share", rule.share)
@@ -177,30 +188,36 @@ impl Lowering<'_> {
             .int("reals", reals))
     }
 
-    fn rooms(&self, rule: &Rule, truth: Option<&TruthLink>, period: i64) -> Result<Rooms, Refused> {
-        let none = Rooms {
+    fn rooms(&self, rule: &Rule, truth: Option<&TruthLink>, period: i64) -> Rooms {
+        let mut rooms = Rooms {
             runs: 1,
             waiting: 1,
             errors: 1,
-            by_count: false,
+            memory: BY_TIME,
             longest: 0,
+            half_life: rule.half_life,
         };
+        if rule.number == HEDGE {
+            // Of two sums.
+            (rooms.errors, rooms.memory) = (2, BY_COUNT);
+        }
         let Some(link) = truth else {
-            return Ok(none);
+            return rooms;
         };
         let of_truth = self.periods.slots[link.slot];
-        let (errors, by_count, longest) = match rule.memory {
-            None => (1, false, 0),
-            Some(Memory::Time(time)) => (samples(time, of_truth, SPARE), false, time.as_ns()),
-            Some(Memory::Truths(last)) => (last.truths, true, last.truths as i64),
-            Some(Memory::HalfLife(_)) => return cannot(&[HALF_LIFE]),
-        };
-        Ok(Rooms {
-            runs: samples(link.ahead + link.embargo(), period, SPARE),
-            waiting: samples(link.embargo(), of_truth, SPARE),
-            errors,
-            by_count,
-            longest,
-        })
+        rooms.runs = samples(link.ahead + link.embargo(), period, SPARE);
+        rooms.waiting = samples(link.embargo(), of_truth, SPARE);
+        if let Some(memory) = rule.memory {
+            rooms.longest = rule.longest.as_ns();
+            (rooms.errors, rooms.memory) = match memory {
+                Memory::Time(time) => (samples(time, of_truth, SPARE), BY_TIME),
+                Memory::Truths(last) => (last.truths, BY_COUNT),
+                Memory::HalfLife(_) => (1, FADING),
+            };
+            if let Memory::HalfLife(fading) = memory {
+                rooms.half_life = fading.half_life;
+            }
+        }
+        rooms
     }
 }

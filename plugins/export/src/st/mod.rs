@@ -1,6 +1,7 @@
 //! Writes a lowered plan as Structured Text (IEC 61131-3): the runtime as it is, the tables of the graph, its function block and its self
 //! test. Promised are results within 1e-9 of the largest size of an output, not their bits: compilers may fuse products with sums.
 
+mod runtime;
 mod tables;
 
 use std::fmt::Write as _;
@@ -12,10 +13,8 @@ use crate::error::ExportError;
 use crate::form::{Form, Port};
 use crate::ticks::{TICKS, Ticks, self_test};
 use crate::{Exported, Options, lower};
+use runtime::Parts;
 use tables::{list, long, plain, real};
-
-/// The runtime, written by hand.
-pub const RUNTIME: &str = include_str!("../../st/athermal_rt.st");
 
 /// A graph in Structured Text.
 ///
@@ -28,9 +27,11 @@ pub fn export(engine: &Engine, options: &Options) -> Result<Exported, ExportErro
         path: path.to_owned(),
         text,
     };
+    let parts = Parts::new();
+    let own = source(&form, &ticks, &parts);
     let files = vec![
-        file("athermal_rt.st", RUNTIME.to_owned()),
-        file(&format!("{}.st", form.name), source(&form, &ticks)),
+        file("athermal_rt.st", parts.shared),
+        file(&format!("{}.st", form.name), own),
     ];
     Ok(Exported { form, ticks, files })
 }
@@ -38,13 +39,13 @@ pub fn export(engine: &Engine, options: &Options) -> Result<Exported, ExportErro
 /// The name of the function block of a graph.
 #[must_use]
 pub fn block(form: &Form) -> String {
-    match word(&form.name).as_str() {
-        // The self test has this name already, as case does not count.
-        name if name.replace('_', "").eq_ignore_ascii_case("selftest") => {
-            "FB_Graph_SelfTest".to_owned()
-        }
-        name => format!("FB_{name}"),
-    }
+    format!("FB_{}", word(&form.name))
+}
+
+/// The name of the function block of its self test.
+#[must_use]
+pub fn self_test_block(form: &Form) -> String {
+    format!("FB_SelfTest_{}", word(&form.name))
 }
 
 /// Bytes of the state on a controller: of each number it is kept whether there is one.
@@ -76,27 +77,32 @@ fn constants(prefix: &str, ports: &[Port]) -> Vec<String> {
     names
 }
 
-fn source(form: &Form, ticks: &Ticks) -> String {
-    let mut text = format!(
+fn source(form: &Form, ticks: &Ticks, parts: &Parts) -> String {
+    let graph = word(&form.name);
+    let head = format!(
         "(* The graph `{}`, revision {}, as `athermal export st` wrote it: not to be changed by hand. It goes with athermal_rt.st.\n\n\
-         \x20  Nanoseconds between two ticks at least: {}. Bytes of the state: {}. *)\n\nVAR_GLOBAL CONSTANT\n",
+         \x20  Nanoseconds between two ticks at least: {}. Bytes of the state: {}. *)\n\n",
         plain(&form.title),
         plain(&form.revision),
         form.period_ns,
         state_bytes(form),
     );
+    let mut text = "VAR_GLOBAL CONSTANT\n".to_owned();
     text.push_str("    (* The places of channels and outputs. *)\n");
-    for (prefix, ports) in [("IN", &form.sources), ("OUT", &form.outputs)] {
-        for (nth, (name, port)) in constants(prefix, ports).iter().zip(ports).enumerate() {
+    for (what, ports) in [("IN", &form.sources), ("OUT", &form.outputs)] {
+        let prefix = format!("{graph}_{what}");
+        for (nth, (name, port)) in constants(&prefix, ports).iter().zip(ports).enumerate() {
             let (own, unit) = (plain(&port.name), plain(&port.unit));
             let _ = writeln!(text, "    {name} : DINT := {nth}; (* {own}, in {unit} *)");
         }
     }
     tables::write(form, &mut text);
     test(form, ticks, &mut text);
-    text.push_str("END_VAR\n");
-    text.push_str(&include_str!("blocks.st.in").replace("@block@", &block(form)));
-    text
+    text.push_str("END_VAR\n\n");
+    text.push_str(&parts.own);
+    let blocks = include_str!("blocks.st.in").replace("@block@", &block(form));
+    text.push_str(&blocks.replace("@test@", &self_test_block(form)));
+    head + &parts.named(&text, &graph)
 }
 
 /// What the self test compares with.

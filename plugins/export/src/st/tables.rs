@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::form::{Entry, Field, Form, Record, Step};
 
 /// Kinds with their types and tables, in the order of the numbers by which steps name them.
-const KINDS: [(&str, &str, &str); 12] = [
+const KINDS: [(&str, &str, &str); 13] = [
     ("slope", "AT_Slope", "AT_SLOPES"),
     ("lag", "AT_Lag", "AT_LAGS"),
     ("first_order", "AT_FirstOrder", "AT_FIRST_ORDERS"),
@@ -18,16 +18,18 @@ const KINDS: [(&str, &str, &str); 12] = [
     ("loss", "AT_Loss", "AT_LOSSES"),
     ("settled", "AT_Settled", "AT_SETTLES"),
     ("pick", "AT_Pick", "AT_PICKS"),
+    ("cross_check", "AT_CrossCheck", "AT_CROSS_CHECKS"),
 ];
 
 /// The step that looks whether anything of a gather is new.
 const GATHER: usize = KINDS.len();
 
-/// Fields whose names are keywords or functions in Structured Text.
-const RENAMED: [(&str, &str); 3] = [
+/// Fields whose names are keywords or functions in Structured Text, or those of places.
+const RENAMED: [(&str, &str); 4] = [
     ("constant", "intercept"),
     ("limit", "tolerance"),
     ("floor", "least_weight"),
+    ("rings", "ring_count"),
 ];
 
 /// Sums of rows, of which a slope needs three in each of four places, beside what the runtime in C has in its state.
@@ -110,10 +112,12 @@ impl Lists {
     fn structure(&mut self, form: &Form, record: &Record) -> String {
         let mut fields = Vec::new();
         for (name, field) in &record.fields {
+            let renamed = RENAMED.iter().find(|(own, _)| own == name);
+            let name = renamed.map_or(*name, |(_, name)| name);
             let first = match field {
                 Field::Int(value) => *value,
                 Field::Real(value) => {
-                    fields.push((*name, real(*value)));
+                    fields.push((name, real(*value)));
                     continue;
                 }
                 Field::Inline(values) | Field::Ints(values) => put(&mut self.indices, values),
@@ -131,14 +135,13 @@ impl Lists {
                     put(&mut self.limits, &inner)
                 }
             };
-            fields.push((*name, long(first)));
+            fields.push((name, long(first)));
         }
         let places = places(form, record).into_iter();
         fields.extend(places.map(|(name, place)| (name, place.to_string())));
-        let written = fields.iter().map(|(name, value)| {
-            let renamed = RENAMED.iter().find(|(own, _)| own == name);
-            format!("{} := {value}", renamed.map_or(*name, |(_, name)| name))
-        });
+        let written = fields
+            .iter()
+            .map(|(name, value)| format!("{name} := {value}"));
         format!("({})", written.collect::<Vec<_>>().join(", "))
     }
 }
@@ -168,12 +171,22 @@ fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
                 ("arrived", next(&mut place, of("runs"))),
                 ("run_of", next(&mut place, of("waiting"))),
                 ("rings", next(&mut place, of("waiting"))),
-                ("error_times", next(&mut place, 2 * judged)),
+                ("error_times", next(&mut place, 2 * of("rings"))),
                 ("truths", next(&mut number, of("runs") * count)),
                 ("squares", next(&mut number, of("waiting"))),
                 ("sums", next(&mut number, judged * of("errors"))),
                 ("means", next(&mut number, judged)),
+                ("counts", next(&mut number, judged)),
                 ("trust", next(&mut number, judged)),
+            ]
+        }
+        "cross_check" => {
+            let mut within = 2 * of("channels");
+            let columns = of("columns");
+            vec![
+                ("form", within),
+                ("z", next(&mut within, columns * columns)),
+                ("pull", next(&mut within, columns)),
             ]
         }
         "safe_state" => {

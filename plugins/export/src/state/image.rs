@@ -7,7 +7,7 @@ use crate::c::bits;
 use crate::form::{Form, History};
 
 /// What every saved state begins with.
-const NAME: u64 = 0x3120_4320_6874_6120;
+const NAME: u64 = 0x3220_4320_6874_6120;
 const HEADER: usize = 5;
 
 /// The two arrays.

@@ -6,8 +6,9 @@ use serde_json::Value;
 
 use super::CarryError;
 use super::image::Image;
-use super::snapshot::{Node, Past, Withheld};
-use crate::form::{Form, Record, STATE_GATE};
+use super::snapshot::{Node, Past};
+use super::votes::Ballot;
+use crate::form::{Form, Record};
 
 #[derive(Serialize, Deserialize)]
 struct Slope {
@@ -45,22 +46,6 @@ struct FirstOrder {
     rates: Vec<f64>,
     last: Vec<Option<(i64, f64)>>,
     values: Vec<f64>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Errors {
-    state: String,
-    memory: Value,
-    squares: Vec<Vec<(i64, f64)>>,
-    means: Vec<Option<f64>>,
-    counts: Vec<f64>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Gate {
-    state: String,
-    followed: Option<u64>,
-    other: Option<(u64, i64)>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -123,11 +108,29 @@ struct Settled {
     newest: Option<i64>,
 }
 
-fn read<T: DeserializeOwned>(node: &Record, own: &[u8]) -> Result<T, CarryError> {
+#[derive(Serialize, Deserialize)]
+struct CrossCheck {
+    state: String,
+    sensors: Vec<Sensor>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Sensor {
+    last: Option<i64>,
+    since: Option<i64>,
+    is_out: bool,
+    passes: bool,
+    agrees_since: Option<i64>,
+}
+
+pub(super) fn read<T: DeserializeOwned>(node: &Record, own: &[u8]) -> Result<T, CarryError> {
     rmp_serde::from_slice(own).map_err(|error| CarryError::of(&node.node, error))
 }
 
-fn written<T: Serialize>(node: &Record, state: &T) -> Result<Option<Vec<u8>>, CarryError> {
+pub(super) fn written<T: Serialize>(
+    node: &Record,
+    state: &T,
+) -> Result<Option<Vec<u8>>, CarryError> {
     let bytes = rmp_serde::to_vec_named(state);
     bytes
         .map(Some)
@@ -135,7 +138,7 @@ fn written<T: Serialize>(node: &Record, state: &T) -> Result<Option<Vec<u8>>, Ca
 }
 
 /// Where the integers and numbers of a node lie.
-fn places(node: &Record) -> (usize, usize) {
+pub(super) fn places(node: &Record) -> (usize, usize) {
     (node.place_of("ints"), node.place_of("reals"))
 }
 
@@ -239,151 +242,6 @@ impl Image {
     }
 }
 
-/// Where the parts of a vote lie.
-struct Ballot {
-    voters: usize,
-    judged: usize,
-    runs: usize,
-    waiting: usize,
-    errors: usize,
-    ints: usize,
-    run_times: usize,
-    arrived: usize,
-    run_of: usize,
-    rings: usize,
-    error_times: usize,
-    rows: usize,
-    truths: usize,
-    squares: usize,
-    sums: usize,
-}
-
-impl Ballot {
-    fn new(form: &Form, node: &Record) -> Self {
-        let (voters, judged) = form.voters(node);
-        let (ints, rows) = places(node);
-        let (runs, waiting) = (node.place_of("runs"), node.place_of("waiting"));
-        let errors = node.place_of("errors");
-        let run_times = ints + 7;
-        let arrived = run_times + runs;
-        let run_of = arrived + waiting;
-        let rings = run_of + waiting;
-        let truths = rows + runs * voters;
-        let squares = truths + waiting;
-        Self {
-            voters,
-            judged,
-            runs,
-            waiting,
-            errors,
-            ints,
-            run_times,
-            arrived,
-            run_of,
-            rings,
-            error_times: rings + 2 * judged,
-            rows,
-            truths,
-            squares,
-            sums: squares + judged * errors,
-        }
-    }
-
-    /// What every vote begins with.
-    fn begin(&self, image: &mut Image) {
-        image.ints[self.ints + 4] = -1;
-        image.ints[self.ints + 5] = -1;
-        let means = self.sums + self.judged;
-        image.reals[means..means + self.judged].fill(f64::NAN);
-        image.reals[means + self.judged..][..self.voters].fill(1.0);
-    }
-
-    fn put(&self, image: &mut Image, known: &Node) {
-        let Some(embargo) = &known.learning else {
-            return;
-        };
-        let pairing = &embargo.pairing;
-        let first = pairing.number - pairing.past as u64;
-        let total = first + pairing.runs.times.len() as u64;
-        image.ints[self.ints] = total as i64;
-        image.ints[self.ints + 1] = first as i64;
-        for (nth, &time) in pairing.runs.times.iter().enumerate() {
-            let place = (first as usize + nth) % self.runs;
-            image.ints[self.run_times + place] = time;
-            let row = &pairing.runs.numbers[nth * self.voters..][..self.voters];
-            image.reals[self.rows + place * self.voters..][..self.voters].copy_from_slice(row);
-        }
-        let kept = embargo.withheld.len().min(self.waiting);
-        let withheld = &embargo.withheld[embargo.withheld.len() - kept..];
-        image.ints[self.ints + 3] = kept as i64;
-        for (nth, late) in withheld.iter().enumerate() {
-            image.ints[self.arrived + nth] = late.arrived;
-            image.ints[self.run_of + nth] = late.run as i64;
-            image.reals[self.truths + nth] = late.truth;
-        }
-    }
-
-    fn take(&self, image: &Image, known: &mut Node) {
-        let Some(embargo) = &mut known.learning else {
-            return;
-        };
-        let total = image.ints[self.ints] as usize;
-        let first = (image.ints[self.ints + 1] as usize).max(total.saturating_sub(self.runs));
-        let pairing = &mut embargo.pairing;
-        (pairing.past, pairing.number) = (0, first as u64);
-        let time = |run: usize| image.ints[self.run_times + run % self.runs];
-        let row = |run: usize| {
-            let first = self.rows + (run % self.runs) * self.voters;
-            image.reals[first..first + self.voters].iter().copied()
-        };
-        pairing.runs.times = (first..total).map(time).collect();
-        pairing.runs.numbers = (first..total).flat_map(row).collect();
-        let from = image.ints[self.ints + 2] as usize;
-        let withheld = (0..image.ints[self.ints + 3] as usize).map(|nth| {
-            let place = (from + nth) % self.waiting;
-            Withheld {
-                arrived: image.ints[self.arrived + place],
-                truth: image.reals[self.truths + place],
-                note: 0.0,
-                run: image.ints[self.run_of + place] as u64,
-            }
-        });
-        embargo.withheld = withheld.collect();
-        let needed = embargo.withheld.first().map(|late| late.run);
-        embargo.pairing.needed = needed.unwrap_or(u64::MAX);
-    }
-
-    fn put_errors(&self, image: &mut Image, errors: &Errors) {
-        for (voter, squares) in errors.squares.iter().enumerate() {
-            let kept = squares.len().min(self.errors);
-            let mut sum = 0.0;
-            for (nth, &(arrived, square)) in squares[squares.len() - kept..].iter().enumerate() {
-                image.ints[self.error_times + voter * self.errors + nth] = arrived;
-                image.reals[self.squares + voter * self.errors + nth] = square;
-                sum += square;
-            }
-            image.ints[self.rings + 2 * voter + 1] = kept as i64;
-            image.reals[self.sums + voter] = sum;
-            if kept > 0 {
-                image.reals[self.sums + self.judged + voter] = sum / kept as f64;
-            }
-        }
-    }
-
-    fn take_errors(&self, image: &Image, errors: &mut Errors) {
-        for (voter, squares) in errors.squares.iter_mut().enumerate() {
-            let from = image.ints[self.rings + 2 * voter] as usize;
-            let count = image.ints[self.rings + 2 * voter + 1] as usize;
-            let error = |nth: usize| {
-                let place = voter * self.errors + (from + nth) % self.errors;
-                let arrived = image.ints[self.error_times + place];
-                (arrived, image.reals[self.squares + place])
-            };
-            *squares = (0..count).map(error).collect();
-        }
-    }
-}
-
 /// Puts what a node knows into the arrays.
 pub(super) fn put(
     image: &mut Image,
@@ -422,17 +280,7 @@ pub(super) fn put(
         }
         "vote" => {
             if let Some(ballot) = &ballot {
-                match node.int_of("rule") {
-                    STATE_GATE => {
-                        let state: Gate = read(node, own)?;
-                        image.ints[ints + 4] = state.followed.map_or(-1, |of| of as i64);
-                        if let Some((other, since)) = state.other {
-                            image.ints[ints + 5] = other as i64;
-                            image.ints[ints + 6] = since;
-                        }
-                    }
-                    _ => ballot.put_errors(image, &read::<Errors>(node, own)?),
-                }
+                ballot.put_own(image, node, own)?;
             }
         }
         "compensate" => {
@@ -476,6 +324,17 @@ pub(super) fn put(
             image.put_time(ints + 4, state.low_since);
             image.put_time(ints + 6, state.newest);
             image.reals[reals] = state.stood.unwrap_or(0.0);
+        }
+        "cross_check" => {
+            let state: CrossCheck = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter().enumerate() {
+                let place = ints + 8 * nth;
+                image.put_time(place, sensor.last);
+                image.put_time(place + 2, sensor.since);
+                image.ints[place + 4] = i64::from(sensor.is_out);
+                image.ints[place + 5] = i64::from(sensor.passes);
+                image.put_time(place + 6, sensor.agrees_since);
+            }
         }
         _ => {}
     }
@@ -523,20 +382,10 @@ pub(super) fn take(
             state.values = image.reals[reals + count..][..width].to_vec();
             written(node, &state)?
         }
-        "vote" if node.int_of("rule") == STATE_GATE => {
-            let mut state: Gate = read(node, own)?;
-            state.followed = u64::try_from(image.ints[ints + 4]).ok();
-            let other = u64::try_from(image.ints[ints + 5]).ok();
-            state.other = other.map(|other| (other, image.ints[ints + 6]));
-            written(node, &state)?
-        }
-        "vote" => {
-            let mut state: Errors = read(node, own)?;
-            if let Some(ballot) = &ballot {
-                ballot.take_errors(image, &mut state);
-            }
-            written(node, &state)?
-        }
+        "vote" => match &ballot {
+            Some(ballot) => ballot.take_own(image, node, own)?,
+            None => return Ok(()),
+        },
         "compensate" => {
             let mut state: Compensate = read(node, own)?;
             state.last = image.time(ints);
@@ -582,6 +431,18 @@ pub(super) fn take(
             state.waiting = image.ints[ints + 3] != 0;
             state.low_since = image.time(ints + 4);
             state.newest = image.time(ints + 6);
+            written(node, &state)?
+        }
+        "cross_check" => {
+            let mut state: CrossCheck = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter_mut().enumerate() {
+                let place = ints + 8 * nth;
+                sensor.last = image.time(place);
+                sensor.since = image.time(place + 2);
+                sensor.is_out = image.ints[place + 4] != 0;
+                sensor.passes = image.ints[place + 5] != 0;
+                sensor.agrees_since = image.time(place + 6);
+            }
             written(node, &state)?
         }
         _ => return Ok(()),

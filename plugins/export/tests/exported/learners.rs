@@ -88,7 +88,7 @@ fn estimators_that_are_no_linear_form_are_refused_by_name() {
         let ExportError::Nodes(refusals) = &error else {
             panic!("{error}");
         };
-        assert_eq!(refusals[0].node, "learner.X1");
+        assert_eq!(refusals[0].node, "learner");
         let why = format!("what `{kind}` was fitted to is no linear form");
         assert!(error.to_string().contains(&why), "{error}");
     }

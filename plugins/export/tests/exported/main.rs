@@ -5,11 +5,14 @@
 
 mod command;
 mod fmu;
+mod graphs;
 mod learners;
+mod math;
 mod onnx;
 mod processors;
 mod random;
 mod refusals;
+mod sensors;
 mod shipped;
 mod st;
 mod support;

@@ -9,6 +9,8 @@ use crate::support::{made_up, plan};
 
 const GRAPH: &str = r#"schema = 1
 name = "7 of all"
+[sets]
+copy = ["b", "c", "d"]
 [time]
 column = "t"
 [signals.temperature]
@@ -21,7 +23,7 @@ channels = ["Z"]
 max_age = "20s"
 [signals.planned]
 unit = "Cel"
-channels = ["p"]
+channels = ["p", "q"]
 max_age = "20s"
 known_ahead = "60s"
 [nodes.drift]
@@ -46,27 +48,11 @@ ahead = "60s"
 type = "zero"
 inputs.truth = "drift"
 ahead = "60s"
-[nodes.hedge]
-type = "hedge"
-inputs.voters = ["thermal", "nothing"]
+[nodes.watch]
+type = "page_hinkley"
+each = "copy"
+inputs.voters = "thermal"
 inputs.truth = "drift"
-[nodes.vote]
-type = "auto_weighted"
-inputs.voters = ["thermal", "nothing"]
-inputs.truth = "drift"
-memory = { half_life = "5min" }
-[nodes.steep]
-type = "auto_weighted"
-inputs.voters = ["thermal", "nothing"]
-inputs.truth = "drift"
-memory = "5min"
-power = 6
-[nodes.as_begun]
-type = "auto_weighted"
-inputs.voters = ["thermal", "nothing"]
-inputs.truth = "drift"
-memory = { half_life = "5min" }
-power = 6
 [nodes.ahead]
 type = "slope"
 inputs.signal = "planned"
@@ -80,10 +66,7 @@ ahead = "60s"
 smooth = "smooth"
 error = "warm:stderr"
 thermal = "thermal"
-hedge = "hedge"
-vote = "vote"
-steep = "steep"
-as_begun = "as_begun"
+watch = "watch"
 ahead = "ahead"
 learner = "learner"
 "#;
@@ -98,29 +81,15 @@ fn all_nodes_that_cannot_be_exported_are_named_each_with_a_way() {
     let nodes: Vec<&str> = refusals.iter().map(|of| &*of.node).collect();
     assert_eq!(
         nodes,
-        [
-            "smooth",
-            "warm",
-            "thermal",
-            "hedge",
-            "vote",
-            "steep",
-            "as_begun",
-            "learner",
-            "planned.p"
-        ]
+        ["smooth", "warm", "thermal", "watch", "learner", "planned"]
     );
     let text = error.to_string();
     for part in [
         "`smooth`: the kind `moving` of athermal-features cannot be exported; leave it out",
         "`warm`: the port `stderr` of `slope` is read; leave out what reads it",
         "`thermal`: it has not been fitted; fit the graph first",
-        "`hedge`: the kind `hedge` of athermal-combiners cannot be exported; use `auto_weighted`",
-        "`vote`: a memory with a `half_life` cannot be exported; use a time",
-        "`steep`: a `power` other than 2 and 4 cannot be exported; use 2, which is the default, or 4\n",
-        "`as_begun`: a `power` other than 2 and 4 and a memory with a `half_life` cannot be exported; use 2, which is the default, or 4; \
-         use a time",
-        "`planned.p`: a signal that is known ahead cannot be exported; leave out `known_ahead`",
+        "`watch` (3 instances): the kind `page_hinkley` of athermal-combiners cannot be exported; use `auto_weighted`",
+        "`planned` (2 instances): a signal that is known ahead cannot be exported; leave out `known_ahead`",
         "`learner`: it goes on learning while it runs; `--frozen` exports it as it was fitted",
     ] {
         assert!(text.contains(part), "{part}\n{text}");

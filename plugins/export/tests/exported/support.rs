@@ -46,6 +46,11 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
     for node in &plan.nodes {
         let Some(rows) = node.rows() else { continue };
         let names = rows.fit.regressors.iter().map(|of| of.name.clone());
+        if node.kind.name == "cross_check" {
+            let predictor = going_together(names.collect(), random);
+            fitted.insert(node.instance(), Arc::from(predictor));
+            continue;
+        }
         let mut used: Vec<String> = names.filter(|_| random.between(0.0, 1.0) < 0.8).collect();
         if used.is_empty() {
             used.push(rows.fit.regressors[0].name.clone());
@@ -75,6 +80,36 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
         fitted.insert(node.instance(), Arc::from(predictor));
     }
     fitted
+}
+
+/// How sensors go together, made up; in some fits nothing was learned, or a channel never had a value.
+fn going_together(mut uses: Vec<String>, random: &mut Prng) -> Box<dyn Predictor> {
+    if random.between(0.0, 1.0) < 0.3 {
+        uses.remove(0);
+    }
+    let order = uses.len();
+    let mut parts =
+        |scale: f64| -> Vec<f64> { (0..order).map(|_| scale * random.normal()).collect() };
+    let directions = [parts(0.5), parts(0.5), parts(0.1)];
+    let means: Vec<f64> = parts(2.0).iter().map(|mean| 20.0 + mean).collect();
+    let scales: Vec<f64> = parts(3.0).iter().map(|scale| scale.abs() + 1.0).collect();
+    let lower = (0..order).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    let product = |(i, j): (usize, usize)| {
+        let along = directions.iter().map(|of| of[i] * of[j]).sum::<f64>();
+        along + if i == j { 0.01 } else { 0.0 }
+    };
+    let mut written = json!({ "type": "cross_check", "uses": uses });
+    if random.between(0.0, 1.0) < 0.9 {
+        written["agreement"] = json!({
+            "means": means,
+            "scales": scales,
+            "matrix": lower.map(product).collect::<Vec<_>>(),
+            "usual": random.between(-2.0, 2.0).exp(),
+        });
+    }
+    let predictor: Box<dyn Predictor> = serde_json::from_value(written).unwrap();
+    assert!(predictor.mistakes().is_empty());
+    predictor
 }
 
 /// Something that happens to a running graph.

@@ -300,6 +300,7 @@ impl<'a> Body<'a> {
             ("abs", Known::Abs, Kind::Lreal, Kind::Lreal),
             ("sqrt", Known::Sqrt, Kind::Lreal, Kind::Lreal),
             ("exp", Known::Exp, Kind::Lreal, Kind::Lreal),
+            ("ln", Known::Ln, Kind::Lreal, Kind::Lreal),
             ("trunc", Known::Trunc, Kind::Lreal, Kind::Dint),
             ("dint_to_lreal", Known::ToReal, Kind::Dint, Kind::Lreal),
             ("lint_to_lreal", Known::ToReal, Kind::Lint, Kind::Lreal),
@@ -318,6 +319,28 @@ impl<'a> Body<'a> {
                 Code::Known(known, Box::new(self.as_type(value, from)?)),
                 Type::Basic(to),
             ));
+        }
+        if name == "expt" {
+            let [
+                Argument {
+                    name: None,
+                    value: base,
+                    ..
+                },
+                Argument {
+                    name: None,
+                    value: exponent,
+                    ..
+                },
+            ] = arguments
+            else {
+                return Err("expt takes two values".to_owned());
+            };
+            let of = (
+                self.as_type(base, Kind::Lreal)?,
+                self.as_type(exponent, Kind::Lreal)?,
+            );
+            return Ok((Code::Power(Box::new(of)), Type::Basic(Kind::Lreal)));
         }
         let (call, result) = self.call(name, arguments)?;
         Ok((Code::Call(Box::new(call)), result))

@@ -37,6 +37,8 @@ pub enum Code {
     Call(Box<Call>),
     /// A function that every compiler has.
     Known(Known, Box<Code>),
+    /// EXPT: a power.
+    Power(Box<(Code, Code)>),
     Binary(Operator, Kind, Box<(Code, Code)>),
     Minus(Kind, Box<Code>),
     Not(Box<Code>),
@@ -47,6 +49,7 @@ pub enum Known {
     Abs,
     Sqrt,
     Exp,
+    Ln,
     Trunc,
     ToReal,
     ToDint,
@@ -269,6 +272,14 @@ impl Machine {
                 let word = self.value(of)?;
                 apply(*known, word)
             }
+            Code::Power(of) => {
+                let base = f64::from_bits(self.value(&of.0)?);
+                let exponent = f64::from_bits(self.value(&of.1)?);
+                match base > 0.0 {
+                    true => number(libm::pow(base, exponent)),
+                    false => Err(format!("EXPT of {base}")),
+                }
+            }
             Code::Binary(operator, kind, of) => {
                 // Both sides, as a controller may: AND and OR too.
                 let left = self.value(&of.0)?;
@@ -303,7 +314,10 @@ fn apply(known: Known, word: u64) -> Result<u64, Fault> {
         // Of what came in without being a number too.
         Known::Abs => Ok(of.abs().to_bits()),
         Known::Sqrt => number(of.sqrt()),
-        Known::Exp => number(of.exp()),
+        // As the engine computes them; a controller has its own.
+        Known::Exp => number(libm::exp(of)),
+        Known::Ln if of <= 0.0 => Err(format!("LN of {of}")),
+        Known::Ln => number(libm::log(of)),
         Known::Trunc if of.abs() < 2e9 => Ok(of.trunc() as i64 as u64),
         Known::Trunc => Err(format!("{of} is too large for TRUNC")),
         Known::ToReal => Ok((word as i64 as f64).to_bits()),

@@ -445,7 +445,7 @@ impl Parser {
     }
 
     fn primary(&mut self) -> Result<Ast> {
-        const FUNCTIONS: [&str; 4] = ["abs", "sqrt", "exp", "trunc"];
+        const FUNCTIONS: [&str; 6] = ["abs", "sqrt", "exp", "ln", "expt", "trunc"];
         match self.peek().clone() {
             Token::Int(value) => {
                 self.next();
