@@ -157,7 +157,7 @@ class Graph:
 
     def __init__(self, graph: str | os.PathLike[str] | Mapping[str, Any]) -> None:
         if isinstance(graph, Mapping):
-            self._graph = _athermal.Graph.of_json("graph", json.dumps(_plain(graph)))
+            self._graph = _athermal.Graph.of_json("graph", json.dumps(_plain(graph), allow_nan=False))
         elif isinstance(graph, str) and "\n" in graph:
             self._graph = _athermal.Graph.of_text("graph.toml", graph)
         else:

@@ -10,6 +10,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from athermal._athermal import Table
+from athermal._errors import RequestError
 from athermal._progress import Progress, listener
 
 _EPOCH = datetime(1970, 1, 1)
@@ -58,6 +59,10 @@ def add_data(
                 wanted.pop(graph_name, None)
                 wanted[given_name] = None
         its_table = table(one, wanted)
+        there = its_table.column_names
+        for given_name in names:
+            if given_name not in there:
+                raise RequestError(f"{its_name}: there is no column `{given_name}`; found {', '.join(f'`{of}`' for of in there)}")
         if names:
             its_table = its_table.renamed(names)
         call.tables.append((its_name, its_table))
@@ -70,6 +75,8 @@ def table(frame: Any, wanted: Iterable[str] | None = None) -> Table:
     if isinstance(frame, Table):
         return frame
     library = module_of(frame)
+    if library in ("pandas", "polars") and not hasattr(type(frame), "columns"):
+        library = "one column"
     if library == "polars":
         if hasattr(frame, "collect"):
             there = frame.collect_schema().names()
@@ -84,13 +91,13 @@ def table(frame: Any, wanted: Iterable[str] | None = None) -> Table:
         there = _there(frame.columns, wanted)
         if there and len(there) < len(frame.columns):
             frame = frame.project(", ".join('"' + of.replace('"', '""') + '"' for of in there))
-    elif library == "pandas" and hasattr(frame, "columns"):
+    elif library == "pandas":
         return _of_pandas(frame, _there(list(frame.columns), wanted))
     elif isinstance(frame, Mapping):
         return _of_columns((of, frame[of]) for of in _there(list(frame), wanted))
     elif library == "numpy" and getattr(frame.dtype, "names", None):
         return _of_columns((of, frame[of]) for of in _there(frame.dtype.names, wanted))
-    if hasattr(frame, "__arrow_c_stream__") or hasattr(frame, "__arrow_c_array__"):
+    if library != "one column" and (hasattr(frame, "__arrow_c_stream__") or hasattr(frame, "__arrow_c_array__")):
         return Table.from_arrow(frame)
     kind = type(frame)
     raise TypeError(
@@ -109,6 +116,9 @@ def _there(columns: Sequence[Any], wanted: Iterable[str] | None) -> list[Any]:
 
 
 def _of_pandas(frame: Any, columns: list[Any]) -> Table:
+    twice = [of for nth, of in enumerate(columns) if of in columns[:nth]]
+    if twice:
+        raise RequestError(f"two columns have the name `{twice[0]}`: give one of them another")
     try:
         import pyarrow
     except ImportError:
@@ -129,6 +139,10 @@ def _of_pandas(frame: Any, columns: list[Any]) -> Table:
 
 
 def _of_columns(columns: Iterable[tuple[str, Any]]) -> Table:
+    columns = [(name, of) for name, of in columns]
+    for name, of in columns[1:]:
+        if len(of) != len(columns[0][1]):
+            raise RequestError(f"the column `{name}` has {len(of)} rows, and `{columns[0][0]}` has {len(columns[0][1])}")
     return Table.from_columns([(name, *_column(of)) for name, of in columns])
 
 

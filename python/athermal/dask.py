@@ -42,7 +42,8 @@ def fit(
     meta = {by: pandas.Series(dtype=object)}
     meta |= {of: pandas.Series(dtype="Int64" if of == "rows" else object) for of in _fleet.RESULT}
     shuffled = rows.shuffle(on=by, npartitions=partitions)
-    return shuffled.map_partitions(_fitted, job, by, times, meta=pandas.DataFrame(meta))
+    reads_by = by in graph._graph.columns
+    return shuffled.map_partitions(_fitted, job, by, times, reads_by, meta=pandas.DataFrame(meta))
 
 
 def save(fitted: Any, folder: str | os.PathLike[str], by: str = "machine") -> dict[str, str]:
@@ -55,7 +56,7 @@ def save(fitted: Any, folder: str | os.PathLike[str], by: str = "machine") -> di
     return _fleet.save(fitted.to_dict("records"), folder, by)
 
 
-def _fitted(rows: Any, job: Job, by: str, times: list[str]) -> Any:
+def _fitted(rows: Any, job: Job, by: str, times: list[str], reads_by: bool) -> Any:
     """The answers for the machines of a partition; in a worker of Dask."""
     import pandas
 
@@ -63,6 +64,9 @@ def _fitted(rows: Any, job: Job, by: str, times: list[str]) -> Any:
     for machine, its in rows.groupby(by, sort=True, dropna=False, observed=True):
         machine = None if pandas.isna(machine) else machine
         its = its.sort_values(times, kind="stable")
+        if not reads_by:
+            # Texts of a shuffle begin at any address, which not every reader of Arrow takes.
+            its = its.drop(columns=by)
         answers.append({by: machine, **job.fit(machine, _frames.table(its))})
     found = pandas.DataFrame(answers, columns=[by, *_fleet.RESULT], dtype=object)
     return found.astype({"rows": "Int64"})

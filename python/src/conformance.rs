@@ -9,13 +9,15 @@ use crate::failure::guarded;
 use crate::json::read;
 use crate::nodes::{PythonEstimator, PythonFeature};
 
+/// What comes to a port: its name, how many channels of which unit, and between which values they are.
+type Given = (String, usize, String, Option<(f64, f64)>);
+
 /// What a node is tried with.
 #[derive(FromPyObject)]
 pub struct Tried {
     /// What stands in the table of the node, as JSON.
     table: String,
-    /// Of ports, how many channels of which unit come there, and between which values they are.
-    inputs: Vec<(String, usize, String, Option<(f64, f64)>)>,
+    inputs: Vec<Given>,
     ticks: usize,
     every: String,
 }

@@ -278,6 +278,25 @@ def test_what_is_no_frame_is_refused_with_what_is_one(graph):
             graph.fit(what)
 
 
+def test_a_column_alone_is_no_frame(graph):
+    pandas = pytest.importorskip("pandas")
+    polars = pytest.importorskip("polars")
+    for what in [pandas.Series([1.0], name="room_degC"), polars.Series("room_degC", [1.0])]:
+        with pytest.raises(TypeError, match="is no data frame"):
+            graph.fit(what)
+
+
+def test_columns_that_do_not_go_together_are_refused_by_name(graph):
+    with pytest.raises(athermal.RequestError, match="`room_degC` has 1 rows, and `time_s` has 400"):
+        graph.fit(small(room_degC=[1.0]))
+    with pytest.raises(athermal.RequestError, match="there is no column `nope`; found `time_s`"):
+        graph.fit(small(), time="nope")
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(small())
+    with pytest.raises(athermal.RequestError, match="two columns have the name `room_degC`"):
+        graph.fit(pandas.concat([frame, frame[["room_degC"]]], axis=1))
+
+
 DATED = GRAPH.replace('column = "time_s"', 'column = "when"')
 
 

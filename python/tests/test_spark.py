@@ -99,7 +99,7 @@ def test_the_models_are_those_of_the_command_line_although_an_executor_is_killed
     assert list(failed) == ["m4"]
     assert sorted(path.stem for path in models.iterdir()) == MACHINES[:3]
     command = [sys.executable, "-m", "athermal", "fleet", "report", str(models), "-o", str(tmp_path / "fleet.html")]
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, cwd=tmp_path)
 
 
 def test_a_time_of_another_name_and_type_and_a_machine_that_is_a_number_are_taken(fleet, spark):
