@@ -23,6 +23,7 @@ mod explain;
 mod failing_disks;
 mod faulty_logs;
 mod first_minutes;
+mod fit_blocks;
 mod fit_json;
 mod fleet;
 mod forms_of_logs;
