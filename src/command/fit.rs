@@ -13,6 +13,7 @@ use athermal::run::fit::{
     BareOutput, EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit,
 };
 use athermal::run::model::{Card, EstimatorCard};
+use athermal_fleet::blocks::BlockOptions;
 use clap::Args;
 use serde_json::json;
 
@@ -21,7 +22,7 @@ use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::doubts;
 use super::faults::{self, ChannelFaults, FaultWatch, Purpose};
-use super::fit_blocks::BlockOptions;
+use super::fit_blocks::fit_on_blocks;
 use super::model;
 use super::numbers;
 use super::threads::Threads;
@@ -138,9 +139,9 @@ impl Fit {
             threads: self.threads.count(),
             ..FitOptions::default()
         };
-        match self.blocks.is_wanted() {
-            true => self.blocks.fit_on(model, &self.data, &options, terminal),
-            false => fit_on(model, &self.data, &options, terminal),
+        match self.blocks.blocks {
+            Some(_) => fit_on_blocks(&self.blocks, model, &self.data, &options, terminal),
+            None => fit_on(model, &self.data, &options, terminal),
         }
     }
 

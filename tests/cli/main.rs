@@ -43,6 +43,7 @@ mod other_processors;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plugin_crates;
+mod priors;
 mod report;
 mod report_graphs;
 mod report_novelty;

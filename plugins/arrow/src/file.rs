@@ -10,9 +10,7 @@ use arrow_schema::{ArrowError, SchemaRef};
 use athermal_files::{Selection, TypedFile, TypedRows};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use parquet::arrow::arrow_reader::statistics::StatisticsConverter;
 
-use crate::column::Instants;
 use crate::rows::{Column, Rows, Wanted};
 
 /// So many rows are decoded at a time: the numbers of a wide table then stay in the second cache.
@@ -27,14 +25,9 @@ struct Batched {
     /// What the folders on its path say.
     keys: Vec<(String, String)>,
     /// Its batches, of these columns at least, and where among theirs each of the file's stands.
-    read: Box<Read>,
+    #[allow(clippy::type_complexity)] // it is this once
+    read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
 }
-
-/// Reads some columns. Rows outside of a stretch of time by a column of instants may be passed over.
-type Read = dyn FnOnce(&[usize], Option<Within>) -> Result<(Batches, Vec<usize>), String> + Send;
-
-/// The first and last instant that is asked for, in ns, and the column of the time.
-type Within = (usize, (i64, i64));
 
 impl TypedFile for Batched {
     fn names(&self) -> Vec<String> {
@@ -52,11 +45,7 @@ impl TypedFile for Batched {
         let mut read: Vec<usize> = all.filter(|place| *place < fields).collect();
         read.sort_unstable();
         read.dedup();
-        let within = match &wanted.time[..] {
-            [time] if *time < fields => wanted.within.map(|within| (*time, within)),
-            _ => None,
-        };
-        let (batches, places) = (self.read)(&read, within)?;
+        let (batches, places) = (self.read)(&read)?;
         let column = |place: usize| match place.checked_sub(fields) {
             Some(key) => Column::Constant(self.keys[key].1.clone()),
             None => Column::At {
@@ -119,40 +108,13 @@ pub(crate) fn parquet(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |columns, within| {
+        read: Box::new(move |columns| {
             let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
-            let groups = within.and_then(|within| groups_within(&builder, within));
-            let builder = match groups {
-                Some(groups) => builder.with_row_groups(groups),
-                None => builder,
-            };
             let reader = builder.with_projection(mask).with_batch_size(BATCH).build();
             let batches: Batches = Box::new(reader.map_err(words)?);
             Ok((batches, columns.to_vec()))
         }),
     }))
-}
-
-/// The row groups that may have rows of a stretch of time, by what the file says of their lowest and highest instants; none where it
-/// says nothing, or the column has no instants.
-fn groups_within(
-    builder: &ParquetRecordBatchReaderBuilder<File>,
-    (time, (from, to)): Within,
-) -> Option<Vec<usize>> {
-    // A clock of which is not said where it stands is so much off at most.
-    const ANYWHERE_NS: i64 = 86_400_000_000_000;
-    let (schema, groups) = (builder.schema(), builder.metadata().row_groups());
-    let name = schema.field(time).name();
-    let of = StatisticsConverter::try_new(name, schema, builder.parquet_schema()).ok()?;
-    let lowest = Instants::of(&of.row_group_mins(groups).ok()?)?;
-    let highest = Instants::of(&of.row_group_maxes(groups).ok()?)?;
-    let margin = if lowest.is_utc { 0 } else { ANYWHERE_NS };
-    let (from, to) = (from.saturating_sub(margin), to.saturating_add(margin));
-    let is_within = |group: &usize| {
-        lowest.at(*group).is_none_or(|at| at <= to)
-            && highest.at(*group).is_none_or(|at| at >= from)
-    };
-    Some((0..groups.len()).filter(is_within).collect())
 }
 
 pub(crate) fn arrow(path: &Path) -> Result<Box<dyn TypedFile>, String> {
@@ -163,7 +125,7 @@ pub(crate) fn arrow(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |columns, _| {
+        read: Box::new(move |columns| {
             let reader = FileReader::try_new_buffered(file, Some(columns.to_vec()));
             let batches: Batches = Box::new(reader.map_err(words)?);
             Ok((batches, columns.to_vec()))
@@ -178,6 +140,6 @@ pub(crate) fn arrow_stream(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |_, _| Ok((Box::new(reader), places))),
+        read: Box::new(move |_| Ok((Box::new(reader), places))),
     }))
 }

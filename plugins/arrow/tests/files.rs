@@ -469,35 +469,3 @@ fn a_table_with_a_row_for_each_value_is_read_by_its_names() {
     assert_eq!(rows[0].values, [0.1, f64::INFINITY]);
     assert!(rows[1].values[0] == 0.3 && rows[1].values[1].is_nan());
 }
-
-#[test]
-fn groups_of_rows_outside_of_a_stretch_of_time_are_not_read() {
-    let folder = Folder::of("within");
-    let day = 86_400_000_i64;
-    let instants = || (0..30).map(|nth| 20_000 * day + nth * day / 2);
-    let rows = |zone: Option<&str>, within: Option<(i64, i64)>| {
-        let path = folder.file("log.parquet");
-        let time = TimestampMillisecondArray::from_iter_values(instants());
-        let time = time.with_timezone_opt(zone);
-        let values = Float64Array::from_iter_values((0..30).map(f64::from));
-        write_parquet(
-            &path,
-            &batch(&[("t", Arc::new(time)), ("x", Arc::new(values))]),
-        );
-        let layout = Layout::new("t", TimeForm::Rfc3339, ["x"]);
-        let options = Options {
-            within,
-            ..Options::default()
-        };
-        let rows = rows_of(&path, layout, options).unwrap();
-        rows.iter().map(|row| row.values[0]).collect::<Vec<_>>()
-    };
-    let numbers = |from: u32, to: u32| (from..to).map(f64::from).collect::<Vec<_>>();
-    let at = |nth: usize| instants().nth(nth).unwrap() * 1_000_000;
-    // A group has three rows.
-    assert_eq!(rows(Some("UTC"), None), numbers(0, 30));
-    assert_eq!(rows(Some("UTC"), Some((at(10), at(12)))), numbers(9, 15));
-    assert_eq!(rows(Some("UTC"), Some((at(0) - 5, at(0) - 1))), []);
-    // Where it is not said where a clock stands, a day more is read on either side.
-    assert_eq!(rows(None, Some((at(10), at(12)))), numbers(6, 15));
-}

@@ -11,9 +11,10 @@ use athermal_run::fit::{FitOptions, Outcome};
 use athermal_run::model::{Card, Model, ModelError};
 use athermal_run::score::{ScoreOptions, score};
 
+use crate::blocks::{self, OnBlocks};
 use crate::figure::Figure;
 use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
-use crate::machine::fit_machine;
+use crate::machine::{MachineFit, fit_machine};
 use crate::rows::{RowsId, Summed};
 
 /// Works until the input ends.
@@ -77,6 +78,20 @@ fn load_graph(setup: &Setup) -> Result<Model, String> {
 fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String> {
     let dataset = Dataset::new(job.files.clone(), setup.reading.options());
     match (&job.task, graph) {
+        (Task::Fit { created, known }, Some(graph)) if setup.blocks.blocks.is_some() => {
+            let kept = setup.blocks.keep_blocks.as_ref();
+            let on_blocks = OnBlocks {
+                graph,
+                files: &job.files,
+                reading: &setup.reading.options(),
+                kept: kept.map(|folder| folder.join(&job.machine)),
+            };
+            let fit = on_blocks.fit(known.as_ref(), &options(setup), created.clone());
+            match fit.map_err(|error| error.to_string())? {
+                blocks::Outcome::Same => Ok(Reply::Same),
+                blocks::Outcome::Fitted(fit, faults) => reply(*fit, &faults),
+            }
+        }
         (Task::Fit { created, known }, Some(graph)) => {
             if let Some(known) = known {
                 let rows = RowsId::of(&dataset, &graph.plan).map_err(|error| error.to_string())?;
@@ -100,15 +115,21 @@ fn fitted(
     dataset: &Dataset,
     created: Option<String>,
 ) -> Result<Reply, String> {
-    let options = FitOptions {
+    let watch = FaultWatch::new(dataset, Purpose::Fit);
+    let fit = fit_machine(graph, &watch, &options(setup), created, &mut |_| {});
+    reply(fit.map_err(|error| error.to_string())?, &watch.found())
+}
+
+fn options(setup: &Setup) -> FitOptions {
+    FitOptions {
         memory: setup.memory,
         // There are as many workers as are to work at a time.
         threads: 1,
         ..FitOptions::default()
-    };
-    let watch = FaultWatch::new(dataset, Purpose::Fit);
-    let fit = fit_machine(graph, &watch, &options, created, &mut |_| {});
-    let fit = fit.map_err(|error| error.to_string())?;
+    }
+}
+
+fn reply(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Reply, String> {
     let failed = fit.report.estimators.iter();
     let unfitted = failed.filter_map(|of| match &of.outcome {
         Outcome::Failed(error) => Some(Unfitted {
@@ -127,7 +148,7 @@ fn fitted(
             .map_or_else(Vec::new, Figure::of_card),
         unfitted: unfitted.collect(),
         constant: bare.map(|of| of.output.clone()).collect(),
-        doubts: doubts(&watch.found(), &fit.report.rejected),
+        doubts: doubts(faults, &fit.report.rejected),
         rows: fit.rows,
     })))
 }
