@@ -13,14 +13,15 @@ these, of which each is a segment of its own. Further named arguments are the op
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
-from athermal import _athermal, _frames
+from athermal import _athermal, _frames, _nodes
 from athermal._athermal import Table, __version__
 from athermal._errors import (
     AthermalWarning,
@@ -28,9 +29,12 @@ from athermal._errors import (
     Error,
     FitError,
     GraphError,
+    NodeError,
     OutsideError,
     RequestError,
 )
+from athermal._nodes import Channel, estimator, feature
+from athermal._progress import Progress
 from athermal._results import (
     Comparison,
     Diagnosis,
@@ -43,6 +47,7 @@ from athermal._results import (
 
 __all__ = [
     "AthermalWarning",
+    "Channel",
     "Comparison",
     "Diagnosis",
     "Diagnostic",
@@ -55,6 +60,7 @@ __all__ = [
     "Graph",
     "GraphError",
     "Model",
+    "NodeError",
     "OutsideError",
     "Report",
     "RequestError",
@@ -63,15 +69,13 @@ __all__ = [
     "__version__",
     "compare",
     "diagnose",
+    "estimator",
     "evaluate",
+    "feature",
     "init",
     "report",
     "simulate",
 ]
-
-Progress = Union[bool, Callable[[str, int, Union[int, None]], Any], None]
-"""`True` for a line on standard error; or a function of what is done, how much of it, and of how much where that is known."""
-
 
 class Frame:
     """A table of Arrow: for pandas, polars, pyarrow, DuckDB, or whoever else takes `__arrow_c_stream__`."""
@@ -124,12 +128,12 @@ def _wrapped(made: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A graph as JSON takes it: what is `None` is not there."""
+    """A graph as JSON takes it: what is `None` is not there, and a node of Python goes by its name."""
     if isinstance(value, Mapping):
         return {str(key): _plain(of) for key, of in value.items() if of is not None}
     if isinstance(value, (list, tuple)):
         return [_plain(of) for of in value]
-    return value
+    return _nodes.reference(value) if _nodes.is_node(value) else value
 
 
 def _renamed(time: str | None, columns: list[str]) -> dict[str, str] | None:
@@ -138,6 +142,14 @@ def _renamed(time: str | None, columns: list[str]) -> dict[str, str] | None:
     if len(columns) != 1:
         raise RequestError(f"time={time!r}: the graph puts its time together from {', '.join(columns)}; give these columns")
     return {time: columns[0]}
+
+
+def _call(
+    graph: _athermal.Graph, data: Any, time: str | None, progress: Progress, options: Mapping[str, Any]
+) -> _frames.Call:
+    call = _frames.Call(_frames.words(options), progress)
+    _frames.add_data(call, data, columns=graph.columns, renamed=_renamed(time, graph.time_columns))
+    return call
 
 
 class Graph:
@@ -171,6 +183,11 @@ class Graph:
         """What it puts out, such as `predicted.Z1`."""
         return self._graph.outputs
 
+    @property
+    def truths(self) -> dict[str, str]:
+        """What is predicted by each output that is a prediction: `drift.Z1` by `predicted.Z1`."""
+        return {output: truth for output, _, truth in self._graph.predictions}
+
     def to_dict(self) -> dict[str, Any]:
         """The graph as declared, with what its file extends."""
         tree: dict[str, Any] = json.loads(self._graph.to_json())
@@ -186,10 +203,11 @@ class Graph:
         `time` names the column that stands for the one that the graph declares. Raises `RequestError` where the data are not what the
         graph reads, and `FitError` where nothing can be fitted.
         """
-        renamed = _renamed(time, self._graph.time_columns)
-        read = _frames.data(data, columns=self._graph.columns, renamed=renamed)
-        model, text = self._graph.fit(read, _frames.words(options), _frames.progress_of(progress))
-        return Model._of(model, text)
+        return Model._of(*self._graph.fit(_call(self._graph, data, time, progress, options)))
+
+    def model(self) -> Model:
+        """The model of a graph in which nothing needs a fit, such as one of features alone."""
+        return Model._of(self._graph.model())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _graph_of, (self._graph.to_json(),)
@@ -285,12 +303,8 @@ class Model:
         after the one before is left out, with a warning. The options are `frozen`, `lenient` and `segments`.
         """
         graph = self._model.graph()
-        its_time = graph.time_columns
-        renamed = _renamed(time, its_time)
-        read = _frames.data(data, columns=graph.columns, renamed=renamed)
-        name = time or " ".join(its_time)
-        made = self._model.predict(read, _frames.words(options), name, _frames.progress_of(progress))
-        return _like(data, made)
+        call = _call(graph, data, time, progress, options)
+        return _like(data, self._model.predict(call, time or " ".join(graph.time_columns)))
 
     def engine(self) -> Engine:
         """The model as an engine that takes one instant a call."""
@@ -374,31 +388,22 @@ class Engine:
         return self._engine.last_ns
 
 
-def _of_model(model: Model, data: Any, time: str | None) -> _frames.Data:
-    graph = model._model.graph()
-    renamed = _renamed(time, graph.time_columns)
-    return _frames.data(data, columns=graph.columns, renamed=renamed)
-
-
 def evaluate(model: Model, data: Any, time: str | None = None, *, progress: Progress = None, **options: Any) -> Scores:
     """Scores the predictions of a model on data, as `athermal evaluate` does, whose options it takes.
 
     Among them are `mode`, `steps`, `abs_truth_below`, `each_on_its_own` and `frozen`.
     """
-    read = _of_model(model, data, time)
-    return Scores(*model._model.evaluate(read, _frames.words(options), _frames.progress_of(progress)))
+    return Scores(*model._model.evaluate(_call(model._model.graph(), data, time, progress, options)))
 
 
 def diagnose(model: Model, data: Any, time: str | None = None, *, progress: Progress = None, **options: Any) -> Diagnosis:
     """Shows why a model predicts as well as it does, as `athermal diagnose` does: `of`, `window`, `day`, `no_fit`."""
-    read = _of_model(model, data, time)
-    return Diagnosis(*model._model.diagnose(read, _frames.words(options), _frames.progress_of(progress)))
+    return Diagnosis(*model._model.diagnose(_call(model._model.graph(), data, time, progress, options)))
 
 
 def report(model: Model, data: Any, time: str | None = None, *, progress: Progress = None, **options: Any) -> Report:
     """Shows what a model is worth on data, as a page, as `athermal report` does."""
-    read = _of_model(model, data, time)
-    return Report(*model._model.report(read, _frames.words(options), _frames.progress_of(progress)))
+    return Report(*model._model.report(_call(model._model.graph(), data, time, progress, options)))
 
 
 def compare(
@@ -415,12 +420,10 @@ def compare(
     if not isinstance(graphs, Mapping):
         graphs = {f"graph {nth}": of for nth, of in enumerate(graphs, 1)}
     columns = {column for of in graphs.values() for column in of.columns}
-    of_fit = _frames.data(data, columns=columns)
-    of_scores = _frames.data(on, name="on", option="--on", columns=columns)
-    of_fit.tables += of_scores.tables
-    of_fit.more = list(dict.fromkeys([*of_scores.arguments, *of_fit.more]))
-    named = [(name, of._graph) for name, of in graphs.items()]
-    return Comparison(*_athermal.compare(named, of_fit, _frames.words(options), _frames.progress_of(progress)))
+    call = _frames.Call(_frames.words(options), progress)
+    _frames.add_data(call, on, name="on", option="--on", columns=columns)
+    _frames.add_data(call, data, columns=columns)
+    return Comparison(*_athermal.compare([(name, of._graph) for name, of in graphs.items()], call))
 
 
 class Starter(Graph):
@@ -436,8 +439,9 @@ class Starter(Graph):
 
 def init(data: Any, **options: Any) -> Starter:
     """A starter graph for data, as `athermal init` writes one; its options are `time`, `time_format` and `drifts`."""
-    read = _frames.data(data, option=None)
-    return Starter(*_athermal.init(read, _frames.words(options)))
+    call = _frames.Call(_frames.words(options))
+    _frames.add_data(call, data, option=None)
+    return Starter(*_athermal.init(call))
 
 
 def simulate(machine: str, days: float = 7.0, seed: int = 1, *, progress: Progress = None, **options: Any) -> Frame:
@@ -447,4 +451,11 @@ def simulate(machine: str, days: float = 7.0, seed: int = 1, *, progress: Progre
     """
     faults = options.pop("faults", None)
     words = [machine, *_frames.words({"days": days, "seed": seed, "fault": faults, **options})]
-    return Frame(_athermal.simulate(words, _frames.progress_of(progress)))
+    return Frame(_athermal.simulate(_frames.Call(words, progress)))
+
+
+def __getattr__(name: str) -> Any:
+    # What builds on another library is imported once it is asked for.
+    if name in ("conformance", "dask", "sklearn", "spark"):
+        return importlib.import_module(f"athermal.{name}")
+    raise AttributeError(f"module 'athermal' has no attribute {name!r}")

@@ -71,11 +71,15 @@ class OutsideError(Error, OSError):
     """A file cannot be read or written."""
 
 
+class NodeError(Error, RuntimeError):
+    """A node failed in its code. What a node of Python raised is the cause."""
+
+
 class AthermalWarning(UserWarning):
     """What is doubtful in data or in a model, but does not stop the work."""
 
 
-_CLASSES = {of.__name__: of for of in (GraphError, RequestError, FitError, OutsideError)}
+_CLASSES = {of.__name__: of for of in (GraphError, RequestError, FitError, OutsideError, NodeError)}
 
 
 def _words(text: str) -> str:
@@ -84,7 +88,7 @@ def _words(text: str) -> str:
 
 
 def made(name: str, text: str) -> Error:
-    return _CLASSES[name](text if name == "GraphError" else _words(text))
+    return _CLASSES[name](text if name in ("GraphError", "NodeError") else _words(text))
 
 
 def warn(texts: list[str], level: int) -> None:

@@ -4,57 +4,53 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone, tzinfo
 from typing import Any
 from zoneinfo import ZoneInfo
 
 from athermal._athermal import Table
+from athermal._progress import Progress, listener
 
 _EPOCH = datetime(1970, 1, 1)
 
 
-class Data:
-    """What a call of the library reads: `--data` with names, and the tables that some of the names stand for."""
+class Call:
+    """What a function of the library is asked for: arguments of the command line, and the tables that names among them stand for."""
 
-    def __init__(self, option: str | None = "--data") -> None:
-        self.option = option
-        self.names: list[str] = []
+    def __init__(self, arguments: list[str], progress: Progress = None) -> None:
+        self.arguments = arguments
         self.tables: list[tuple[str, Table]] = []
-        self.more: list[str] = []
-
-    @property
-    def arguments(self) -> list[str]:
-        option = [self.option] if self.option else []
-        return [*option, *self.names, *self.more]
+        self.progress = listener(progress)
 
 
 def module_of(of: object) -> str:
     return type(of).__module__.partition(".")[0]
 
 
-def data(
+def add_data(
+    call: Call,
     given: Any,
     *,
     name: str = "frame",
     option: str | None = "--data",
     columns: Iterable[str] | None = None,
     renamed: Mapping[str, str] | None = None,
-) -> Data:
-    """Reads a frame, the path of a file, or a list of them, of which each is a segment of its own.
+) -> None:
+    """Adds a frame, the path of a file, or a list of them, of which each is a segment of its own, to what a call reads.
 
     Only the named columns are looked at, all where none are named. `renamed` gives columns of the frame other names.
     """
-    of = Data(option)
+    names_of_data: list[str] = []
     several = isinstance(given, (list, tuple))
     if several and not given:
         raise TypeError("the list of frames is empty")
     for nth, one in enumerate(given if several else [given]):
         if isinstance(one, (str, os.PathLike)):
-            of.names.append(os.fspath(one))
+            names_of_data.append(os.fspath(one))
             continue
         its_name = f"{name}[{nth}]" if several else name
-        of.names.append(its_name)
+        names_of_data.append(its_name)
         wanted = None if columns is None else dict.fromkeys(columns)
         names = dict(renamed or {})
         for given_name, graph_name in names.items():
@@ -64,10 +60,9 @@ def data(
         its_table = table(one, wanted)
         if names:
             its_table = its_table.renamed(names)
-        of.tables.append((its_name, its_table))
-    if several and len(given) > 1:
-        of.more.append("--segments")
-    return of
+        call.tables.append((its_name, its_table))
+    segments = ["--segments"] if several and len(given) > 1 and "--segments" not in call.arguments else []
+    call.arguments = [*([option] if option else []), *names_of_data, *segments, *call.arguments]
 
 
 def table(frame: Any, wanted: Iterable[str] | None = None) -> Table:
@@ -81,6 +76,9 @@ def table(frame: Any, wanted: Iterable[str] | None = None) -> Table:
             frame = frame.select(_there(there, wanted)).collect()
         else:
             frame = frame.select(_there(frame.columns, wanted))
+        # A column in which nothing ever was has a type of its own, which polars does not hand over as Arrow wants it.
+        nothing = [name for name, of in frame.schema.items() if str(of) == "Null"]
+        frame = frame.with_columns(sys.modules["polars"].lit(None, sys.modules["polars"].Float64).alias(of) for of in nothing)
     elif library in ("duckdb", "_duckdb"):
         # Columns are named as they are, whatever signs they have.
         there = _there(frame.columns, wanted)
@@ -241,21 +239,6 @@ def to_polars(made: Table) -> Any:
     import polars
 
     return polars.DataFrame(made)
-
-
-def progress_of(progress: bool | Callable[[str, int, int | None], Any] | None) -> Any:
-    """The function that takes progress: what is done, how much of it, and of how much."""
-    if progress is None or progress is False:
-        return None
-    if progress is not True:
-        return progress
-
-    def line(what: str, done: int, total: int | None) -> None:
-        of = f" of {total:,}" if total else ""
-        sys.stderr.write(f"\r{what}: {done:,}{of}   ")
-        sys.stderr.flush()
-
-    return line
 
 
 def words(options: Mapping[str, Any]) -> list[str]:

@@ -55,8 +55,8 @@ class Scores(Facts):
         return list(self.facts["scores"])
 
     def _repr_html_(self) -> str:
-        head = ["prediction", "truth", "unit", "n", "RMSE", "R²", "no model", "persistence", "bias", "valid"]
-        keys = ["output", "truth", "unit", "n", "rmse", "r2", "baseline_zero", "baseline_persistence", "bias", "valid"]
+        head = ["prediction", "truth", "unit", "n", "RMSE", "R²", "R²mean", "no model", "persistence", "bias", "valid"]
+        keys = ["output", "truth", "unit", "n", "rmse", "r2_zero", "r2_mean", "baseline_zero", "baseline_persistence", "bias", "valid"]
         return _STYLE + html_table(head, [[of.get(key) for key in keys] for of in self.scores])
 
 
@@ -125,8 +125,8 @@ class FitReport(Facts):
 
     @property
     def chosen(self) -> dict[str, list[str]]:
-        """The regressors that each node chose, in the order in which it did."""
-        return {of["node"]: [step_name(step) for step in of.get("selection", [])] for of in self.estimators}
+        """The regressors that each node chose, in the order in which it did; none where it takes all."""
+        return {of["node"]: _chosen(of.get("selection", [])) for of in self.estimators}
 
     def _repr_html_(self) -> str:
         head = ["node", "truth", "unit", "rows", "in-sample RMSE", "R²", "chosen"]
@@ -135,9 +135,11 @@ class FitReport(Facts):
         return _STYLE + html_table(head, rows)
 
 
-def step_name(step: dict[str, Any]) -> str:
-    name = step.get("name") or step.get("added") or step.get("regressor")
-    return str(name if name is not None else step.get("removed", ""))
+def _chosen(steps: list[dict[str, Any]]) -> list[str]:
+    chosen: list[str] = []
+    for step in steps:
+        (chosen.remove if step.get("removed") else chosen.append)(step["regressor"])
+    return chosen
 
 
 def _summary(card: dict[str, Any]) -> str:

@@ -8,9 +8,10 @@ use athermal::core::document::TimeBase;
 use athermal::{Engine as Run, Instant};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt as _;
 use pyo3::types::{PyBytes, PyDict, PyString};
 
-use crate::failure::request;
+use crate::failure::{guarded, request};
 
 /// An engine.
 #[pyclass(frozen, module = "athermal._athermal")]
@@ -54,8 +55,10 @@ impl Engine {
         }
     }
 
-    fn running(&self) -> MutexGuard<'_, Running> {
-        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    /// What runs. A node of Python may let another thread ask for it meanwhile, which then waits without Python's lock.
+    fn running(&self, py: Python<'_>) -> MutexGuard<'_, Running> {
+        let running = self.running.lock_py_attached(py);
+        running.unwrap_or_else(PoisonError::into_inner)
     }
 
     fn unknown(&self, name: &str) -> PyErr {
@@ -76,7 +79,7 @@ impl Engine {
         t_ns: i64,
         values: &Bound<'py, PyDict>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let mut running = self.running();
+        let mut running = self.running(py);
         let Running { engine, samples } = &mut *running;
         samples.fill(f64::NAN);
         for (name, value) in values {
@@ -92,7 +95,7 @@ impl Engine {
                 })?;
             }
         }
-        let outputs = engine.step(Instant::from_ns(t_ns), samples);
+        let outputs = guarded(py, move || engine.step(Instant::from_ns(t_ns), samples))?;
         let outputs = outputs.map_err(|error| request(py, &error.to_string()))?;
         let given = PyDict::new(py);
         for (name, value) in self.outputs.iter().zip(outputs) {
@@ -103,36 +106,37 @@ impl Engine {
     }
 
     /// The next step belongs to another segment: windows, lags and filters start afresh.
-    fn segment(&self) {
-        self.running().engine.segment();
+    fn segment(&self, py: Python<'_>) -> PyResult<()> {
+        guarded(py, || self.running(py).engine.segment())
     }
 
     /// Freezes what is learned while it runs, or lets it go on.
-    fn freeze(&self, frozen: bool) {
-        self.running().engine.freeze(frozen);
+    fn freeze(&self, py: Python<'_>, frozen: bool) {
+        self.running(py).engine.freeze(frozen);
     }
 
     /// All that it knows, as bytes.
-    fn snapshot<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.running().engine.snapshot())
+    fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let snapshot = guarded(py, || self.running(py).engine.snapshot())?;
+        Ok(PyBytes::new(py, &snapshot))
     }
 
     /// Goes on from a snapshot of the same model, with the same bits.
     fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> PyResult<()> {
-        let restored = self.running().engine.restore(snapshot);
+        let restored = guarded(py, || self.running(py).engine.restore(snapshot))?;
         restored.map_err(|error| request(py, &error.to_string()))
     }
 
     /// The instant of the last step in ns; `None` before the first.
     #[getter]
-    fn last_ns(&self) -> Option<i64> {
-        self.running().engine.last().map(Instant::as_ns)
+    fn last_ns(&self, py: Python<'_>) -> Option<i64> {
+        self.running(py).engine.last().map(Instant::as_ns)
     }
 
     /// The measured channels.
     #[getter]
-    fn channels(&self) -> Vec<String> {
-        let running = self.running();
+    fn channels(&self, py: Python<'_>) -> Vec<String> {
+        let running = self.running(py);
         let sources = running.engine.plan().sources.iter();
         sources.map(|of| of.name.clone()).collect()
     }

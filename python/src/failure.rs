@@ -1,13 +1,19 @@
 //! Failures as Python exceptions, whose texts are those of the command line.
 
-use athermal::core::diagnostic::{Diagnostics, Sources, explain};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+use athermal::core::diagnostic::{
+    Diagnostics, NodePanic, Sources, explain, panic_message, panic_text,
+};
 use athermal::run::model::ModelError;
 use athermal_command::Failure;
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use serde_json::Value;
 
 use crate::json::to_python;
+use crate::nodes::raised;
 
 /// An exception of the package, by the name of its class.
 fn exception(py: Python<'_>, class: &str, text: &str) -> PyErr {
@@ -73,4 +79,27 @@ pub fn of_failure(py: Python<'_>, failure: &Failure) -> PyErr {
 /// The exception of a graph or model that cannot be used.
 pub fn of_model(py: Python<'_>, error: ModelError) -> PyErr {
     of_failure(py, &error.into())
+}
+
+/// Does what runs nodes. What one of them raises, and a panic of one, becomes an exception that names it.
+pub fn guarded<R>(py: Python<'_>, work: impl FnOnce() -> R) -> PyResult<R> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let cause = raised(panic_message(&*panic));
+        let node = panic.downcast_ref::<NodePanic>();
+        let text = match (&cause, node) {
+            // An interrupt goes on as it is.
+            (Some(cause), _) if !cause.is_instance_of::<PyException>(py) => {
+                return cause.clone_ref(py);
+            }
+            (Some(cause), None) => return cause.clone_ref(py),
+            (Some(cause), Some(of)) => {
+                format!("the node `{}` failed {}: {cause}", of.node, of.when)
+            }
+            (None, Some(_)) => panic_text(&*panic),
+            (None, None) => resume_unwind(panic),
+        };
+        let error = exception(py, "NodeError", &text);
+        error.set_cause(py, cause);
+        error
+    })
 }

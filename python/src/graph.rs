@@ -8,10 +8,10 @@ use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::run::model::{Model as Run, ModelError};
 use pyo3::prelude::*;
 
-use crate::failure::{of_model, unfitted};
+use crate::failure::{guarded, of_model, unfitted};
 use crate::json;
 use crate::model::{Model, columns, tree};
-use crate::work::{Data, work};
+use crate::work::{Call, work};
 
 /// A graph that was read and compiled, without a fit.
 #[pyclass(frozen, module = "athermal._athermal")]
@@ -25,7 +25,8 @@ fn read(
     read: impl FnOnce(&mut Sources, &mut Diagnostics) -> Result<Run, ModelError>,
 ) -> PyResult<Graph> {
     let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
-    let inner = read(&mut sources, &mut doubts).map_err(|error| of_model(py, error))?;
+    let inner = guarded(py, || read(&mut sources, &mut doubts))?;
+    let inner = inner.map_err(|error| of_model(py, error))?;
     if !doubts.is_empty() {
         let text = doubts.render(&sources, false, 100).trim_end().to_owned();
         let errors = py.import("athermal._errors")?;
@@ -98,26 +99,36 @@ impl Graph {
         outputs.map(|of| of.name.clone()).collect()
     }
 
+    /// Of each output that predicts a truth: its name, that of the prediction in scores, and the truth.
+    #[getter]
+    fn predictions(&self) -> Vec<(String, String, String)> {
+        let plan = &self.inner.plan;
+        let outputs = plan.outputs.iter().filter_map(|output| {
+            let of = &plan.channels[output.slot];
+            let truth = &plan.channels[of.predicts?];
+            Some((output.name.clone(), of.name.clone(), truth.name.clone()))
+        });
+        outputs.collect()
+    }
+
     /// A picture as SVG.
     fn svg(&self) -> String {
         calls::picture(&self.inner.plan)
     }
 
-    /// Fits it on data, with the arguments of `athermal fit`. Gives the model, and how the fit went in words.
-    #[pyo3(signature = (data, arguments, progress = None))]
-    fn fit(
-        &self,
-        py: Python<'_>,
-        data: Data,
-        arguments: Vec<String>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Model, String)> {
-        let arguments = [data.arguments.clone(), arguments].concat();
-        let fitted = work(py, &data, progress, || calls::fit(&self.inner, &arguments))?;
+    /// Fits it, with the arguments of `athermal fit`. Gives the model, and how the fit went in words.
+    fn fit(&self, py: Python<'_>, call: Call) -> PyResult<(Model, String)> {
+        let fitted = work(py, &call, |arguments| calls::fit(&self.inner, arguments))?;
         match fitted.model {
             Some(inner) => Ok((Model { inner }, fitted.text)),
             None => Err(unfitted(py, &fitted.failed)),
         }
+    }
+
+    /// The model of it, where nothing needs a fit.
+    fn model(&self) -> Model {
+        let inner = self.inner.clone();
+        Model { inner }
     }
 
     /// The model of a graph in which nothing needs a fit, or with the fits of the model that its file names.
@@ -130,10 +141,9 @@ impl Graph {
     }
 }
 
-/// A starter graph for data, with the arguments of `athermal init`: its text, and what was found and guessed.
+/// A starter graph, with the arguments of `athermal init`: its text, and what was found and guessed.
 #[pyfunction]
-pub fn init(py: Python<'_>, data: Data, arguments: Vec<String>) -> PyResult<(String, Vec<String>)> {
-    let arguments = [data.arguments.clone(), arguments].concat();
-    let starter = work(py, &data, None, || calls::init(&arguments))?;
+pub fn init(py: Python<'_>, call: Call) -> PyResult<(String, Vec<String>)> {
+    let starter = work(py, &call, calls::init)?;
     Ok((starter.text, starter.remarks))
 }

@@ -10,12 +10,12 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::engine::Engine;
-use crate::failure::of_model;
+use crate::failure::{guarded, of_model};
 use crate::graph::Graph;
 use crate::json::to_python;
 use crate::predictions::Predictions;
 use crate::table::Table;
-use crate::work::{Data, work};
+use crate::work::{Call, work};
 
 /// A model.
 #[pyclass(frozen, module = "athermal._athermal")]
@@ -52,7 +52,7 @@ impl Model {
     /// Reads the text of a model; `name` stands for its path.
     #[staticmethod]
     fn of_json(py: Python<'_>, name: &str, text: String) -> PyResult<Self> {
-        let inner = py.detach(|| Run::from_text(name, text));
+        let inner = guarded(py, || py.detach(|| Run::from_text(name, text)))?;
         let inner = inner.map_err(|error| of_model(py, error))?;
         Ok(Self { inner })
     }
@@ -96,29 +96,20 @@ impl Model {
 
     /// An engine that runs it, cold.
     fn engine(&self, py: Python<'_>) -> PyResult<Engine> {
-        let engine = self.inner.engine();
+        let engine = guarded(py, || self.inner.engine())?;
         engine
             .map(|engine| Engine::new(py, engine))
             .map_err(|error| of_model(py, error))
     }
 
-    /// What it puts out for data, with the arguments of `athermal run`. `time` is the name of the column of the time.
-    #[pyo3(signature = (data, arguments, time, progress = None))]
-    fn predict(
-        &self,
-        py: Python<'_>,
-        data: Data,
-        arguments: Vec<String>,
-        time: String,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<Table> {
-        let arguments = [data.arguments.clone(), arguments].concat();
+    /// What it puts out, with the arguments of `athermal run`. `time` is the name of the column of the time.
+    fn predict(&self, py: Python<'_>, call: Call, time: String) -> PyResult<Table> {
         let outputs = self.inner.plan.outputs.iter();
         let outputs = outputs.map(|of| of.name.clone()).collect();
-        let like = self.time_type(&data);
+        let like = self.time_type(&call);
         let mut sink = Predictions::new(time, like.as_ref(), outputs);
-        let sink = work(py, &data, progress, move || {
-            calls::predict(&self.inner, &arguments, &mut sink)?;
+        let sink = work(py, &call, move |arguments| {
+            calls::predict(&self.inner, arguments, &mut sink)?;
             Ok(sink)
         })?;
         sink.table()
@@ -126,50 +117,28 @@ impl Model {
     }
 
     /// Scores, with the arguments of `athermal evaluate`.
-    #[pyo3(signature = (data, arguments, progress = None))]
-    fn evaluate<'py>(
-        &self,
-        py: Python<'py>,
-        data: Data,
-        arguments: Vec<String>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<(String, Bound<'py, PyAny>)> {
-        let arguments = [data.arguments.clone(), arguments].concat();
-        let of = work(py, &data, progress, || {
-            calls::evaluate(&self.inner, &arguments)
-        })?;
-        found(py, &of)
+    fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
+        found(
+            py,
+            &work(py, &call, |words| calls::evaluate(&self.inner, words))?,
+        )
     }
 
     /// A diagnosis, with the arguments of `athermal diagnose`.
-    #[pyo3(signature = (data, arguments, progress = None))]
-    fn diagnose<'py>(
-        &self,
-        py: Python<'py>,
-        data: Data,
-        arguments: Vec<String>,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<(String, Bound<'py, PyAny>)> {
-        let arguments = [data.arguments.clone(), arguments].concat();
-        let of = work(py, &data, progress, || {
-            calls::diagnose(&self.inner, &arguments)
-        })?;
-        found(py, &of)
+    fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
+        found(
+            py,
+            &work(py, &call, |words| calls::diagnose(&self.inner, words))?,
+        )
     }
 
     /// A report, with the arguments of `athermal report`; the last part is the page.
-    #[pyo3(signature = (data, arguments, progress = None))]
     fn report<'py>(
         &self,
         py: Python<'py>,
-        data: Data,
-        arguments: Vec<String>,
-        progress: Option<Py<PyAny>>,
+        call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
-        let arguments = [data.arguments.clone(), arguments].concat();
-        let (of, page) = work(py, &data, progress, || {
-            calls::report(&self.inner, &arguments)
-        })?;
+        let (of, page) = work(py, &call, |words| calls::report(&self.inner, words))?;
         let (text, facts) = found(py, &of)?;
         Ok((text, facts, page))
     }
@@ -177,10 +146,10 @@ impl Model {
 
 impl Model {
     /// The type of the one column of the time in tables.
-    fn time_type(&self, data: &Data) -> Option<DataType> {
+    fn time_type(&self, call: &Call) -> Option<DataType> {
         let (times, _) = columns(&self.inner.plan);
         let [time] = &*times else { return None };
-        let (_, table) = data.tables.first()?;
+        let (_, table) = call.tables.first()?;
         let field = table.get().schema.field_with_name(time).ok()?;
         Some(field.data_type().clone())
     }
@@ -188,20 +157,16 @@ impl Model {
 
 /// Graphs fitted on the same data and scored on others, with the arguments of `athermal compare`.
 #[pyfunction]
-#[pyo3(signature = (graphs, data, arguments, progress = None))]
 pub fn compare<'py>(
     py: Python<'py>,
     graphs: Vec<(String, Py<Graph>)>,
-    data: Data,
-    arguments: Vec<String>,
-    progress: Option<Py<PyAny>>,
+    call: Call,
 ) -> PyResult<(String, Bound<'py, PyAny>)> {
     let graphs = graphs.into_iter();
     let graphs = graphs.map(|(name, graph)| (name, graph.get().inner.clone()));
     let graphs: Vec<_> = graphs.collect();
-    let arguments = [data.arguments.clone(), arguments].concat();
-    let of = work(py, &data, progress, move || {
-        calls::compare(graphs, &arguments)
-    })?;
-    found(py, &of)
+    found(
+        py,
+        &work(py, &call, move |words| calls::compare(graphs, words))?,
+    )
 }

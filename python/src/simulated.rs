@@ -8,19 +8,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::table::Table;
-use crate::work::{Data, work};
+use crate::work::{Call, work};
 
 /// Simulates a machine, with the arguments of `athermal simulate`.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress = None))]
-pub fn simulate(
-    py: Python<'_>,
-    arguments: Vec<String>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Table> {
+pub fn simulate(py: Python<'_>, call: Call) -> PyResult<Table> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    let (names, columns) = work(py, &Data::default(), progress, move || {
-        let names = calls::simulate(&arguments, &mut |time_ns, values| {
+    let (names, columns) = work(py, &call, move |arguments| {
+        let names = calls::simulate(arguments, &mut |time_ns, values| {
             columns.resize(values.len() + 1, Vec::new());
             for (column, value) in columns
                 .iter_mut()

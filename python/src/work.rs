@@ -10,7 +10,7 @@ use athermal_command::Failure;
 use athermal_command::collect::{Collected, ProgressListener, collected};
 use pyo3::prelude::*;
 
-use crate::failure::of_failure;
+use crate::failure::{guarded, of_failure};
 use crate::table::Table;
 
 /// So often Python is asked whether it was interrupted.
@@ -19,13 +19,15 @@ const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
 /// What a warning is raised from: a function of the package, which a user called.
 const USER: i32 = 3;
 
-/// The data of a call: the arguments that name them, and those of which the names stand for tables in memory.
-#[derive(Default, FromPyObject)]
-pub struct Data {
-    /// `--data`, names, and what else says how they are read.
+/// What Python asks for, beside the function.
+#[derive(FromPyObject)]
+pub struct Call {
+    /// The arguments of the command line, those that name data included.
     pub arguments: Vec<String>,
-    /// Names and tables.
+    /// The tables in memory that names among them stand for.
     pub tables: Vec<(PathBuf, Py<Table>)>,
+    /// What takes progress.
+    progress: Option<Py<PyAny>>,
 }
 
 /// What ended the work from the side of Python.
@@ -83,12 +85,11 @@ impl Stop {
     }
 }
 
-/// Does some work on data. Its warnings are raised as Python's.
+/// Does some work with the arguments of a call. Its warnings are raised as Python's.
 pub fn work<R: Send>(
     py: Python<'_>,
-    data: &Data,
-    progress: Option<Py<PyAny>>,
-    work: impl FnOnce() -> Result<R, Failure> + Send,
+    call: &Call,
+    work: impl FnOnce(&[String]) -> Result<R, Failure> + Send,
 ) -> PyResult<R> {
     let stop = Stop::default();
     let go_on = stop.clone().check();
@@ -98,12 +99,17 @@ pub fn work<R: Send>(
         let open: OpenTable = athermal_arrow::table(schema, batches, Arc::clone(&go_on));
         (name.clone(), open)
     };
-    let tables = data.tables.iter().map(open).collect();
+    let tables = call.tables.iter().map(open).collect();
+    let progress = call.progress.as_ref().map(|of| of.clone_ref(py));
     let progress = progress.map(|listener| stop.clone().progress(listener));
-    let (result, reports) = py.detach(|| collected(progress, || with_tables(tables, work)));
+    let arguments = &call.arguments;
+    let done = guarded(py, || {
+        py.detach(|| collected(progress, || with_tables(tables, || work(arguments))))
+    });
     if let Some(error) = stop.take() {
         return Err(error);
     }
+    let (result, reports) = done?;
     warn(py, &reports)?;
     result.map_err(|failure| of_failure(py, &failure))
 }

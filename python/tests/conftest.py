@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -100,3 +101,64 @@ def parts(model: athermal.Model | str) -> tuple[str, str]:
     text = model if isinstance(model, str) else model.to_json()
     read = json.loads(text)
     return json.dumps(read["graph"]), json.dumps(read["fitted"])
+
+
+DATE = "2026-01-31T12:00:00Z"
+MACHINES = ["m1", "m2", "m3", "m4"]
+
+
+@pytest.fixture(scope="session")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the graph, a day of Parquet of each of four machines, and the models that the command line makes of them.
+
+    Of `m4` no truth was measured, so that it cannot be fitted.
+    """
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "graph.toml").write_text(GRAPH)
+    for nth, machine in enumerate(MACHINES):
+        rows = pyarrow.table(athermal.simulate("die-tester", days=1, seed=nth + 1))
+        for axis in ("Z1_nm", "Z2_nm") if machine == "m4" else ():
+            rows = rows.set_column(rows.column_names.index(axis), axis, pyarrow.nulls(len(rows), "f8"))
+        its = folder / "logs" / f"machine={machine}"
+        its.mkdir(parents=True)
+        parquet.write_table(rows, its / "log.parquet", row_group_size=2000)
+    words = ["fleet", "fit", "graph.toml", "--data", "logs/machine=*/*.parquet", "-o", "models", "--date", DATE]
+    done = subprocess.run([sys.executable, "-m", "athermal", *words], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 1 and "m4" in done.stderr, done.stderr
+    run(folder, "fit", "graph.toml", "--data", "logs/machine=m1/log.parquet", "-o", "m1.json")
+    return folder
+
+
+def check_fleet(fleet: Path, rows: list[dict[str, object]]) -> None:
+    """The rows of a fitted fleet have the models of the command line, to the byte, and say why a machine has none."""
+    assert sorted(row["machine"] for row in rows) == MACHINES
+    for row in rows:
+        machine, model = row["machine"], row["model"]
+        if machine == "m4":
+            assert model is None and "nothing could be fitted" in row["error"]
+            continue
+        assert model == (fleet / "models" / f"{machine}.json").read_bytes(), machine
+        assert row["error"] is None and row["unfitted"] == [] and row["constant"] == []
+        card = json.loads(model)["card"]
+        assert [(of["rows"], of["hash"]) for of in card["data"]] == [(row["rows"], row["rows_hash"])]
+        assert card["created"] == DATE
+        assert [of["of"] for of in row["scores"]] == ["thermal.Z1", "thermal.Z2"]
+        assert all(of["rmse"] > 0 and of["n"] > 0 and of["unit"] == "nm/min" for of in row["scores"])
+        if machine == "m1":
+            assert parts(model.decode()) == parts((fleet / "m1.json").read_text())
+
+
+def run_blocks(page: str, word: str, folder: Path) -> None:
+    """Runs the blocks of Python on a page of the documentation that have a word in them, with `logs` of a folder."""
+    path = Path(__file__).parents[2] / "docs" / "src" / page
+    if not path.is_file():
+        pytest.skip("the documentation is not there")
+    blocks = re.findall(r"^```python\n(.*?)^```$", path.read_text(), re.DOTALL | re.MULTILINE)
+    blocks = [block for block in blocks if word in block]
+    assert blocks
+    for block in blocks:
+        # The present folder is not that of whoever reads in another process.
+        block = block.replace('"logs"', repr(str(folder / "logs")))
+        exec(compile(block, str(path), "exec"), {})

@@ -291,6 +291,27 @@ fn a_project_of_somebody_else_is_not_written_over() {
     absent.ended(3).tells(&["no vendored crates in"]);
 }
 
+#[test]
+fn a_wheel_is_refused_where_what_makes_it_is_missing() {
+    let scratch = Scratch::new("build-wheel");
+    let core = format!(
+        "athermal-core = {{ path = {:?} }}",
+        format!("{ROOT}/core/framework")
+    );
+    let with = with_core(&scratch, "wheel-nodes", &core);
+    let wheels = scratch.path("wheels");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(["build", "--wheel", "--with", &with, "-o"])
+        .arg(&wheels)
+        .env("MATURIN", scratch.path("no-maturin"))
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{message}");
+    assert!(message.contains("pip install maturin"), "{message}");
+    assert!(!wheels.exists() && !scratch.path("wheels-project").exists());
+}
+
 /// A cargo that notes how it is called to build, and builds nothing.
 #[cfg(unix)]
 #[test]

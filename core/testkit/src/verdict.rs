@@ -64,7 +64,7 @@ pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     let of_ports: Vec<Case> = derived::of_ports(kind, &subjects).into_iter().collect();
     subjects.extend(self::subjects(kind, &of_ports, &mut broken));
     for subject in &subjects {
-        for (rule, check) in rules::ALL {
+        for &(rule, check) in rules::ALL {
             if subject.case.asks_for(rule)
                 && let Err(found) = tried(|| check.run(subject, &subjects))
             {

@@ -5,7 +5,7 @@ use std::path::Path;
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
 use athermal_files::{FileError, Options, Reader, layout};
-use athermal_run::fit::{FitOptions, FitProgress};
+use athermal_run::fit::{FitError, FitOptions, FitProgress};
 use athermal_run::model::Model;
 
 use crate::machine::{MachineError, MachineFit, fit_machine};
@@ -29,11 +29,27 @@ pub fn rows_of(
     Reader::from_typed(Path::new(name), file, layout(&graph.plan), options)
 }
 
-/// [`fit_machine`] on batches that come once. Those that the fit has seen are let go; where it reads them again, they come from what
-/// was kept of them: in memory up to [`FitOptions::memory`], beyond that in a file without a name.
+/// The rows of batches that come once, as a recording of this graph. Batches that were read are let go; who reads them again gets them
+/// from what was kept of them: in memory up to so many bytes, beyond that in a file without a name.
 ///
 /// # Errors
-/// As of [`fit_machine`].
+/// As of [`rows_of`].
+pub fn once(
+    graph: &Model,
+    name: &str,
+    schema: SchemaRef,
+    batches: impl Iterator<Item = Result<RecordBatch, ArrowError>> + Send + 'static,
+    memory: usize,
+) -> Result<Once<'static>, MachineError> {
+    let rows = rows_of(graph, name, schema, batches);
+    let rows = rows.map_err(|error| MachineError::Fit(FitError::Recording(error.into())))?;
+    Ok(Once::new(Box::new(rows), memory))
+}
+
+/// [`fit_machine`] on batches that come once.
+///
+/// # Errors
+/// As of [`rows_of`] and [`fit_machine`].
 pub fn fit_batches(
     graph: &Model,
     name: &str,
@@ -43,10 +59,7 @@ pub fn fit_batches(
     created: Option<String>,
     progress: &mut (dyn FnMut(FitProgress<'_>) + Send),
 ) -> Result<MachineFit, MachineError> {
-    let rows = rows_of(graph, name, schema, batches);
-    let rows = rows
-        .map_err(|error| MachineError::Fit(athermal_run::fit::FitError::Recording(error.into())))?;
-    let once = Once::new(Box::new(rows), options.memory);
+    let once = once(graph, name, schema, batches, options.memory)?;
     fit_machine(graph, &once, options, created, progress)
 }
 

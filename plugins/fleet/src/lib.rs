@@ -3,6 +3,7 @@
 //! | part | decides |
 //! |---|---|
 //! | [`fit_machine`] | what the rows of a machine and a graph give: the bytes of a model |
+//! | [`fitted`] | the same, with what is reported of it |
 //! | [`RowsId`] | by what rows are known again |
 //! | [`blocks`] | how a machine is fitted on sums of its days in place of rows |
 //! | `batches` | how rows come as batches of Arrow |
@@ -35,3 +36,4 @@ pub use machine::{MachineError, MachineFit, fit_machine};
 #[cfg(feature = "arrow")]
 pub use once::Once;
 pub use rows::RowsId;
+pub use worker::fitted;

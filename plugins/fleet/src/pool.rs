@@ -1,16 +1,35 @@
 //! Workers, each a process of its own: one that runs out of memory or dies takes no other with it. Not what they do.
 
 use std::collections::VecDeque;
+use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use crate::job::{Job, Reply, Setup};
 
 /// How often a job is tried whose worker dies.
 const TRIES: u32 = 2;
+
+static PROGRAM: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Says how this program is started once more, for its workers: an executable, and what stands before the words of a command, as in
+/// `python -m athermal`. Else it is the executable of this process.
+pub fn started_by(words: Vec<OsString>) {
+    // A process is one program; whoever says it twice says the same.
+    let _ = PROGRAM.set(words);
+}
+
+fn program() -> io::Result<Command> {
+    let Some((executable, words)) = PROGRAM.get().and_then(|words| words.split_first()) else {
+        return std::env::current_exe().map(Command::new);
+    };
+    let mut command = Command::new(executable);
+    command.args(words);
+    Ok(command)
+}
 
 /// What the pool reports.
 #[derive(Debug)]
@@ -145,7 +164,7 @@ impl Slot<'_> {
 
 impl Worker {
     fn start(first: &str) -> io::Result<Self> {
-        let mut child = Command::new(std::env::current_exe()?)
+        let mut child = program()?
             .args(["fleet", "worker"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

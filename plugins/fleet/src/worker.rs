@@ -9,12 +9,13 @@ use athermal_core::diagnostic::{Diagnostics, Sources, panic_text};
 use athermal_files::Dataset;
 use athermal_run::fit::{FitOptions, Outcome};
 use athermal_run::model::{Card, Model, ModelError};
+use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
 use crate::blocks::{self, OnBlocks};
 use crate::figure::Figure;
 use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
-use crate::machine::{MachineFit, fit_machine};
+use crate::machine::{MachineError, MachineFit, fit_machine};
 use crate::rows::{RowsId, Summed};
 
 /// Works until the input ends.
@@ -86,10 +87,13 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
                 reading: &setup.reading.options(),
                 kept: kept.map(|folder| folder.join(&job.machine)),
             };
-            let fit = on_blocks.fit(known.as_ref(), &options(setup), created.clone());
+            let fit = on_blocks.fit(known.as_ref(), &options(setup.memory), created.clone());
             match fit.map_err(|error| error.to_string())? {
                 blocks::Outcome::Same => Ok(Reply::Same),
-                blocks::Outcome::Fitted(fit, faults) => reply(*fit, &faults),
+                blocks::Outcome::Fitted(fit, faults) => {
+                    let fitted = whole(*fit, &faults).map_err(|error| error.to_string())?;
+                    Ok(Reply::Fitted(Box::new(fitted)))
+                }
             }
         }
         (Task::Fit { created, known }, Some(graph)) => {
@@ -99,7 +103,9 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
                     return Ok(Reply::Same);
                 }
             }
-            fitted(setup, graph, &dataset, created.clone())
+            let fitted = fitted(graph, &dataset, setup.memory, created.clone());
+            let fitted = fitted.map_err(|error| error.to_string())?;
+            Ok(Reply::Fitted(Box::new(fitted)))
         }
         (Task::Fit { .. }, None) => Err("no graph was given".to_owned()),
         (Task::Evaluate { model }, _) => {
@@ -109,27 +115,31 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
     }
 }
 
-fn fitted(
-    setup: &Setup,
+/// Fits a graph on the rows of one machine, with all that the manifest of a fleet says of it: for whoever spreads machines over processes,
+/// each of which works on one at a time. So the fit has one thread.
+///
+/// # Errors
+/// As of [`fit_machine`].
+pub fn fitted(
     graph: &Model,
-    dataset: &Dataset,
+    rows: &dyn Recording,
+    memory: usize,
     created: Option<String>,
-) -> Result<Reply, String> {
-    let watch = FaultWatch::new(dataset, Purpose::Fit);
-    let fit = fit_machine(graph, &watch, &options(setup), created, &mut |_| {});
-    reply(fit.map_err(|error| error.to_string())?, &watch.found())
+) -> Result<Fitted, MachineError> {
+    let watch = FaultWatch::new(rows, Purpose::Fit);
+    let fit = fit_machine(graph, &watch, &options(memory), created, &mut |_| {})?;
+    whole(fit, &watch.found())
 }
 
-fn options(setup: &Setup) -> FitOptions {
+fn options(memory: usize) -> FitOptions {
     FitOptions {
-        memory: setup.memory,
-        // There are as many workers as are to work at a time.
+        memory,
         threads: 1,
         ..FitOptions::default()
     }
 }
 
-fn reply(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Reply, String> {
+fn whole(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Fitted, MachineError> {
     let failed = fit.report.estimators.iter();
     let unfitted = failed.filter_map(|of| match &of.outcome {
         Outcome::Failed(error) => Some(Unfitted {
@@ -139,8 +149,8 @@ fn reply(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Reply, String> {
         Outcome::Fitted(_) => None,
     });
     let bare = fit.bare.iter().filter(|of| !of.has_others);
-    Ok(Reply::Fitted(Box::new(Fitted {
-        model: fit.model.to_text().map_err(|error| error.to_string())?,
+    Ok(Fitted {
+        model: fit.model.to_text()?,
         scores: fit
             .model
             .card
@@ -150,7 +160,7 @@ fn reply(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Reply, String> {
         constant: bare.map(|of| of.output.clone()).collect(),
         doubts: doubts(faults, &fit.report.rejected),
         rows: fit.rows,
-    })))
+    })
 }
 
 fn evaluated(setup: &Setup, model: &Model, dataset: &Dataset) -> Result<Reply, String> {

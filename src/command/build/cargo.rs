@@ -1,8 +1,8 @@
-//! Calling cargo, and what is reported where it is missing or fails.
+//! Calling cargo and maturin, and what is reported where one is missing or fails.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
 use serde_json::Value;
 
@@ -63,23 +63,38 @@ impl Cargo {
     /// # Errors
     /// When cargo is not there or fails.
     pub(super) fn build(&self, folder: &Path) -> Result<(), Failure> {
-        let mut command = self.command(folder, "build");
+        let command = self.command(folder, "build");
+        let status = self.release(command);
+        let status = status.map_err(|error| self.missing(&error))?;
+        built(status, "cargo", folder)
+    }
+
+    /// Builds the wheel of the crate in a folder, into another folder.
+    ///
+    /// # Errors
+    /// When maturin fails.
+    pub(super) fn build_wheel(&self, folder: &Path, into: &Path) -> Result<(), Failure> {
+        let mut command = self.called(&maturin(), folder, "build");
+        command.arg("--out").arg(into);
+        let status = self.release(command);
+        let status = status.map_err(|error| without_maturin(&error))?;
+        built(status, "maturin", folder)
+    }
+
+    fn release(&self, mut command: Command) -> std::io::Result<ExitStatus> {
         command.arg("--release").stdout(Stdio::null());
         if self.quiet {
             command.arg("--quiet");
         }
-        let status = command.status().map_err(|error| self.missing(&error))?;
-        if status.success() {
-            return Ok(());
-        }
-        Err(Failure::Outside(format!(
-            "cargo could not build {}; its output stands above",
-            folder.display()
-        )))
+        command.status()
     }
 
     fn command(&self, folder: &Path, what: &str) -> Command {
-        let mut command = Command::new(&self.program);
+        self.called(&self.program, folder, what)
+    }
+
+    fn called(&self, program: &OsStr, folder: &Path, what: &str) -> Command {
+        let mut command = Command::new(program);
         command.arg(what).current_dir(folder);
         if self.offline {
             command.arg("--offline");
@@ -93,4 +108,36 @@ impl Cargo {
             self.program.display()
         ))
     }
+}
+
+fn maturin() -> OsString {
+    std::env::var_os("MATURIN").unwrap_or_else(|| "maturin".into())
+}
+
+/// Makes sure that maturin is there, before anything is built for it.
+///
+/// # Errors
+/// When it is not.
+pub(super) fn find_maturin() -> Result<(), Failure> {
+    let mut asked = Command::new(maturin());
+    let answer = asked.arg("--version").output();
+    answer.map(drop).map_err(|error| without_maturin(&error))
+}
+
+fn without_maturin(error: &std::io::Error) -> Failure {
+    Failure::Outside(format!(
+        "`{}` cannot be run ({error}): it makes wheels; install it with `pip install maturin`",
+        maturin().display()
+    ))
+}
+
+/// What became of a build.
+fn built(status: ExitStatus, by: &str, folder: &Path) -> Result<(), Failure> {
+    if status.success() {
+        return Ok(());
+    }
+    Err(Failure::Outside(format!(
+        "{by} could not build {}; its output stands above",
+        folder.display()
+    )))
 }

@@ -4,8 +4,9 @@ mod cargo;
 mod project;
 mod wish;
 
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,8 @@ use serde_json::{Value, json};
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal::run::live::store::copy_whole;
-use cargo::Cargo;
+use cargo::{Cargo, find_maturin};
+use project::Product;
 use wish::Wish;
 
 /// Build this program with plugin crates of your choice
@@ -25,6 +27,7 @@ use wish::Wish;
 #[command(after_help = "Examples:
   athermal build --with path:room-lag -o athermal-ours
   athermal build --with drift-nodes@0.3.1 --with path:../ours -o athermal-ours
+  athermal build --wheel --with path:room-lag -o wheels
   athermal build --with path:room-lag --vendored vendor -o athermal-ours
 
 The last one needs no network; `cargo vendor`, called in the project's folder where there is one, writes such a folder.")]
@@ -32,10 +35,13 @@ pub struct Build {
     /// A crate: NAME, NAME@VERSION, or path:DIR
     #[arg(long, required = true, value_name = "CRATE")]
     with: Vec<String>,
-    /// The binary
+    /// The binary; with `--wheel` the folder of the wheel
     #[arg(long, short, value_name = "BINARY")]
     output: PathBuf,
-    /// The folder of the cargo project; by default the binary's name and `-project`
+    /// Build the Python package with these crates instead, as a wheel; needs maturin
+    #[arg(long)]
+    wheel: bool,
+    /// The folder of the cargo project; by default the name of what is built and `-project`
     #[arg(long, value_name = "DIR")]
     project: Option<PathBuf>,
     /// Take crates from this folder, as `cargo vendor` writes it, and never from a network
@@ -60,24 +66,51 @@ impl Build {
         let wishes = self.with.iter().map(|text| Wish::read(text));
         let wishes: Vec<Wish> = wishes.collect::<Result<_, _>>()?;
         let folder = self.folder();
-        project::write(&folder, &wishes, &checkout, self.vendored.as_deref())?;
+        let product = if self.wheel {
+            find_maturin()?;
+            Product::Wheel
+        } else {
+            Product::Program
+        };
+        project::write(
+            &folder,
+            product,
+            &wishes,
+            &checkout,
+            self.vendored.as_deref(),
+        )?;
         let resolved = cargo.metadata(&folder)?;
         one_core(&resolved, &wishes)?;
         without_testkit(&resolved)?;
-        cargo.build(&folder)?;
         let target = resolved["target_directory"].as_str().unwrap_or_default();
-        let executable = format!("athermal{}", std::env::consts::EXE_SUFFIX);
-        let built = Path::new(target).join("release").join(executable);
-        let kinds = known(&built, "nodes", "nodes")?;
+        let target = Path::new(target).join("release");
+        let built = match product {
+            Product::Program => {
+                cargo.build(&folder)?;
+                Built::Program(target.join(format!("athermal{EXE_SUFFIX}")))
+            }
+            Product::Wheel => {
+                let into =
+                    std::path::absolute(&self.output).unwrap_or_else(|_| self.output.clone());
+                cargo.build_wheel(&folder, &into)?;
+                Built::Package(
+                    folder.clone(),
+                    target.join(format!("{DLL_PREFIX}athermal_with_plugins{DLL_SUFFIX}")),
+                )
+            }
+        };
+        let kinds = built.known("nodes", "nodes")?;
         twice("node type", &kinds)?;
-        let written = known(&built, "nodes", "written")?;
+        let written = built.known("nodes", "written")?;
         for of in ["state", "predictor"] {
             let of_role = written.iter().filter(|known| known.role == of);
             twice(of, &of_role.cloned().collect::<Vec<_>>())?;
         }
-        let machines = known(&built, "simulate", "machines")?;
+        let machines = built.known("simulate", "machines")?;
         twice("machine", &machines)?;
-        place(&built, &self.output)?;
+        if let Built::Program(program) = &built {
+            place(program, &self.output)?;
+        }
         if terminal.format == Format::Json {
             println!(
                 "{:#}",
@@ -140,21 +173,48 @@ fn brought(all: &[Known], package: &str) -> String {
     own.join(", ")
 }
 
-/// Asks a binary's command for what it lists under a key.
-fn known(binary: &Path, command: &str, what: &str) -> Result<Vec<Known>, Failure> {
-    let listed = || -> Result<Vec<Known>, std::io::Error> {
-        let program = std::fs::canonicalize(binary)?;
-        let mut call = Command::new(program);
-        let output = call.args([command, "--format", "json"]).output()?;
-        let mut listed: Value = serde_json::from_slice(&output.stdout)?;
-        Ok(serde_json::from_value(listed[what].take())?)
-    };
-    listed().map_err(|error| {
-        Failure::Outside(format!(
-            "{} was built and cannot list its {what}: {error}",
-            binary.display()
-        ))
-    })
+/// What was built.
+#[derive(Debug)]
+enum Built {
+    /// A program.
+    Program(PathBuf),
+    /// The folder of a Python package, and the library that belongs into it.
+    Package(PathBuf, PathBuf),
+}
+
+impl Built {
+    /// What a command lists under a key.
+    fn known(&self, command: &str, what: &str) -> Result<Vec<Known>, Failure> {
+        let listed = || -> Result<Vec<Known>, std::io::Error> {
+            let output = self.called(&[command, "--format", "json"])?;
+            let mut listed: Value = serde_json::from_slice(&output.stdout)?;
+            Ok(serde_json::from_value(listed[what].take())?)
+        };
+        let (Self::Program(path) | Self::Package(path, _)) = self;
+        listed().map_err(|error| {
+            Failure::Outside(format!(
+                "{} was built and cannot list its {what}: {error}",
+                path.display()
+            ))
+        })
+    }
+
+    fn called(&self, words: &[&str]) -> Result<Output, std::io::Error> {
+        match self {
+            Self::Program(program) => Command::new(program.canonicalize()?).args(words).output(),
+            Self::Package(folder, library) => {
+                let beside = folder.join("athermal").join("_athermal.abi3.so");
+                std::fs::copy(library, &beside)?;
+                let python = Command::new("python3")
+                    .args(["-m", "athermal"])
+                    .args(words)
+                    .current_dir(folder)
+                    .output();
+                std::fs::remove_file(beside)?;
+                python
+            }
+        }
+    }
 }
 
 /// Refuses a name that two crates use for the same sort of thing.
@@ -196,12 +256,15 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
     )))
 }
 
-/// The conformance kit is for the tests of a crate: it counts what a program allocates.
+/// The conformance kit is for the tests of a crate: with its default features it counts what a program allocates.
 fn without_testkit(resolved: &Value) -> Result<(), Failure> {
     for package in resolved["packages"].as_array().into_iter().flatten() {
         let mut dependencies = package["dependencies"].as_array().into_iter().flatten();
         let brings_it = dependencies.any(|of| {
-            of["name"] == "athermal-testkit" && of["kind"].is_null() && of["optional"] != true
+            of["name"] == "athermal-testkit"
+                && of["kind"].is_null()
+                && of["optional"] != true
+                && of["uses_default_features"] != false
         });
         if brings_it {
             let name = package["name"].as_str().unwrap_or_default();

@@ -1,10 +1,10 @@
 //! What the cargo project of a binary with chosen plugins consists of.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::wish::Wish;
-use crate::checkout::{Checkout, in_toml};
+use crate::checkout::{Checkout, VERSION, in_toml};
 use crate::terminal::Failure;
 
 /// What every manifest written here begins with, so that no other is written over.
@@ -21,6 +21,76 @@ const CRATES: [(&str, &str); 7] = [
     ("athermal-numerics", "core/numerics"),
 ];
 
+/// What a project makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Product {
+    /// The program.
+    Program,
+    /// The Python package.
+    Wheel,
+}
+
+impl Product {
+    /// What stands in the manifest between the package and the plugins.
+    fn target(self, checkout: &Checkout) -> String {
+        let at = |folder: &str| in_toml(&checkout.folder().join(folder));
+        match self {
+            Self::Program => format!(
+                "[[bin]]\nname = \"athermal\"\npath = \"src/main.rs\"\n\n[dependencies]\nathermal = {{ path = {} }}\n",
+                in_toml(checkout.folder())
+            ),
+            Self::Wheel => format!(
+                "[lib]\ncrate-type = [\"cdylib\"]\n\n[dependencies]\nathermal-python = {{ path = {} }}\n",
+                at("python")
+            ),
+        }
+    }
+
+    /// The source, by its place.
+    fn source(self, wishes: &[Wish]) -> (&'static str, String) {
+        let library = |wish: &Wish| format!("use {} as _;\n", wish.package.replace('-', "_"));
+        let uses: String = wishes.iter().map(library).collect();
+        let plugins = "A plugin that no code names is left out by the linker.";
+        match self {
+            Self::Program => (
+                "src/main.rs",
+                format!(
+                    "//! athermal with plugins. {plugins}\n\n{uses}\n\
+                     fn main() -> std::process::ExitCode {{\n    athermal::command_line()\n}}\n"
+                ),
+            ),
+            Self::Wheel => (
+                "src/lib.rs",
+                format!(
+                    "//! The Python package with plugins. {plugins}\n\nuse _athermal as _;\n{uses}"
+                ),
+            ),
+        }
+    }
+
+    /// Files of the checkout that the project has copies of, with their places there.
+    fn copies(self, checkout: &Checkout) -> std::io::Result<Vec<(PathBuf, PathBuf)>> {
+        let mut copies = Vec::new();
+        if self == Self::Wheel {
+            let python = checkout.folder().join("python");
+            for name in ["pyproject.toml", "README.md"] {
+                copies.push((python.join(name), PathBuf::from(name)));
+            }
+            for file in fs::read_dir(python.join("athermal"))? {
+                let path = file?.path();
+                let is_source =
+                    |of: &std::ffi::OsStr| ["py", "pyi", "typed"].iter().any(|end| of == *end);
+                if let Some(name) = path.file_name()
+                    && path.extension().is_some_and(is_source)
+                {
+                    copies.push((path.clone(), Path::new("athermal").join(name)));
+                }
+            }
+        }
+        Ok(copies)
+    }
+}
+
 /// Writes the project into a folder, which is new or has one already. A lock file that is there stays; a new one begins as that of
 /// athermal, so that what is common is the same.
 ///
@@ -28,6 +98,7 @@ const CRATES: [(&str, &str); 7] = [
 /// When the folder holds something else, or cannot be written.
 pub(super) fn write(
     folder: &Path,
+    product: Product,
     wishes: &[Wish],
     checkout: &Checkout,
     vendored: Option<&Path>,
@@ -49,11 +120,18 @@ pub(super) fn write(
     fs::create_dir_all(folder.join("src")).map_err(failed)?;
     fs::create_dir_all(folder.join(".cargo")).map_err(failed)?;
     for (path, text) in [
-        ("Cargo.toml", manifest(wishes, checkout)),
-        ("src/main.rs", program(wishes)),
+        ("Cargo.toml", manifest(product, wishes, checkout)),
+        product.source(wishes),
         (".cargo/config.toml", config),
     ] {
         fs::write(folder.join(path), text).map_err(failed)?;
+    }
+    for (from, to) in product.copies(checkout).map_err(failed)? {
+        let to = folder.join(to);
+        let copied = to.parent().map_or(Ok(()), fs::create_dir_all);
+        copied
+            .and_then(|()| fs::copy(from, to).map(drop))
+            .map_err(failed)?;
     }
     let lock = folder.join("Cargo.lock");
     if !lock.exists() {
@@ -63,8 +141,8 @@ pub(super) fn write(
 }
 
 /// The manifest. Crates that ask a registry for athermal get the one at hand.
-fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
-    let athermal = in_toml(checkout.folder());
+fn manifest(product: Product, wishes: &[Wish], checkout: &Checkout) -> String {
+    let target = product.target(checkout);
     let plugins: String = wishes.iter().map(Wish::dependency).collect();
     let crates = CRATES.map(|(name, folder)| {
         let folder = in_toml(&checkout.folder().join(folder));
@@ -81,29 +159,13 @@ fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
     format!(
         r#"{MARK}[package]
 name = "athermal-with-plugins"
-version = "0.0.0"
+version = "{VERSION}"
 edition = "2024"
 publish = false
 
-[[bin]]
-name = "athermal"
-path = "src/main.rs"
-
-[dependencies]
-athermal = {{ path = {athermal} }}
-{plugins}
+{target}{plugins}
 {patch}[workspace]
 "#
-    )
-}
-
-fn program(wishes: &[Wish]) -> String {
-    let library = |wish: &Wish| format!("use {} as _;\n", wish.package.replace('-', "_"));
-    let uses: String = wishes.iter().map(library).collect();
-    format!(
-        "//! athermal with plugins. A plugin that no code names is left out by the linker.\n\n\
-         {uses}\n\
-         fn main() -> std::process::ExitCode {{\n    athermal::command_line()\n}}\n"
     )
 }
 

@@ -1,6 +1,7 @@
 //! Decides what is tried of a node, rule by rule.
 
 mod absence;
+#[cfg(feature = "whole")]
 mod allocation;
 mod answers;
 mod edited;
@@ -15,12 +16,14 @@ mod repeat;
 mod shapes;
 mod snapshots;
 mod stamps;
+#[cfg(feature = "whole")]
 mod traces;
 mod units;
+#[cfg(feature = "whole")]
 mod votes;
 
 pub(super) use explained::explained;
-pub(super) use names::shared;
+pub(super) use names::{is_name, shared};
 
 use std::sync::OnceLock;
 
@@ -60,7 +63,7 @@ pub(super) enum Check {
 }
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 26] = [
+pub(super) const ALL: &[(Rule, Check)] = &[
     (Rule::Names, Alone(names::names)),
     (Rule::Answers, Among(answers::answers)),
     (Rule::ReadsBack, Alone(parameters::read_back)),
@@ -78,10 +81,14 @@ pub(super) const ALL: [(Rule, Check); 26] = [
     (Rule::Wanted, Alone(shapes::wanted)),
     (Rule::Widths, Alone(shapes::widths)),
     (Rule::Units, Alone(units::units)),
+    #[cfg(feature = "whole")]
     (Rule::Allocation, Alone(allocation::allocation)),
+    #[cfg(feature = "whole")]
     (Rule::Votes, Alone(votes::votes)),
+    #[cfg(feature = "whole")]
     (Rule::Uncertainty, Alone(votes::uncertainty)),
     (Rule::Novelty, Alone(novelty::novelty)),
+    #[cfg(feature = "whole")]
     (Rule::NoTrace, Alone(traces::no_trace)),
     (Rule::Fits, Alone(fitting::fits)),
     (Rule::Models, Alone(fitting::models)),
