@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::compared::{none_of, same_bits};
-use super::rules::is_name;
 use super::tried::{PANICS, tried};
+use crate::document::is_name;
 use crate::unit::Unit;
 use athermal_trial::machine::{
     Channel, LONGEST_DAYS, Machine, Row, Schedule, Setup, SetupError, Simulation, machines,
@@ -158,7 +158,7 @@ fn described(machine: &dyn Machine) -> Result<(), String> {
         .flat_map(|channel| [channel.signal, channel.name]);
     let settings = set_points.iter().map(|set_point| set_point.name);
     for name in std::iter::once(machine.name()).chain(names).chain(settings) {
-        check(!is_name(name), &|| {
+        check(!is_name(name, false), &|| {
             format!("`{name}` is not a letter followed by letters, digits, `_` and `-`")
         });
     }

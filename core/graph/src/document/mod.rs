@@ -17,7 +17,6 @@ mod toml_text;
 mod tree;
 
 pub use declare::declare;
-#[cfg(feature = "testkit")]
 pub use declare::is_name;
 pub use declare::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use declare::{TIME_UNITS, is_misspelt, known_keys};

@@ -23,7 +23,7 @@ mod units;
 mod votes;
 
 pub(super) use explained::explained;
-pub(super) use names::{is_name, shared};
+pub(super) use names::shared;
 
 use std::sync::OnceLock;
 

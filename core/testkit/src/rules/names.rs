@@ -3,6 +3,7 @@
 use super::super::compared::none_of;
 use super::Subject;
 use crate::compile::PlannedRole;
+use crate::document::is_name;
 use crate::node::{Kind, Role, kinds, taken_twice};
 
 /// What of a kind, and of its crate, has the name of something else, or one that no graph could write.
@@ -68,7 +69,7 @@ pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
 fn unfit<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let (mut found, mut seen) = (Vec::new(), Vec::new());
     for name in names {
-        if !is_name(name) {
+        if !is_name(name, false) {
             found.push(format!(
                 "{what} `{name}` is not a letter followed by letters, digits, `_` and `-`"
             ));
@@ -79,12 +80,6 @@ fn unfit<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
         seen.push(name);
     }
     found
-}
-
-/// Whether a reference can name it.
-pub(in super::super) fn is_name(name: &str) -> bool {
-    let fits = |c: char| c.is_alphanumeric() || "_-".contains(c);
-    name.starts_with(char::is_alphabetic) && name.chars().all(fits)
 }
 
 /// Whether a reference can end in it, and no pattern is seen in it.

@@ -18,7 +18,6 @@ use super::problem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
-#[cfg(feature = "testkit")]
 pub use names::is_name;
 pub use placeholder::{fill as fill_placeholders, names as placeholders};
 use reading::text;
