@@ -50,7 +50,6 @@ pub mod recovery;
 pub mod replay;
 pub mod sequencer;
 pub mod service;
-#[cfg(any(test, feature = "testkit"))]
 pub mod testkit;
 pub mod worker;
 

@@ -255,8 +255,7 @@ impl Declared<'_> {
 
     /// The place of what a kind points at: an input or a parameter.
     pub(crate) fn place_of(&self, mistake: &Mistake) -> Place {
-        #[cfg(feature = "testkit")]
-        assert!(
+        debug_assert!(
             self.has(&mistake.at),
             "it finds a mistake at `{}`, which is none of its parameters and ports: {}",
             mistake.at,
@@ -269,7 +268,6 @@ impl Declared<'_> {
     }
 
     /// Whether a kind that points at this points at something of its own.
-    #[cfg(feature = "testkit")]
     fn has(&self, at: &str) -> bool {
         match at.split_once('.') {
             None if at.is_empty() => true,

@@ -5,7 +5,6 @@
 
 mod at_work;
 mod error;
-#[cfg(feature = "testkit")]
 mod idle;
 mod isolation;
 mod learning;
@@ -25,7 +24,6 @@ pub use state::{
 };
 pub use tick::{Cursor, History};
 
-#[cfg(feature = "testkit")]
 pub use idle::Answer;
 
 pub(crate) use at_work::{caught, naming};

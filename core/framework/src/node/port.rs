@@ -136,12 +136,11 @@ impl Inputs {
     /// The channels of a port; none where the port has been left out, or the kind declares no such port.
     ///
     /// # Panics
-    /// With the feature `testkit`, where the kind declares no such port.
+    /// In a debug build, where the kind declares no such port.
     #[must_use]
     pub fn port(&self, name: &str) -> &[Channel] {
         let found = self.ports.iter().find(|(port, _)| port.name == name);
-        #[cfg(feature = "testkit")]
-        assert!(
+        debug_assert!(
             found.is_some(),
             "it asks for the input port `{name}`, and declares {:?}",
             self.ports

@@ -1,7 +1,7 @@
 //! Decides what is tried of a node, rule by rule.
 
 mod absence;
-#[cfg(feature = "whole")]
+#[cfg(feature = "allocation")]
 mod allocation;
 mod answers;
 mod edited;
@@ -16,10 +16,8 @@ mod repeat;
 mod shapes;
 mod snapshots;
 mod stamps;
-#[cfg(feature = "whole")]
 mod traces;
 mod units;
-#[cfg(feature = "whole")]
 mod votes;
 
 pub(super) use explained::explained;
@@ -81,14 +79,11 @@ pub(super) const ALL: &[(Rule, Check)] = &[
     (Rule::Wanted, Alone(shapes::wanted)),
     (Rule::Widths, Alone(shapes::widths)),
     (Rule::Units, Alone(units::units)),
-    #[cfg(feature = "whole")]
+    #[cfg(feature = "allocation")]
     (Rule::Allocation, Alone(allocation::allocation)),
-    #[cfg(feature = "whole")]
     (Rule::Votes, Alone(votes::votes)),
-    #[cfg(feature = "whole")]
     (Rule::Uncertainty, Alone(votes::uncertainty)),
     (Rule::Novelty, Alone(novelty::novelty)),
-    #[cfg(feature = "whole")]
     (Rule::NoTrace, Alone(traces::no_trace)),
     (Rule::Fits, Alone(fitting::fits)),
     (Rule::Models, Alone(fitting::models)),

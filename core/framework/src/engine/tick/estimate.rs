@@ -345,7 +345,6 @@ impl Estimate {
     }
 
     /// Asks for the prediction from any values.
-    #[cfg(feature = "testkit")]
     pub fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);

@@ -3,7 +3,6 @@
 use super::gather::Gathered;
 use crate::channel::unless_infinite;
 use crate::compile::{AuxPorts, TruthLink};
-#[cfg(feature = "testkit")]
 use crate::engine::idle::Answer;
 use crate::engine::learning::{DueTruth, Embargo};
 use crate::engine::state::NodeState;
@@ -162,7 +161,6 @@ impl Vote {
     }
 
     /// The answer to any votes.
-    #[cfg(feature = "testkit")]
     pub fn answer(&self, votes: &[f64]) -> Answer {
         let mut weights = vec![f64::NAN; votes.len()];
         self.combine.weights(Votes(votes), &mut weights);
