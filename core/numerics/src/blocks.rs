@@ -290,7 +290,7 @@ impl GramBlocks {
     }
 
     /// The statistics of the rows that train and test each fold: to the row while rows are kept (see
-    /// [`GramBlocks::exact_folds`]), else with edges moved to blocks (see [`Folds::of_blocks`]).
+    /// [`GramBlocks::exact_folds`]), else with edges moved to those of blocks.
     ///
     /// # Errors
     /// [`NumericsError::Folds`] for fewer than two folds or too few rows or blocks to fill them.

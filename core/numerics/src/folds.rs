@@ -129,7 +129,7 @@ impl Folds {
     /// The folds of so many rows.
     ///
     /// # Errors
-    /// See [`Folds::of_blocks`].
+    /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsApart`] for a fold without a row to train on.
     pub fn of(&self, rows: u64) -> Result<Vec<FoldRows>, NumericsError> {
         self.of_blocks(rows, Edges::Every(1), &[])
     }

@@ -152,13 +152,12 @@ pub fn check(plan: &Plan) -> Result<(), BlockError> {
         });
     }
     let needs_rows = |&node: &usize| {
-        let all = plan.nodes[node]
-            .role
-            .fit()
-            .map_or(0, |fit| fit.regressors.len());
-        let all: Vec<usize> = (0..all).collect();
-        let is_estimator = matches!(plan.nodes[node].role, PlannedRole::Estimator { .. });
-        !is_estimator || trainer_of(plan, node, &all, 0).0.summed().is_none()
+        let PlannedRole::Estimator { fit, .. } = &plan.nodes[node].role else {
+            return true;
+        };
+        let all: Vec<usize> = (0..fit.regressors.len()).collect();
+        let (mut trainer, _) = trainer_of(plan, (node, fit.truth), &all, 0);
+        trainer.summed().is_none()
     };
     let nodes: Vec<usize> = fitted_nodes(plan).filter(needs_rows).collect();
     if !nodes.is_empty() {

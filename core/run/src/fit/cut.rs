@@ -9,11 +9,11 @@ use serde_json::value::RawValue;
 use super::FitError;
 use super::block::{Block, Content, Examples, Group, State};
 use super::blocks::{BlockError, check, rows_identity};
-use super::collect::{Collector, Share, Sink};
+use super::collect::{Collector, Share, Sink, Trainee};
 use super::doubt::Truths;
 use super::train::trainer_of;
 use crate::channel::Extremes;
-use crate::compile::Plan;
+use crate::compile::{Plan, TruthLink};
 use crate::engine::{Engine, Fitted, Fnv1a, When, naming_one};
 use crate::node::{Trainer, TrainingError};
 use crate::recording::{Event, Recording, Samples, Steps, drive};
@@ -149,11 +149,13 @@ struct DayInWork {
 impl DayInWork {
     fn new(plan: &Arc<Plan>, day: i64, graph: String) -> Result<Self, FitError> {
         let nodes: Vec<usize> = fitted_nodes(plan).collect();
+        let collector = Collector::new(plan, &nodes, 0);
+        let trainees = collector.trainees.iter();
         Ok(Self {
             block: Block::new(day, graph),
             engine: Engine::new(Arc::clone(plan), &Fitted::new())?,
-            collector: Collector::new(plan, &nodes, 0),
-            sums: nodes.iter().map(|&node| Summing::new(plan, node)).collect(),
+            sums: trainees.map(|of| Summing::new(plan, of)).collect(),
+            collector,
             means: Means::new(plan),
             hash: Fnv1a::default(),
             has_begun: false,
@@ -217,7 +219,7 @@ impl DayInWork {
             .collect();
         for (trainee, sums) in self.collector.trainees.iter().zip(self.sums) {
             let node = plan.nodes[trainee.node].instance();
-            let groups = naming_one(plan, trainee.node, When::Fit, || sums.end(plan));
+            let groups = naming_one(plan, trainee.node, When::Fit, || sums.end());
             block.estimators.push(Examples {
                 ran: self.collector.ran(trainee),
                 without_run: trainee.dropped.without_run,
@@ -242,7 +244,8 @@ pub(super) fn fitted_nodes(plan: &Plan) -> impl Iterator<Item = usize> {
 /// Sums the examples of one estimator.
 struct Summing {
     plan: Arc<Plan>,
-    node: usize,
+    /// The estimator, and its truth.
+    of: (usize, TruthLink),
     groups: Vec<GroupInWork>,
     known: BTreeMap<Vec<State>, usize>,
     states: Vec<State>,
@@ -262,10 +265,10 @@ struct GroupInWork {
 }
 
 impl Summing {
-    fn new(plan: &Arc<Plan>, node: usize) -> Self {
+    fn new(plan: &Arc<Plan>, trainee: &Trainee) -> Self {
         Self {
             plan: Arc::clone(plan),
-            node,
+            of: (trainee.node, trainee.link),
             groups: Vec::new(),
             known: BTreeMap::new(),
             states: Vec::new(),
@@ -275,10 +278,9 @@ impl Summing {
     }
 
     /// The groups in the order of their first examples.
-    fn end(mut self, plan: &Plan) -> Result<Vec<Group>, TrainingError> {
-        let node = self.node;
-        let groups = self.groups.drain(..);
-        groups.map(|group| group.end(plan, node)).collect()
+    fn end(self) -> Result<Vec<Group>, TrainingError> {
+        let groups = self.groups.into_iter();
+        groups.map(|group| group.end(&self.plan, self.of)).collect()
     }
 }
 
@@ -310,7 +312,7 @@ impl Sink for Summing {
         }
         group.rows.extend_from_slice(&self.row);
         if group.rows.len() >= BATCH * group.order {
-            group.sum(&self.plan, self.node);
+            group.sum(&self.plan, self.of);
         }
     }
 
@@ -334,12 +336,12 @@ impl GroupInWork {
     }
 
     /// Sums the examples that are not yet.
-    fn sum(&mut self, plan: &Plan, node: usize) {
+    fn sum(&mut self, plan: &Plan, of: (usize, TruthLink)) {
         let trainer = self.trainer.get_or_insert_with(|| {
             let present = self.states.iter().enumerate();
             let present = present.filter(|(_, state)| **state == State::Present);
             let present: Vec<usize> = present.map(|(nth, _)| nth).collect();
-            let (mut trainer, _) = trainer_of(plan, node, &present, 0);
+            let (mut trainer, _) = trainer_of(plan, of, &present, 0);
             // Rows are not kept from here on.
             trainer.summed();
             trainer
@@ -351,11 +353,11 @@ impl GroupInWork {
         self.rows.clear();
     }
 
-    fn end(mut self, plan: &Plan, node: usize) -> Result<Group, TrainingError> {
+    fn end(mut self, plan: &Plan, of: (usize, TruthLink)) -> Result<Group, TrainingError> {
         let examples = self.rows.len() / self.order;
         // Sums are a triangle: fewer examples take less room themselves.
         if self.trainer.is_some() || 2 * examples > self.order {
-            self.sum(plan, node);
+            self.sum(plan, of);
         }
         let content = match self.trainer.as_mut().and_then(|trainer| trainer.summed()) {
             None => Content::Rows(self.rows),

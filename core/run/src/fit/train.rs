@@ -10,7 +10,7 @@ use super::doubt::{Lacking, Truths, note_constant};
 use super::progress::{FitProgress, Listener};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
-use crate::compile::{Plan, PlannedLearning, PlannedNode, PlannedRole};
+use crate::compile::{Plan, PlannedLearning, PlannedNode, PlannedRole, TruthLink};
 use crate::engine::{When, naming_one};
 use crate::node::{
     LearningLimits, Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup,
@@ -167,7 +167,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
     let regressors = regressors.map_or(&[][..], |fit| &fit.regressors);
     let mut kept = trainee.validity.kept();
     kept.retain(|candidate| !constant.contains(candidate));
-    let (trainer, may_leave_out) = trainer_of(plan, trainee.node, &kept, memory);
+    let (trainer, may_leave_out) = trainer_of(plan, (trainee.node, trainee.link), &kept, memory);
     Making {
         trainer,
         constant,
@@ -191,31 +191,29 @@ fn learning_of(node: &PlannedNode) -> Option<&PlannedLearning> {
     }
 }
 
-/// What learns from the rows of a node, of which some candidates are kept.
+/// What learns a truth from the rows of a node, of which some candidates are kept.
 pub(super) fn trainer_of(
     plan: &Plan,
-    node: usize,
+    (node, truth): (usize, TruthLink),
     kept: &[usize],
     memory: usize,
 ) -> (Box<dyn Trainer>, MayLeaveOut) {
     let node = &plan.nodes[node];
-    let fit = node.role.fit().expect("only what needs a fit is trained");
     let learning = learning_of(node);
-    let regressors = kept
-        .iter()
-        .map(|&candidate| fit.regressors[candidate].clone());
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
+    let regressors = kept.iter().map(|&candidate| regressors[candidate].clone());
     let setup = TrainingSetup {
         instance: node.instance(),
         regressors: regressors.collect::<Vec<Regressor>>(),
         places: kept.to_vec(),
-        error_unit: plan.channels[fit.truth.slot]
+        error_unit: plan.channels[truth.slot]
             .channel
             .unit
             .difference()
             .to_string(),
         memory,
-        ahead: fit.truth.ahead,
-        span: fit.truth.span,
+        ahead: truth.ahead,
+        span: truth.span,
         learns: learning.is_some(),
         limits: learning.map_or(LearningLimits::NONE, |learning| learning.limits),
     };
