@@ -186,17 +186,39 @@ impl Data {
             let recording = Rc::new(JournalRecording::in_state(&journal));
             return Dataset::of(name.to_owned(), recording);
         }
+        self.dataset_of(self.paths().map(Path::to_owned).collect(), None)
+    }
+
+    /// The files; none where a journal or a table in memory is read.
+    #[must_use]
+    pub fn files(&self) -> Option<Vec<PathBuf>> {
+        let files = self.paths().map(|path| {
+            (journal_of(path).is_none() && !is_in_memory(path)).then(|| path.to_owned())
+        });
+        files.collect()
+    }
+
+    /// How files are read, in words that differ where rows may.
+    #[must_use]
+    pub fn reading_words(&self) -> String {
+        format!("{:?}, lenient: {}", self.reading, self.lenient)
+    }
+
+    /// A data set of some of the files, of which no rows outside of a stretch of time are needed.
+    #[must_use]
+    pub fn dataset_of(&self, files: Vec<PathBuf>, within: Option<(i64, i64)>) -> Dataset {
         let offsets = self.reading.offsets.iter().flat_map(|(name, by)| {
             let files = self.named(name);
             files.map(|file| (file.to_owned(), by.as_ns()))
         });
         Dataset::new(
-            self.paths().map(Path::to_owned).collect(),
+            files,
             Options {
                 lenient: self.lenient,
                 segments: self.reading.segments,
                 merge: self.reading.merge,
                 offsets: offsets.collect(),
+                within,
                 ..Options::default()
             },
         )

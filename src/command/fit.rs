@@ -13,6 +13,7 @@ use athermal::run::fit::{
     BareOutput, EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit,
 };
 use athermal::run::model::{Card, EstimatorCard};
+use athermal_fleet::blocks::BlockOptions;
 use clap::Args;
 use serde_json::json;
 
@@ -21,6 +22,7 @@ use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::doubts;
 use super::faults::{self, ChannelFaults, FaultWatch, Purpose};
+use super::fit_blocks::fit_on_blocks;
 use super::model;
 use super::numbers;
 use super::threads::Threads;
@@ -47,6 +49,10 @@ use athermal_analysis::figures::{count, counted, number, paragraph, table};
 /// it is fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with
 /// three.
 ///
+/// With `--blocks day` a fit learns from the sums of each UTC day in place of rows. With `--keep-blocks FOLDER` these are kept, and the
+/// next fit of years reads them and the days that are new. An estimator that needs more than sums is named. What needs the rows is
+/// missing in such a model: novelty, and singular values where features hang together.
+///
 /// With `--format json` all of that is data: `estimators` has an object for each node, and its `figures` are by name,
 /// unrounded.
 #[derive(Debug, Args)]
@@ -62,6 +68,8 @@ pub struct Fit {
     /// Where the model goes; `-` is standard output
     #[arg(long, short, value_name = "MODEL")]
     output: PathBuf,
+    #[command(flatten)]
+    blocks: BlockOptions,
     #[command(flatten)]
     threads: Threads,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
@@ -131,7 +139,10 @@ impl Fit {
             threads: self.threads.count(),
             ..FitOptions::default()
         };
-        fit_on(model, &self.data, &options, terminal)
+        match self.blocks.blocks {
+            Some(_) => fit_on_blocks(&self.blocks, model, &self.data, &options, terminal),
+            None => fit_on(model, &self.data, &options, terminal),
+        }
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
@@ -272,7 +283,7 @@ pub fn fit_on(
 }
 
 /// Warns of outputs that predict a constant, and of voters that do beside others.
-fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
+pub fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
     let (some, none): (Vec<_>, Vec<_>) = outcome.bare.iter().partition(|of| of.has_others);
     for (outputs, is_constant) in [(none, true), (some, false)] {
         if outputs.is_empty() {
@@ -491,7 +502,8 @@ pub fn describe(fit: &EstimatorFit, candidates: bool) -> String {
 }
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
-fn created() -> Option<String> {
+#[must_use]
+pub fn created() -> Option<String> {
     let stated = std::env::var("SOURCE_DATE_EPOCH").ok();
     let stated = stated.and_then(|text| text.parse().ok());
     let now = || jiff::Timestamp::now().as_second();

@@ -15,6 +15,7 @@ pub(crate) mod evaluate;
 mod explain;
 pub(crate) mod faults;
 pub(crate) mod fit;
+mod fit_blocks;
 pub(crate) mod found;
 pub(crate) mod init;
 pub(crate) mod model;

@@ -73,16 +73,11 @@ impl Fleet {
     fn simulate(&self, machine: &str, seed: usize, more: &[&str]) {
         let (log, seed) = (self.log(machine), seed.to_string());
         fs::create_dir_all(log.parent().unwrap()).unwrap();
-        let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![
-            &"simulate",
-            &"die-tester",
-            &"--days",
-            &"0.3",
-            &"--seed",
-            &seed,
-            &"-o",
-            &log,
-        ];
+        let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"simulate", &"die-tester", &"--seed", &seed, &"-o", &log];
+        if !more.contains(&"--days") {
+            words.extend([&"--days" as &dyn AsRef<std::ffi::OsStr>, &"0.3"]);
+        }
         words.extend(more.iter().map(|word| word as &dyn AsRef<std::ffi::OsStr>));
         athermal(&words).ended(0);
     }
@@ -466,4 +461,83 @@ mod killed {
         assert_eq!(dates[0], dates[1]);
         assert_eq!(fleet.manifest()["finished"], true);
     }
+}
+
+#[test]
+fn a_fleet_on_kept_blocks_has_the_bytes_of_fits_on_blocks_of_the_rows() {
+    let fleet = Fleet::new("fleet-blocks", &[]);
+    for (nth, machine) in ["a", "b"].into_iter().enumerate() {
+        fleet.simulate(machine, nth + 1, &["--days", "1.4"]);
+    }
+    let folder = fleet.scratch.path("blocks");
+    let fit = |more: &[&str]| {
+        let kept = ["--blocks", "day", "--keep-blocks", folder.to_str().unwrap()];
+        fleet.fit(&[&kept, more].concat()).ended(0)
+    };
+    let alone = |machine: &str, blocks: &[&str]| {
+        let (log, model) = (fleet.log(machine), fleet.scratch.path("single.json"));
+        let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"fit", &fleet.graph, &"--data", &log, &"-o", &model];
+        words.extend(
+            blocks
+                .iter()
+                .map(|word| word as &dyn AsRef<std::ffi::OsStr>),
+        );
+        athermal(&words).ended(0);
+        fs::read_to_string(model).unwrap()
+    };
+    let of_days = |machine: &str| {
+        ["1970-01-01.json", "1970-01-02.json"]
+            .map(|day| fs::metadata(folder.join(machine).join(day)).unwrap())
+            .map(|of| of.modified().unwrap())
+    };
+    fit(&[]).tells(&["2 machines fitted"]);
+    let made = ["a", "b"].map(of_days);
+    fit(&[]).tells(&["0 machines fitted, 2 unchanged"]);
+    // What is fitted to the rows of a day may change: the sums stay.
+    for alpha in ["1.0", "3.0"] {
+        let solver = format!("solver = {{ type = \"ridge\", alpha = {alpha} }}\n[outputs]");
+        fs::write(&fleet.graph, GRAPH.replace("[outputs]", &solver)).unwrap();
+        fit(&[]).tells(&["2 machines fitted"]);
+        for machine in ["a", "b"] {
+            let of_rows = alone(machine, &["--blocks", "day"]);
+            assert_eq!(
+                graph_and_fit(&of_rows),
+                graph_and_fit(&fleet.model(machine))
+            );
+        }
+    }
+    assert_eq!(["a", "b"].map(of_days), made);
+    // Beside a fit on the rows.
+    let coefficients = |text: &str| -> Vec<f64> {
+        let model: Value = serde_json::from_str(text).unwrap();
+        let of = &model["fitted"]["thermal"];
+        let all = of["coefficients"].as_array().unwrap().iter();
+        all.chain([&of["intercept"]])
+            .map(|of| of.as_f64().unwrap())
+            .collect()
+    };
+    let (rows, blocks) = (
+        coefficients(&alone("b", &[])),
+        coefficients(&fleet.model("b")),
+    );
+    assert!(rows.len() == 4 && blocks.len() == 4);
+    let size = rows.iter().fold(0.0_f64, |size, b| size.max(b.abs()));
+    for (rows, blocks) in rows.iter().zip(&blocks) {
+        assert!((rows - blocks).abs() <= 1e-9 * size, "{rows} {blocks}");
+    }
+    // The manifest knows how rows were cut, and rows that come are added.
+    fleet.fit(&[]).ended(0).tells(&["2 machines fitted"]);
+    let more = fleet.log("a").with_file_name("more.csv");
+    let text = fs::read_to_string(fleet.log("a")).unwrap();
+    let day = text.lines().skip(1).map(|row| {
+        let (time, values) = row.split_once(',').unwrap();
+        format!("{},{values}\n", time.parse::<f64>().unwrap() + 200_000.0)
+    });
+    let head = text.lines().next().unwrap();
+    fs::write(more, format!("{head}\n{}", day.collect::<String>())).unwrap();
+    fit(&[]).tells(&["2 machines fitted"]);
+    assert_eq!(of_days("a")[0], made[0][0]);
+    assert!(folder.join("a/1970-01-03.json").is_file());
+    assert!(!folder.join("b/1970-01-03.json").exists());
 }

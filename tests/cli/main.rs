@@ -23,6 +23,7 @@ mod explain;
 mod failing_disks;
 mod faulty_logs;
 mod first_minutes;
+mod fit_blocks;
 mod fit_json;
 mod fleet;
 mod forms_of_logs;
@@ -42,6 +43,7 @@ mod other_processors;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plugin_crates;
+mod priors;
 mod report;
 mod report_graphs;
 mod report_novelty;

@@ -1,6 +1,7 @@
 //! Training rows as Gram matrices of blocks, in their order. Decides how many rows make a block and when rows are no longer
 //! kept; does not decide what is fitted on them.
 
+use crate::folds::Edges;
 use crate::gram::triangle;
 use crate::{FoldRows, Folds, Gram, NumericsError, Split};
 use std::ops::Range;
@@ -30,9 +31,11 @@ pub struct GramBlocks {
     width: usize,
     row_memory: usize,
     most_blocks: usize,
-    /// Rows per closed block: [`BLOCK_ROWS`] times a power of two.
+    /// Rows per closed block: [`BLOCK_ROWS`] times a power of two. Not of stretches.
     block_rows: usize,
     closed: Vec<Gram>,
+    /// Where each closed block ends, where blocks are [stretches](GramBlocks::in_stretches).
+    ends: Option<Vec<u64>>,
     /// The block being filled, whole chunks only.
     open: Gram,
     /// The rows that do not make a whole chunk yet.
@@ -74,6 +77,7 @@ impl GramBlocks {
             most_blocks: (BLOCK_MEMORY / block_bytes).clamp(FEWEST_BLOCKS, MOST_BLOCKS),
             block_rows: BLOCK_ROWS,
             closed: Vec::new(),
+            ends: None,
             open: Gram::new(width),
             pending: Chunk::default(),
             kept: (row_memory > 0).then(Vec::new),
@@ -91,6 +95,55 @@ impl GramBlocks {
             most_blocks: self.most_blocks.max(needed),
             ..self
         }
+    }
+
+    /// The same with blocks that [`GramBlocks::end_stretch`] ends, and no rows kept. Only before the first row.
+    #[must_use]
+    pub fn in_stretches(self) -> Self {
+        Self {
+            ends: Some(Vec::new()),
+            kept: None,
+            row_memory: 0,
+            ..self
+        }
+    }
+
+    /// Whether blocks are stretches, which folds do not cut.
+    pub fn is_in_stretches(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// Adds the rows of `gram` to the stretch that is open; those added one by one come before them.
+    ///
+    /// # Errors
+    /// [`NumericsError::Width`] when the widths differ.
+    pub fn merge(&mut self, gram: &Gram) -> Result<(), NumericsError> {
+        self.add_pending();
+        self.open.merge(gram)
+    }
+
+    /// Ends a stretch: the next row begins another, and a fold may begin with it. Does nothing without rows, nor where blocks are no
+    /// stretches. Of more than 1,024 stretches, or fewer wide ones, neighbours are put together.
+    pub fn end_stretch(&mut self) {
+        if self.ends.is_none() || self.open.count() + self.pending_rows() as u64 == 0 {
+            return;
+        }
+        self.add_pending();
+        let end = self.pending_start();
+        let next = self.open.emptied();
+        self.closed.push(std::mem::replace(&mut self.open, next));
+        self.ends.iter_mut().for_each(|ends| ends.push(end));
+        if self.closed.len() > self.most_blocks {
+            self.halve_blocks();
+        }
+    }
+
+    /// Adds the rows that do not make a whole chunk to the open block.
+    fn add_pending(&mut self) {
+        let (values, weights) = self.pending.part(0..self.pending_rows(), self.width + 1);
+        self.open.add_rows(values, weights, &mut self.scratch);
+        self.pending.values.clear();
+        self.pending.weights.clear();
     }
 
     /// The number of regressors.
@@ -157,7 +210,7 @@ impl GramBlocks {
         let order = self.width + 1;
         let (values, weights) = self.pending.part(0..BLOCK_ROWS, order);
         self.open.add_rows(values, weights, &mut self.scratch);
-        if self.open.count() == self.block_rows as u64 {
+        if self.ends.is_none() && self.open.count() == self.block_rows as u64 {
             let next = self.open.emptied();
             self.closed.push(std::mem::replace(&mut self.open, next));
             if self.closed.len() > self.most_blocks {
@@ -178,6 +231,13 @@ impl GramBlocks {
     }
 
     fn halve_blocks(&mut self) {
+        if let Some(ends) = &mut self.ends {
+            let (mut nth, last) = (0, ends.len() - 1);
+            ends.retain(|_| {
+                nth += 1;
+                nth % 2 == 0 || nth - 1 == last
+            });
+        }
         let mut blocks = std::mem::take(&mut self.closed).into_iter();
         while let Some(mut first) = blocks.next() {
             match blocks.next() {
@@ -185,6 +245,7 @@ impl GramBlocks {
                     first.add_same_shift(&second);
                     self.closed.push(first);
                 }
+                None if self.ends.is_some() => self.closed.push(first),
                 None => self.open = first,
             }
         }
@@ -192,7 +253,10 @@ impl GramBlocks {
     }
 
     fn closed_rows(&self) -> u64 {
-        (self.closed.len() * self.block_rows) as u64
+        match &self.ends {
+            Some(ends) => ends.last().copied().unwrap_or(0),
+            None => (self.closed.len() * self.block_rows) as u64,
+        }
     }
 
     fn pending_start(&self) -> u64 {
@@ -226,18 +290,18 @@ impl GramBlocks {
     }
 
     /// The statistics of the rows that train and test each fold: to the row while rows are kept (see
-    /// [`GramBlocks::exact_folds`]), else with edges moved to blocks (see [`Folds::of_blocks`]).
+    /// [`GramBlocks::exact_folds`]), else with edges moved to those of blocks.
     ///
     /// # Errors
     /// [`NumericsError::Folds`] for fewer than two folds or too few rows or blocks to fill them.
     pub fn splits(&self, folds: &Folds) -> Result<Vec<Split>, NumericsError> {
-        let size = if self.exact_folds() {
-            1
-        } else {
-            self.block_rows as u64
-        };
         let count = folds.count();
-        let folds = folds.of_blocks(self.count(), size, &self.starts)?;
+        let edges = match &self.ends {
+            Some(ends) => Edges::At(ends),
+            None if self.exact_folds() => Edges::Every(1),
+            None => Edges::Every(self.block_rows as u64),
+        };
+        let folds = folds.of_blocks(self.count(), edges, &self.starts)?;
         if folds.iter().any(|fold| fold.test.end - fold.test.start < 2) {
             let rows = self.count();
             return Err(NumericsError::FoldOfOneRow { folds: count, rows });
@@ -307,10 +371,13 @@ impl GramBlocks {
     }
 
     fn block_span(&self, rows: Range<u64>) -> Gram {
-        let size = self.block_rows as u64;
         let mut gram = self.open.emptied();
-        let whole =
-            (rows.start / size) as usize..(rows.end.min(self.closed_rows()) / size) as usize;
+        // How many blocks end at a row or before it.
+        let until = |row: u64| match &self.ends {
+            Some(ends) => ends.partition_point(|end| *end <= row),
+            None => (row / self.block_rows as u64) as usize,
+        };
+        let whole = until(rows.start)..until(rows.end.min(self.closed_rows()));
         for block in &self.closed[whole] {
             gram.add_same_shift(block);
         }
@@ -369,153 +436,4 @@ impl<'a> Rows<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn row(i: u64) -> ([f64; 2], f64) {
-        let t = i as f64;
-        (
-            [20.0 + (0.37 * t).sin(), (0.11 * t).cos()],
-            (0.05 * t).sin(),
-        )
-    }
-
-    fn filled(rows: u64, row_memory: usize) -> GramBlocks {
-        let mut blocks = GramBlocks::with_row_memory(2, row_memory);
-        for i in 0..rows {
-            let (x, y) = row(i);
-            blocks.push(&x, y);
-        }
-        blocks
-    }
-
-    fn direct(rows: Range<u64>) -> Gram {
-        let (x, y) = row(0);
-        let mut gram = Gram::with_shift(vec![x[0], x[1], y]).unwrap();
-        for i in rows {
-            let (x, y) = row(i);
-            gram.push(&x, y);
-        }
-        gram
-    }
-
-    fn assert_near(a: &Gram, b: &Gram) {
-        assert_eq!(a.count(), b.count());
-        let (left, right) = (a.moments(), b.moments());
-        for j in 0..=a.width() {
-            assert!((a.means()[j] - b.means()[j]).abs() < 1e-12);
-            for i in 0..=a.width() {
-                let size = (left[(i, i)] * left[(j, j)]).sqrt();
-                assert!((left[(i, j)] - right[(i, j)]).abs() < 1e-12 * size);
-            }
-        }
-    }
-
-    #[test]
-    fn kept_rows_give_the_folds_to_the_row() {
-        let blocks = filled(1000, DEFAULT_ROW_MEMORY);
-        assert!(blocks.exact_folds());
-        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
-        for (split, rows) in splits.iter().zip([0..334, 334..667, 667..1000]) {
-            assert_near(&split.test, &direct(rows));
-        }
-        assert_near(&splits[2].train, &direct(0..667));
-        assert_near(&blocks.total(), &direct(0..1000));
-    }
-
-    #[test]
-    fn without_kept_rows_fold_edges_snap_to_blocks() {
-        let blocks = filled(2000, 0);
-        assert!(!blocks.exact_folds());
-        assert!(blocks.rows().is_none());
-        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
-        for (split, rows) in splits.iter().zip([0..768, 768..1280, 1280..2000]) {
-            assert_near(&split.test, &direct(rows));
-        }
-        assert_near(&splits[0].train, &direct(768..2000));
-    }
-
-    #[test]
-    fn rows_are_dropped_beyond_the_stated_memory_only() {
-        let bytes_per_row = 3 * size_of::<f64>();
-        assert!(filled(512, 512 * bytes_per_row + 511).exact_folds());
-        assert!(!filled(512, 512 * bytes_per_row - 1).exact_folds());
-    }
-
-    #[test]
-    fn blocks_stay_bounded_and_keep_every_row() {
-        let rows = 256 * 1024 * 2 + 300;
-        let blocks = filled(rows, 0);
-        assert!(blocks.blocks() <= 1025);
-        assert_eq!(blocks.block_rows(), 512);
-        assert_near(&blocks.total(), &direct(0..rows));
-        let splits = blocks.splits(&Folds::contiguous(7)).unwrap();
-        let counted: u64 = splits.iter().map(|split| split.test.count()).sum();
-        assert_eq!(counted, rows);
-    }
-
-    #[test]
-    fn the_same_rows_give_the_same_bits_whether_they_are_kept_or_not() {
-        assert_eq!(
-            filled(5000, 0).total(),
-            filled(5000, DEFAULT_ROW_MEMORY).total()
-        );
-        assert_ne!(filled(5000, 0).total(), filled(5001, 0).total());
-    }
-
-    #[test]
-    fn wide_rows_are_summed_in_no_more_blocks_than_their_folds_need() {
-        let width = 500;
-        let filled = |blocks: GramBlocks| {
-            let mut blocks = blocks;
-            let x = vec![1.0; width];
-            for i in 0..30 * BLOCK_ROWS {
-                blocks.push(&x, i as f64);
-            }
-            blocks
-        };
-        let without = || GramBlocks::with_row_memory(width, 0);
-        assert!(filled(without()).blocks() <= 9);
-        let blocks = filled(without().cut_into(4));
-        assert!(blocks.blocks() <= 17);
-        let gap = Folds::Blocked {
-            folds: 4,
-            gap: 1,
-            embargo: 0,
-        };
-        assert_eq!(blocks.splits(&gap).unwrap().len(), 4);
-    }
-
-    #[test]
-    fn too_few_blocks_for_the_folds_are_refused_rather_than_empty() {
-        let thirds = Folds::contiguous(3);
-        assert!(filled(300, 0).splits(&thirds).is_err());
-        assert!(filled(300, DEFAULT_ROW_MEMORY).splits(&thirds).is_ok());
-    }
-
-    #[test]
-    fn a_gap_is_in_neither_part_of_a_split() {
-        let folds = Folds::Blocked {
-            folds: 2,
-            gap: 10,
-            embargo: 20,
-        };
-        let exact = filled(1500, DEFAULT_ROW_MEMORY).splits(&folds).unwrap();
-        assert_near(&exact[0].train, &direct(780..1500));
-        assert_near(&exact[1].train, &direct(0..740));
-        let in_blocks = filled(1500, 0).splits(&folds).unwrap();
-        assert_near(&in_blocks[0].test, &direct(0..768));
-        assert_near(&in_blocks[0].train, &direct(1024..1500));
-        assert_near(&in_blocks[1].train, &direct(0..512));
-    }
-
-    #[test]
-    fn weights_are_kept_with_the_rows() {
-        let mut blocks = GramBlocks::new(1);
-        blocks.push(&[1.0], 2.0);
-        blocks.push_weighted(&[3.0], 4.0, 0.5);
-        let rows: Vec<_> = blocks.rows().unwrap().iter().collect();
-        assert_eq!(rows, [(&[1.0][..], 2.0, 1.0), (&[3.0][..], 4.0, 0.5)]);
-        assert_eq!(blocks.total().weight(), 1.5);
-    }
-}
+mod tests;

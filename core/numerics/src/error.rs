@@ -94,6 +94,13 @@ pub enum NumericsError {
         /// How many rows a block has.
         block: u64,
     },
+    /// The same where blocks are stretches.
+    FoldsOfStretches {
+        /// How many folds were asked for.
+        folds: usize,
+        /// How many stretches have rows.
+        stretches: usize,
+    },
     /// What is left out beside a test leaves nothing to train on.
     FoldsApart {
         /// The rows that would be tested.
@@ -169,6 +176,11 @@ impl fmt::Display for NumericsError {
             Self::FoldsOfBlocks { folds, rows, block } => write!(
                 f,
                 "{rows} rows cannot be cut into {folds} folds, since they did not fit in memory and are summed in blocks of {block} rows"
+            ),
+            Self::FoldsOfStretches { folds, stretches } => write!(
+                f,
+                "{stretches} blocks cannot be cut into {folds} folds of whole blocks that leave some to train on; fit without blocks, on \
+                 fewer folds, or on more data"
             ),
             Self::FoldsApart {
                 test,

@@ -44,6 +44,55 @@ pub enum Folds {
     },
 }
 
+/// Where rows may be cut, beside their first and their last.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Edges<'a> {
+    /// After every so many of them.
+    Every(u64),
+    /// At these rows, in order.
+    At(&'a [u64]),
+}
+
+impl Edges<'_> {
+    /// The edge nearest to a row among so many.
+    fn nearest(self, row: u64, rows: u64) -> u64 {
+        match self {
+            Self::Every(size) => match (row + size / 2) / size * size {
+                nearest if nearest <= rows / size * size && row < rows => nearest,
+                _ => rows,
+            },
+            Self::At(_) => {
+                let (before, after) = (self.before(row), self.after(row, rows));
+                let nearer = row - before < after - row;
+                if nearer { before } else { after }
+            }
+        }
+    }
+
+    /// The last edge at or before a row.
+    fn before(self, row: u64) -> u64 {
+        match self {
+            Self::Every(size) => row / size * size,
+            Self::At(edges) => match edges.partition_point(|edge| *edge <= row) {
+                0 => 0,
+                nth => edges[nth - 1],
+            },
+        }
+    }
+
+    /// The first edge at or after a row.
+    fn after(self, row: u64, rows: u64) -> u64 {
+        match self {
+            Self::Every(size) => row.div_ceil(size).saturating_mul(size).min(rows),
+            Self::At(_) if row == 0 => 0,
+            Self::At(edges) => {
+                let nth = edges.partition_point(|edge| *edge < row);
+                edges.get(nth).copied().unwrap_or(rows)
+            }
+        }
+    }
+}
+
 /// The rows of one fold.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FoldRows {
@@ -80,21 +129,21 @@ impl Folds {
     /// The folds of so many rows.
     ///
     /// # Errors
-    /// See [`Folds::of_blocks`].
+    /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsApart`] for a fold without a row to train on.
     pub fn of(&self, rows: u64) -> Result<Vec<FoldRows>, NumericsError> {
-        self.of_blocks(rows, 1, &[])
+        self.of_blocks(rows, Edges::Every(1), &[])
     }
 
-    /// The same where rows come in blocks of `size` that cannot be cut: edges of tests move to the nearest edge of a
+    /// The same where rows come in blocks that cannot be cut: edges of tests move to the nearest edge of a
     /// block, and gaps become no smaller than stated. Segments but for the first begin at the rows `starts`.
     ///
     /// # Errors
-    /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsOfBlocks`] where rows
-    /// one by one would do; [`NumericsError::FoldsApart`] for a fold without a row to train on.
-    pub fn of_blocks(
+    /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsOfBlocks`] and
+    /// [`NumericsError::FoldsOfStretches`] where rows one by one would do; [`NumericsError::FoldsApart`] for a fold without a row to train on.
+    pub(crate) fn of_blocks(
         &self,
         rows: u64,
-        size: u64,
+        edges: Edges<'_>,
         starts: &[u64],
     ) -> Result<Vec<FoldRows>, NumericsError> {
         let folds = self.count();
@@ -102,16 +151,13 @@ impl Folds {
         if folds < 2 || rows < parts {
             return Err(NumericsError::Folds { folds, rows });
         }
-        let snap = |row: u64| match (row + size / 2) / size * size {
-            nearest if nearest <= rows / size * size && row < rows => nearest,
-            _ => rows,
-        };
+        let snap = |row: u64| edges.nearest(row, rows);
         let cut: Vec<FoldRows> = self
             .tests(rows, starts)
             .into_iter()
             .map(|test| snap(test.start)..snap(test.end))
             .map(|test| FoldRows {
-                train: self.train(&test, rows, size),
+                train: self.train(&test, rows, edges),
                 test,
             })
             .collect();
@@ -119,11 +165,18 @@ impl Folds {
         let Some(lacking) = cut.iter().find(lacks) else {
             return Ok(cut);
         };
-        if size > 1 {
+        match edges {
+            Edges::Every(1) => {}
             // What fails one by one too is not the fault of the blocks.
-            self.of(rows)?;
-            let block = size;
-            return Err(NumericsError::FoldsOfBlocks { folds, rows, block });
+            Edges::Every(block) => {
+                self.of(rows)?;
+                return Err(NumericsError::FoldsOfBlocks { folds, rows, block });
+            }
+            Edges::At(edges) => {
+                self.of(rows)?;
+                let stretches = edges.len();
+                return Err(NumericsError::FoldsOfStretches { folds, stretches });
+            }
         }
         let (gap, embargo) = self.apart();
         Err(NumericsError::FoldsApart {
@@ -180,14 +233,13 @@ impl Folds {
         }
     }
 
-    fn train(&self, test: &Range<u64>, rows: u64, size: u64) -> Vec<Range<u64>> {
+    fn train(&self, test: &Range<u64>, rows: u64, edges: Edges<'_>) -> Vec<Range<u64>> {
         let (gap, embargo) = self.apart();
-        let before = 0..test.start.saturating_sub(gap) / size * size;
+        let before = 0..edges.before(test.start.saturating_sub(gap));
         let left_out = test.end.saturating_add(gap).saturating_add(embargo);
-        let start = left_out.min(rows).div_ceil(size).saturating_mul(size);
         let after = match self {
             Self::Expanding { .. } => rows..rows,
-            _ => start.min(rows)..rows,
+            _ => edges.after(left_out.min(rows), rows)..rows,
         };
         [before, after]
             .into_iter()
@@ -253,7 +305,7 @@ mod tests {
             gap: 1,
             embargo: 0,
         };
-        let folds = how.of_blocks(1000, 100, &[]).unwrap();
+        let folds = how.of_blocks(1000, Edges::Every(100), &[]).unwrap();
         assert_eq!(folds[0].test, 0..500);
         assert_eq!(folds[0].train, [600..1000]);
         assert_eq!(folds[1].train, [0..400]);
@@ -267,7 +319,7 @@ mod tests {
         assert!(
             refusal(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
         );
-        let blocks = refusal(three.of_blocks(12, 256, &[]));
+        let blocks = refusal(three.of_blocks(12, Edges::Every(256), &[]));
         assert!(blocks.contains("12 rows") && blocks.contains("in blocks of 256 rows"));
         let wide = Folds::Blocked {
             folds: 3,
@@ -275,7 +327,7 @@ mod tests {
             embargo: 7,
         };
         for size in [1, 4] {
-            let apart = refusal(wide.of_blocks(12, size, &[]));
+            let apart = refusal(wide.of_blocks(12, Edges::Every(size), &[]));
             assert_eq!(
                 apart,
                 "of 12 rows none is left to train on where rows 1 to 4 are tested, with a gap of 2 rows and an embargo of 7"
@@ -286,7 +338,9 @@ mod tests {
     #[test]
     fn folds_by_segments_never_cut_one() {
         let tests = |folds: usize, starts: &[u64]| {
-            let folds = Folds::Segments { folds }.of_blocks(100, 1, starts).unwrap();
+            let folds = Folds::Segments { folds }
+                .of_blocks(100, Edges::Every(1), starts)
+                .unwrap();
             folds.into_iter().map(|fold| fold.test).collect::<Vec<_>>()
         };
         assert_eq!(tests(2, &[40, 70]), [0..40, 40..100]);
@@ -297,7 +351,7 @@ mod tests {
         assert_eq!(tests(2, &[3, 99]), [0..50, 50..100]);
         assert_eq!(tests(4, &[]), [0..25, 25..50, 50..75, 75..100]);
         let third = &Folds::Segments { folds: 3 }
-            .of_blocks(100, 1, &[40, 70])
+            .of_blocks(100, Edges::Every(1), &[40, 70])
             .unwrap()[1];
         assert_eq!(third.train, [0..40, 70..100]);
     }
@@ -315,5 +369,25 @@ mod tests {
         assert!(wide.of(10).is_err());
         let late = Folds::Expanding { folds: 3, gap: 25 };
         assert!(late.of(100).is_err());
+    }
+
+    #[test]
+    fn of_stretches_folds_end_where_these_do() {
+        let ends = [10, 30, 60, 70, 90];
+        let thirds = Folds::contiguous(3).of_blocks(90, Edges::At(&ends), &[]);
+        let tests: Vec<Range<u64>> = thirds.unwrap().into_iter().map(|fold| fold.test).collect();
+        assert_eq!(tests, [0..30, 30..60, 60..90]);
+        let apart = Folds::Blocked {
+            folds: 2,
+            gap: 1,
+            embargo: 0,
+        };
+        let apart = apart.of_blocks(90, Edges::At(&ends), &[]).unwrap();
+        assert_eq!(apart[0].test, 0..60);
+        assert_eq!(apart[0].train, [70..90]);
+        assert_eq!(apart[1].train, [0..30]);
+        let few = Folds::contiguous(3).of_blocks(90, Edges::At(&[45, 90]), &[]);
+        let few = few.map_err(|error| error.to_string());
+        assert!(few.is_err_and(|error| error.contains("2 blocks cannot be cut into 3 folds")));
     }
 }

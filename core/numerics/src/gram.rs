@@ -203,6 +203,36 @@ impl Gram {
         Ok(())
     }
 
+    /// The same rows with some of their regressors, in this order.
+    ///
+    /// # Errors
+    /// [`NumericsError::Column`] where there is no such regressor.
+    pub fn of_columns(&self, columns: &[usize]) -> Result<Self, NumericsError> {
+        let width = self.width;
+        if let Some(&column) = columns.iter().find(|&&column| column >= width) {
+            return Err(NumericsError::Column { column, width });
+        }
+        let all: Vec<usize> = columns.iter().copied().chain([width]).collect();
+        let pick = |of: &[f64]| all.iter().map(|&column| of[column]).collect::<Vec<f64>>();
+        let mut chosen = Self {
+            count: self.count,
+            weight: self.weight,
+            shift: Vec::new(),
+            sum: pick(&self.sum),
+            ..Self::new(columns.len())
+        };
+        if !self.shift.is_empty() {
+            chosen.shift = pick(&self.shift);
+        }
+        for (j, &column) in all.iter().enumerate() {
+            for (i, &row) in all.iter().enumerate().skip(j) {
+                let (low, high) = (row.min(column), row.max(column));
+                chosen.cross[place(i, j, all.len())] = self.cross[place(high, low, width + 1)];
+            }
+        }
+        Ok(chosen)
+    }
+
     /// No rows, about the same shift.
     pub(crate) fn emptied(&self) -> Self {
         Self {
@@ -320,7 +350,8 @@ impl Gram {
         moments
     }
 
-    pub(crate) fn is_finite(&self) -> bool {
+    /// Whether all sums are finite.
+    pub fn is_finite(&self) -> bool {
         let mut sums = self.shift.iter().chain(&self.sum).chain(&self.cross);
         self.weight.is_finite() && sums.all(|v| v.is_finite())
     }
@@ -482,5 +513,22 @@ mod tests {
         assert_eq!(gram.means(), [0.0; 3]);
         assert_eq!(gram.variances(), [0.0; 3]);
         assert_eq!(gram.moments_about(&[1.0; 3]), Mat::<f64>::zeros(3, 3));
+    }
+
+    #[test]
+    fn some_columns_have_the_statistics_of_rows_of_these() {
+        let (mut all, mut some) = (Gram::new(3), Gram::new(2));
+        for i in 0..50 {
+            let t = f64::from(i);
+            let x = [t.sin(), 20.0 + t.cos(), (0.1 * t).sin()];
+            all.push(&x, t);
+            some.push(&[x[2], x[1]], t);
+        }
+        let chosen = all.of_columns(&[2, 1]).unwrap();
+        assert_eq!(chosen.means(), some.means());
+        assert_eq!((chosen.count(), chosen.shift()), (50, some.shift()));
+        assert_eq!(chosen.moments(), some.moments());
+        assert!(all.of_columns(&[3]).is_err());
+        assert_eq!(Gram::new(3).of_columns(&[1]).unwrap(), Gram::new(1));
     }
 }

@@ -1,8 +1,8 @@
 //! The estimator that leaves features out by its penalty: lasso and elastic net share it.
 
 use athermal_core::node::{
-    Estimator, Forms, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Estimator, Forms, InputPort, Mistake, Regressor, Regressors, Summed, Trained, Trainer,
+    TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_numerics::{
     Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid, quiet_folds,
@@ -16,6 +16,7 @@ use crate::folds::{Folds, tell_moved, tell_quiet};
 use crate::novelty::novelty_of;
 use crate::penalty::{best_of, means};
 use crate::regression::LinearPredictor;
+use crate::summed::{add_sums, sums_of};
 use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
@@ -248,6 +249,13 @@ impl Trainer for SparseTrainer {
         self.blocks.segment();
     }
 
+    fn summed(&mut self) -> Option<&mut dyn Summed> {
+        if !self.blocks.is_in_stretches() {
+            self.blocks = self.blocks.clone().in_stretches();
+        }
+        Some(self)
+    }
+
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         let predictor = self.solve(&mut report).map_err(unsolved)?;
@@ -255,5 +263,19 @@ impl Trainer for SparseTrainer {
             predictor: Box::new(predictor),
             report,
         })
+    }
+}
+
+impl Summed for SparseTrainer {
+    fn sums(&mut self) -> Result<String, TrainingError> {
+        sums_of(&self.blocks)
+    }
+
+    fn add_sums(&mut self, sums: &str, places: &[usize]) -> Result<(), TrainingError> {
+        add_sums(&mut self.blocks, sums, places)
+    }
+
+    fn end_stretch(&mut self) {
+        self.blocks.end_stretch();
     }
 }

@@ -55,6 +55,9 @@ pub(crate) fn tell_moved(blocks: &GramBlocks, report: &mut TrainingReport) {
     if blocks.exact_folds() || report.figures.contains_key(FIGURE) {
         return;
     }
+    if blocks.is_in_stretches() {
+        return;
+    }
     let rows = blocks.block_rows();
     report.figure(FIGURE, rows);
     report.notes.push(format!(

@@ -36,6 +36,7 @@ mod selection;
 mod solver;
 mod stack;
 mod state_space;
+mod summed;
 mod unsolved;
 mod zero;
 

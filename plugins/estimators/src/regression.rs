@@ -1,8 +1,8 @@
 //! What the linear estimators share: how rows become a fitted model and a report; which regressors there are is theirs.
 
 use athermal_core::node::{
-    Coefficients, LinearForm, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer,
-    TrainingError, TrainingReport, TrainingSetup,
+    Coefficients, LinearForm, Mistake, Predictor, Regressor, Summed, Trained, TrainedRange,
+    Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::node::{number, numbers};
 use athermal_core::unit::Unit;
@@ -19,6 +19,7 @@ use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::prior::{Met, Wanted};
 use crate::selection::Selection;
 use crate::solver::Solver;
+use crate::summed::{add_sums, sums_of};
 use crate::unsolved::unsolved;
 
 /// Takes the rows of a linear fit as Gram blocks.
@@ -329,7 +330,7 @@ impl LinearTrainer {
             Method::TinyRidge { alpha } => {
                 report.figure("tiny_ridge", alpha);
                 report.notes.push(format!(
-                    "ill-conditioned, and the rows did not fit in memory, so solved with a ridge of {alpha:e}"
+                    "ill-conditioned, and the rows are not kept, so solved with a ridge of {alpha:e}"
                 ));
             }
         }
@@ -348,6 +349,15 @@ impl Trainer for LinearTrainer {
         self.blocks.segment();
     }
 
+    fn summed(&mut self) -> Option<&mut dyn Summed> {
+        // Gradients go over the rows several times.
+        let by_rows = matches!(self.solver, Solver::Sgd { .. });
+        if !by_rows && !self.blocks.is_in_stretches() {
+            self.blocks = self.blocks.clone().in_stretches();
+        }
+        (!by_rows).then_some(self)
+    }
+
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         let predictor: Box<dyn Predictor> = match self.fitted(&mut report)? {
@@ -355,6 +365,20 @@ impl Trainer for LinearTrainer {
             (model, None) => Box::new(model),
         };
         Ok(Trained { predictor, report })
+    }
+}
+
+impl Summed for LinearTrainer {
+    fn sums(&mut self) -> Result<String, TrainingError> {
+        sums_of(&self.blocks)
+    }
+
+    fn add_sums(&mut self, sums: &str, places: &[usize]) -> Result<(), TrainingError> {
+        add_sums(&mut self.blocks, sums, places)
+    }
+
+    fn end_stretch(&mut self) {
+        self.blocks.end_stretch();
     }
 }
 

@@ -15,6 +15,7 @@ use crate::json_rows::JsonRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 use crate::long::Long;
+use crate::recording::offset_of;
 use crate::typed::{self, TypedCells, TypedFile};
 use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, TimeColumn};
 use commas::Commas;
@@ -39,6 +40,8 @@ pub struct Options {
     pub merge: bool,
     /// What is added to the times of files, in ns.
     pub offsets: Vec<(PathBuf, i64)>,
+    /// The first and last instant that is asked for, in ns: what can pass rows outside over without reading them does so.
+    pub within: Option<(i64, i64)>,
     /// The time of files that have another than the layout says.
     pub times: Vec<(PathBuf, TimeColumn)>,
 }
@@ -173,7 +176,10 @@ impl Reader {
         let wanted = wanted(&layout, &table);
         let is_long = table.layout == Arrangement::Long;
         let numbers = if is_long { 0 } else { layout.channels.len() };
-        let cells = TypedCells::new(path, file, &wanted, numbers)?;
+        let offset = offset_of(path, &options);
+        let own = |at: i64| at.saturating_sub(offset);
+        let within = options.within.map(|(from, to)| (own(from), own(to)));
+        let cells = TypedCells::new(path, file, &wanted, numbers, within)?;
         let rows = Rows::Typed(Box::new(cells));
         Ok(Self::of_rows(rows, None, layout, &table, &options))
     }

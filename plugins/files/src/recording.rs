@@ -170,6 +170,7 @@ impl Recording {
             }
         }
         if let Some(period) = self.period.take() {
+            report.period = Some((*period.start(), *period.end()));
             self.periods.push((self.reports.len(), period));
         }
         self.within = vec![0; self.periods.len()];

@@ -57,6 +57,8 @@ pub struct Selection {
     pub values: Vec<Option<usize>>,
     /// The columns of texts; the same.
     pub texts: Vec<Option<usize>>,
+    /// The first and last instant that is asked for, in ns: rows outside may be passed over, and need not be. All where there is none.
+    pub within: Option<(i64, i64)>,
 }
 
 /// What a cell of the time is.
@@ -159,12 +161,14 @@ pub(crate) struct TypedCells {
 }
 
 impl TypedCells {
-    /// Looks the columns of a layout up; those behind the first `numbers` channels are texts.
+    /// Looks the columns of a layout up; those behind the first `numbers` channels are texts. Rows outside of a stretch of time may be
+    /// passed over.
     pub fn new(
         path: &Path,
         file: Box<dyn TypedFile>,
         layout: &Layout,
         numbers: usize,
+        within: Option<(i64, i64)>,
     ) -> Result<Self, FileError> {
         let place = Place {
             file: path.display().to_string().into(),
@@ -185,7 +189,7 @@ impl TypedCells {
             );
             return Err(FileError::unfit(path, reason));
         }
-        Self::of(path, file, names, columns, numbers)
+        Self::of(path, file, names, columns, numbers, within)
     }
 
     /// All columns as texts.
@@ -195,7 +199,7 @@ impl TypedCells {
             time: Vec::new(),
             channels: (0..names.len()).map(Some).collect(),
         };
-        Self::of(path, file, names, columns, 0)
+        Self::of(path, file, names, columns, 0, None)
     }
 
     fn of(
@@ -204,12 +208,14 @@ impl TypedCells {
         names: Vec<String>,
         columns: Columns,
         numbers: usize,
+        within: Option<(i64, i64)>,
     ) -> Result<Self, FileError> {
         let (values, texts) = columns.channels.split_at(numbers);
         let wanted = Selection {
             time: columns.time.iter().flatten().copied().collect(),
             values: values.to_vec(),
             texts: texts.to_vec(),
+            within,
         };
         let rows = file.select(wanted);
         Ok(Self {

@@ -7,6 +7,7 @@ use athermal_run::model::Model;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
+use crate::blocks::BlockOptions;
 use crate::figure::Figure;
 use crate::rows::RowsId;
 
@@ -44,6 +45,9 @@ pub struct Setup {
     pub graph: Option<(PathBuf, String)>,
     /// How files are read.
     pub reading: Reading,
+    /// Whether a fit is one on blocks.
+    #[serde(default)]
+    pub blocks: BlockOptions,
     /// How many bytes of rows a fit may keep.
     pub memory: usize,
     /// Only truths whose absolute value is below count in scores.

@@ -1,5 +1,6 @@
 //! The one function of a fleet: the rows of a machine and a graph to a model. It knows neither clock nor path nor environment.
 
+use athermal_core::engine::Fitted;
 use athermal_run::fit::{BareOutput, FitError, FitOptions, FitProgress, FitReport, fit};
 use athermal_run::model::{Card, Model};
 use athermal_run::recording::Recording;
@@ -51,6 +52,33 @@ pub struct MachineFit {
 }
 
 impl MachineFit {
+    /// What was fitted, as a model.
+    pub(crate) fn of(
+        graph: &Model,
+        fitted: Fitted,
+        report: FitReport,
+        rows: RowsId,
+        created: Option<String>,
+    ) -> Result<Self, MachineError> {
+        if !report.estimators.is_empty() && report.failed().count() == report.estimators.len() {
+            return Err(MachineError::NothingFitted(Box::new(report)));
+        }
+        let card = Card::of(&report, vec![rows.card()], created);
+        let model = Model {
+            graph: graph.graph.clone(),
+            plan: graph.plan.clone(),
+            fitted,
+            card: Some(card),
+        };
+        let bare = report.bare_outputs(&graph.plan);
+        Ok(Self {
+            model,
+            rows,
+            report,
+            bare,
+        })
+    }
+
     /// The bytes of the model: the same for the same rows, graph and date, wherever and in however many batches they were fitted.
     ///
     /// # Errors
@@ -81,21 +109,5 @@ pub fn fit_machine(
     let fitted = fit(&graph.plan, &rows, options, progress);
     let (fitted, report) = fitted.map_err(MachineError::Fit)?;
     let rows = rows.id().ok_or(MachineError::Changed)?;
-    if !report.estimators.is_empty() && report.failed().count() == report.estimators.len() {
-        return Err(MachineError::NothingFitted(Box::new(report)));
-    }
-    let card = Card::of(&report, vec![rows.card()], created);
-    let model = Model {
-        graph: graph.graph.clone(),
-        plan: graph.plan.clone(),
-        fitted,
-        card: Some(card),
-    };
-    let bare = report.bare_outputs(&graph.plan);
-    Ok(MachineFit {
-        model,
-        rows,
-        report,
-        bare,
-    })
+    MachineFit::of(graph, fitted, report, rows, created)
 }

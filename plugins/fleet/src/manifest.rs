@@ -10,6 +10,7 @@ use athermal_run::live::store::write_whole;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::blocks::Cut;
 use crate::figure::Figure;
 use crate::job::{Doubt, Reading, Unfitted};
 use crate::rows::RowsId;
@@ -121,6 +122,9 @@ pub struct Maker {
     pub graph_hash: String,
     /// How the files were read.
     pub reading: Reading,
+    /// How rows were cut into blocks, where they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<Cut>,
 }
 
 /// A file as it was when it was read.

@@ -5,6 +5,7 @@ use std::hash::Hasher as _;
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Fnv1a;
+use athermal_run::fit::{Blocks, FitError};
 use athermal_run::model::DataCard;
 use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,23 @@ impl RowsId {
         let mut sum = Sum::default();
         while let Some(event) = source.next(&mut samples)? {
             sum.add(event, &samples);
+        }
+        Ok(sum.id())
+    }
+
+    /// The rows that blocks were made of: of each block in order its day, lowest byte first, and the checksum of its rows.
+    ///
+    /// # Errors
+    /// When a block cannot be read.
+    pub fn of_blocks(blocks: &(impl Blocks + ?Sized)) -> Result<Self, FitError> {
+        let mut sum = Sum::default();
+        for nth in 0..blocks.count() {
+            let read = blocks.read(nth, &mut |block| {
+                sum.rows += block.ticks;
+                sum.write(&block.day.to_le_bytes());
+                sum.write(block.rows.as_bytes());
+            });
+            read.map_err(FitError::Recording)?;
         }
         Ok(sum.id())
     }

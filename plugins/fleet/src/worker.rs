@@ -12,9 +12,10 @@ use athermal_run::model::{Card, Model, ModelError};
 use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
+use crate::blocks::{self, OnBlocks};
 use crate::figure::Figure;
 use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
-use crate::machine::{MachineError, fit_machine};
+use crate::machine::{MachineError, MachineFit, fit_machine};
 use crate::rows::{RowsId, Summed};
 
 /// Works until the input ends.
@@ -78,6 +79,23 @@ fn load_graph(setup: &Setup) -> Result<Model, String> {
 fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String> {
     let dataset = Dataset::new(job.files.clone(), setup.reading.options());
     match (&job.task, graph) {
+        (Task::Fit { created, known }, Some(graph)) if setup.blocks.blocks.is_some() => {
+            let kept = setup.blocks.keep_blocks.as_ref();
+            let on_blocks = OnBlocks {
+                graph,
+                files: &job.files,
+                reading: &setup.reading.options(),
+                kept: kept.map(|folder| folder.join(&job.machine)),
+            };
+            let fit = on_blocks.fit(known.as_ref(), &options(setup.memory), created.clone());
+            match fit.map_err(|error| error.to_string())? {
+                blocks::Outcome::Same => Ok(Reply::Same),
+                blocks::Outcome::Fitted(fit, faults) => {
+                    let fitted = whole(*fit, &faults).map_err(|error| error.to_string())?;
+                    Ok(Reply::Fitted(Box::new(fitted)))
+                }
+            }
+        }
         (Task::Fit { created, known }, Some(graph)) => {
             if let Some(known) = known {
                 let rows = RowsId::of(&dataset, &graph.plan).map_err(|error| error.to_string())?;
@@ -108,13 +126,20 @@ pub fn fitted(
     memory: usize,
     created: Option<String>,
 ) -> Result<Fitted, MachineError> {
-    let options = FitOptions {
+    let watch = FaultWatch::new(rows, Purpose::Fit);
+    let fit = fit_machine(graph, &watch, &options(memory), created, &mut |_| {})?;
+    whole(fit, &watch.found())
+}
+
+fn options(memory: usize) -> FitOptions {
+    FitOptions {
         memory,
         threads: 1,
         ..FitOptions::default()
-    };
-    let watch = FaultWatch::new(rows, Purpose::Fit);
-    let fit = fit_machine(graph, &watch, &options, created, &mut |_| {})?;
+    }
+}
+
+fn whole(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Fitted, MachineError> {
     let failed = fit.report.estimators.iter();
     let unfitted = failed.filter_map(|of| match &of.outcome {
         Outcome::Failed(error) => Some(Unfitted {
@@ -133,7 +158,7 @@ pub fn fitted(
             .map_or_else(Vec::new, Figure::of_card),
         unfitted: unfitted.collect(),
         constant: bare.map(|of| of.output.clone()).collect(),
-        doubts: doubts(&watch.found(), &fit.report.rejected),
+        doubts: doubts(faults, &fit.report.rejected),
         rows: fit.rows,
     })
 }

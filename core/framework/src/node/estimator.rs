@@ -262,6 +262,12 @@ pub trait Trainer: Send {
     /// The next row belongs to another segment of the data.
     fn segment(&mut self) {}
 
+    /// The same as a fit that sums can take the place of rows in; none where more of the rows is needed than such sums. Called before
+    /// the first row, and then for each stretch of the data.
+    fn summed(&mut self) -> Option<&mut dyn Summed> {
+        None
+    }
+
     /// The result.
     ///
     /// # Errors
@@ -278,6 +284,25 @@ pub trait Trainer: Send {
     ) -> Result<Trained, TrainingError> {
         self.finish()
     }
+}
+
+/// A fit in which sums take the place of rows: those of squares and products, from which least squares are solved. The rows of a
+/// stretch of the data are summed once, and many fits are made of the sums.
+pub trait Summed {
+    /// The sums of all rows so far as JSON, in which every number comes back to the bit.
+    ///
+    /// # Errors
+    /// When a sum is no finite number.
+    fn sums(&mut self) -> Result<String, TrainingError>;
+
+    /// Takes the sums of rows that another trainer of the same estimator gave; `places` says which of its regressors these are.
+    ///
+    /// # Errors
+    /// When they are none, or have not these regressors.
+    fn add_sums(&mut self, sums: &str, places: &[usize]) -> Result<(), TrainingError>;
+
+    /// Ends a stretch: what was taken since the last one is not cut by folds.
+    fn end_stretch(&mut self);
 }
 
 /// What a fit gave.

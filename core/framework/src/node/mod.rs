@@ -39,7 +39,7 @@ pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
     CandidateScore, Estimator, OrderFigure, OrderTable, PlannedRow, Regressor, Regressors, Runs,
-    SelectionStep, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
+    SelectionStep, Summed, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub(crate) use feature::{PortValues, SlotTime};

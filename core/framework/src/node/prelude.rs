@@ -3,9 +3,9 @@
 pub use super::{
     Coefficients, Combine, Combiner, Encoder, Estimator, Evidence, Factor, Feature, Forms,
     InputPort, Inputs, Learner, Learns, LinearForm, Mistake, Noise, Of, Operator, OutputPort,
-    Outputs, PortSummary, Predictor, Reach, Regressor, Regressors, Restored, Runs, State, Term,
-    Tick, Trained, TrainedRange, Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
-    Votes, number, number_or_none, numbers,
+    Outputs, PortSummary, Predictor, Reach, Regressor, Regressors, Restored, Runs, State, Summed,
+    Term, Tick, Trained, TrainedRange, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    TruthLags, Votes, number, number_or_none, numbers,
 };
 pub use crate::channel::{ABSENT, Channel, is_unchanged};
 pub use crate::quantity::Quantity;

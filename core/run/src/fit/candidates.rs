@@ -32,6 +32,15 @@ impl Validity {
         }
     }
 
+    /// Counts so many rows, each of which has these values.
+    pub(super) fn count_alike(&mut self, row: impl Iterator<Item = f64>, rows: u64) {
+        self.rows += rows;
+        for (i, value) in row.enumerate() {
+            self.present[i] += rows * u64::from(!value.is_nan());
+            self.cold[i] += rows * u64::from(is_cold(value));
+        }
+    }
+
     /// Whether there was no row to judge candidates by.
     pub(super) fn knows_nothing(&self) -> bool {
         self.rows == 0

@@ -27,6 +27,13 @@ impl Share {
         }
     }
 
+    pub(super) fn none() -> Self {
+        Self {
+            within: 0..0,
+            without: Vec::new(),
+        }
+    }
+
     fn contains(&self, tick: u64) -> bool {
         self.within.contains(&tick) && !self.without.iter().any(|range| range.contains(&tick))
     }
@@ -46,7 +53,7 @@ impl Share {
 }
 
 /// The runs of a gather, as several estimators may share them.
-struct Tap {
+pub(super) struct Tap {
     gather: usize,
     /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
     triggers: Vec<usize>,
@@ -55,7 +62,7 @@ struct Tap {
     kept: Vec<f64>,
     last_kept: Option<u64>,
     /// Whether there was any run, and one in this tick.
-    ran: bool,
+    pub(super) ran: bool,
     runs: bool,
 }
 
@@ -65,7 +72,7 @@ pub(super) struct Trainee {
     pub(super) node: usize,
     pub(super) link: TruthLink,
     limits: TrainingLimits,
-    taps: Vec<usize>,
+    pub(super) taps: Vec<usize>,
     pub(super) validity: Validity,
     pub(super) dropped: Dropped,
     /// When each truth was measured, and what it was.
@@ -90,7 +97,7 @@ struct KeptBetween {
 
 /// Collects the examples of several estimators while an engine is driven.
 pub(super) struct Collector {
-    taps: Vec<Tap>,
+    pub(super) taps: Vec<Tap>,
     pub(super) trainees: Vec<Trainee>,
     memory: usize,
     bytes: usize,
@@ -100,7 +107,7 @@ pub(super) struct Collector {
     pub(super) overflowed: bool,
     tick: u64,
     /// The measured channels that have had no value yet: the slots.
-    silent: Vec<usize>,
+    pub(super) silent: Vec<usize>,
 }
 
 /// Takes the examples of one estimator, in order.
@@ -262,9 +269,14 @@ impl Collector {
         self.silent.contains(&slot)
     }
 
+    /// Whether an estimator ever ran.
+    pub(super) fn ran(&self, trainee: &Trainee) -> bool {
+        trainee.taps.iter().any(|&tap| self.taps[tap].ran)
+    }
+
     /// The regressors that an estimator waits for, and the measured channels behind them without a value, where it never ran.
     pub(super) fn waited_for(&self, plan: &Plan, trainee: &Trainee) -> Option<TrainingError> {
-        if trainee.taps.iter().any(|&tap| self.taps[tap].ran) {
+        if self.ran(trainee) {
             return None;
         }
         let rows = plan.nodes[trainee.node].rows()?;

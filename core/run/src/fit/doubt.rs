@@ -1,6 +1,7 @@
 //! Decides which fits are doubted for the rows that they stand on; not which rows those are.
 
 use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
 
 use crate::channel::is_cold;
 use crate::diagnostic::{count, counted};
@@ -49,15 +50,15 @@ impl Lacking {
         }
     }
 
-    /// An incomplete row.
-    pub(super) fn count(&mut self, row: &[f64]) {
+    /// So many incomplete rows that lack the same.
+    pub(super) fn count(&mut self, row: &[f64], rows: u64) {
         self.row.fill(false);
         for (&source, value) in self.of.iter().zip(row) {
             self.row[source] |= value.is_nan() && !is_cold(*value);
         }
-        self.rows += u64::from(self.row.contains(&true));
+        self.rows += rows * u64::from(self.row.contains(&true));
         for (count, &lacks) in self.sources.values_mut().zip(&self.row) {
-            *count += u64::from(lacks);
+            *count += rows * u64::from(lacks);
         }
     }
 
@@ -137,7 +138,7 @@ pub(super) const FROM_PAST_ALONE: &str =
     "no regressor is left, so it predicts from the past of the truth alone";
 
 /// The truths of the complete rows.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Truths {
     pub(super) rows: u64,
     first: f64,
@@ -159,6 +160,22 @@ impl Truths {
         let off = truth - self.mean;
         self.mean += off / self.rows as f64;
         self.squares += off * (truth - self.mean);
+    }
+
+    /// Those of other rows, which come after (Chan, Golub and LeVeque 1979).
+    pub(super) fn merge(&mut self, other: &Self) {
+        if self.rows == 0 || other.rows == 0 {
+            if other.rows > 0 {
+                *self = *other;
+            }
+            return;
+        }
+        self.changes |= other.changes || other.first != self.first;
+        let rows = self.rows + other.rows;
+        let (off, share) = (other.mean - self.mean, other.rows as f64 / rows as f64);
+        self.squares += other.squares + off * off * self.rows as f64 * share;
+        self.mean += off * share;
+        self.rows = rows;
     }
 
     /// Notes a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has, and
@@ -231,6 +248,28 @@ mod tests {
     use crate::time::Duration;
 
     #[test]
+    fn truths_in_two_parts_are_those_of_all_rows() {
+        let truths: Vec<f64> = (0..40).map(|i| 100.0 + f64::from(i).sin()).collect();
+        let of = |truths: &[f64]| {
+            let mut all = Truths::default();
+            truths.iter().for_each(|truth| all.count(*truth));
+            all
+        };
+        let (whole, mut parts) = (of(&truths), Truths::default());
+        for part in [&truths[..7], &[], &truths[7..]] {
+            parts.merge(&of(part));
+        }
+        assert_eq!((parts.rows, parts.first, parts.changes), (40, 100.0, true));
+        assert!((parts.mean - whole.mean).abs() < 1e-12);
+        assert!((parts.squares - whole.squares).abs() < 1e-12);
+        let mut same = of(&[3.0, 3.0]);
+        same.merge(&of(&[3.0]));
+        assert!(!same.changes);
+        same.merge(&of(&[4.0]));
+        assert!(same.changes);
+    }
+
+    #[test]
     fn a_fit_that_outliers_cannot_pull_is_judged_by_most_of_its_rows() {
         let mut truths = Truths::default();
         for truth in [-1.0, 1.0, -1.0, 1.0] {
@@ -267,7 +306,7 @@ mod tests {
             [1.0, f64::NAN, 1.0],
             [f64::NAN; 3],
         ] {
-            lacking.count(&row);
+            lacking.count(&row, 1);
         }
         let expected = [("t.a".to_owned(), 3), ("t.b".to_owned(), 2)];
         assert_eq!(lacking.named(), expected);

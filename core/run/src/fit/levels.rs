@@ -34,8 +34,8 @@ pub(super) struct Fitting<'a> {
 
 /// Nodes that are fitted together.
 #[derive(Default)]
-struct Level {
-    nodes: Vec<usize>,
+pub(super) struct Level {
+    pub(super) nodes: Vec<usize>,
     /// Those of them that feed others that are fitted.
     feeding: Vec<usize>,
     /// Whether an estimator feeds one of them.
@@ -375,7 +375,7 @@ impl Planned {
 }
 
 /// The nodes that need a fit, by how many others feed them, one through the other.
-fn levels(plan: &Plan) -> Vec<Level> {
+pub(super) fn levels(plan: &Plan) -> Vec<Level> {
     let mut levels: Vec<Level> = Vec::new();
     // Of each slot the first level that may read it, and whether a fitted estimator is behind it.
     let mut of_slot = vec![(0_usize, false); plan.channels.len()];

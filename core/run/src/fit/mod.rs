@@ -3,8 +3,11 @@
 
 mod bare;
 mod between;
+mod block;
+mod blocks;
 mod candidates;
 mod collect;
+mod cut;
 mod doubt;
 mod levels;
 mod progress;
@@ -14,6 +17,9 @@ mod train;
 use std::sync::Arc;
 
 pub use bare::BareOutput;
+pub use block::Block;
+pub use blocks::{BlockError, Blocks, check as check_blocks, fit_from_blocks, rows_identity};
+pub use cut::blocks_of;
 pub use progress::FitProgress;
 pub use report::{Dropped, EstimatorFit, FitError, FitReport, Outcome};
 

@@ -4,12 +4,13 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
+use super::block::{Content, Group};
 use super::collect::{Collector, Sink, Trainee};
 use super::doubt::{Lacking, Truths, note_constant};
 use super::progress::{FitProgress, Listener};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
-use crate::compile::{Plan, PlannedRole};
+use crate::compile::{Plan, PlannedLearning, PlannedNode, PlannedRole, TruthLink};
 use crate::engine::{When, naming_one};
 use crate::node::{
     LearningLimits, Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup,
@@ -32,11 +33,13 @@ pub(super) struct Making {
     ranges: Vec<Extremes>,
     incomplete: u64,
     lacking: Lacking,
+    /// Why sums could not be taken.
+    broken: Option<TrainingError>,
 }
 
 /// Which candidates a trainer may be made to do without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum MayLeaveOut {
+pub(super) enum MayLeaveOut {
     /// None: its model has no constant of its own.
     None,
     /// Not all: what encodes nothing has nothing to give.
@@ -69,6 +72,57 @@ impl Making {
     }
 }
 
+impl Making {
+    /// Takes the examples of a stretch that folds do not cut.
+    pub(super) fn take(&mut self, groups: &[Group], begins_segment: bool) {
+        // Before the first row: no rows are kept.
+        self.trainer.summed();
+        if begins_segment {
+            self.trainer.segment();
+        }
+        for group in groups {
+            self.row.clear();
+            let states = self.kept.iter().map(|&nth| group.states[nth].value());
+            self.row.extend(states);
+            if self.row.iter().any(|value| value.is_nan()) {
+                self.incomplete += group.count();
+                self.lacking.count(&self.row, group.count());
+                continue;
+            }
+            match &group.content {
+                Content::Rows(_) => {
+                    group.each_row(|row, truth| {
+                        self.row(Instant::from_ns(0), [row].into_iter(), truth)
+                    });
+                }
+                Content::Sums {
+                    truths,
+                    extremes,
+                    sums,
+                } => self.add(group, truths, extremes, sums.get()),
+            }
+        }
+        if let Some(summed) = self.trainer.summed() {
+            summed.end_stretch();
+        }
+    }
+
+    fn add(&mut self, group: &Group, truths: &Truths, extremes: &[(f64, f64)], sums: &str) {
+        self.truths.merge(truths);
+        let places: Vec<usize> = self.kept.iter().map(|&nth| group.place(nth)).collect();
+        let truth = group.place(group.states.len());
+        let all = places.iter().chain([&truth]);
+        for (range, (lowest, highest)) in self.ranges.iter_mut().zip(all.map(|&at| extremes[at])) {
+            range.include(lowest);
+            range.include(highest);
+        }
+        let summed = self.trainer.summed();
+        if let Some(Err(error)) = summed.map(|summed| summed.add_sums(sums, &places)) {
+            self.broken.get_or_insert(error);
+        }
+    }
+}
+
 impl Sink for Making {
     fn row<'a>(&mut self, at: Instant, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64) {
         self.all.clear();
@@ -80,7 +134,7 @@ impl Sink for Making {
             .extend(self.kept.iter().map(|&candidate| self.all[candidate]));
         if self.row.iter().any(|value| value.is_nan()) {
             self.incomplete += 1;
-            self.lacking.count(&self.row);
+            self.lacking.count(&self.row, 1);
         } else {
             self.truths.count(truth);
             for (range, value) in self.ranges.iter_mut().zip(self.row.iter().chain([&truth])) {
@@ -109,34 +163,61 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 
 /// Starts the fit of one estimator, now that it is known which candidates have values, and which of them stay the same.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec<usize>) -> Making {
-    let node = &plan.nodes[trainee.node];
-    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
-    let learning = match &node.role {
-        PlannedRole::Estimator { learning, .. } => learning.as_ref(),
-        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
-    };
-    let learns = learning.is_some();
+    let regressors = plan.nodes[trainee.node].role.fit();
+    let regressors = regressors.map_or(&[][..], |fit| &fit.regressors);
     let mut kept = trainee.validity.kept();
     kept.retain(|candidate| !constant.contains(candidate));
+    let (trainer, may_leave_out) = trainer_of(plan, (trainee.node, trainee.link), &kept, memory);
+    Making {
+        trainer,
+        constant,
+        may_leave_out,
+        learns: learning_of(&plan.nodes[trainee.node]).is_some(),
+        row: Vec::with_capacity(kept.len()),
+        ranges: vec![Extremes::NONE; kept.len() + 1],
+        all: Vec::new(),
+        lacking: Lacking::new(kept.iter().map(|&candidate| &regressors[candidate])),
+        kept,
+        truths: Truths::default(),
+        incomplete: 0,
+        broken: None,
+    }
+}
+
+fn learning_of(node: &PlannedNode) -> Option<&PlannedLearning> {
+    match &node.role {
+        PlannedRole::Estimator { learning, .. } => learning.as_ref(),
+        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
+    }
+}
+
+/// What learns a truth from the rows of a node, of which some candidates are kept.
+pub(super) fn trainer_of(
+    plan: &Plan,
+    (node, truth): (usize, TruthLink),
+    kept: &[usize],
+    memory: usize,
+) -> (Box<dyn Trainer>, MayLeaveOut) {
+    let node = &plan.nodes[node];
+    let learning = learning_of(node);
+    let regressors = node.role.fit().map_or(&[][..], |fit| &fit.regressors);
+    let regressors = kept.iter().map(|&candidate| regressors[candidate].clone());
     let setup = TrainingSetup {
         instance: node.instance(),
-        regressors: kept
-            .iter()
-            .map(|&candidate| regressors[candidate].clone())
-            .collect::<Vec<Regressor>>(),
-        places: kept.clone(),
-        error_unit: plan.channels[trainee.link.slot]
+        regressors: regressors.collect::<Vec<Regressor>>(),
+        places: kept.to_vec(),
+        error_unit: plan.channels[truth.slot]
             .channel
             .unit
             .difference()
             .to_string(),
         memory,
-        ahead: trainee.link.ahead,
-        span: trainee.link.span,
-        learns,
+        ahead: truth.ahead,
+        span: truth.span,
+        learns: learning.is_some(),
         limits: learning.map_or(LearningLimits::NONE, |learning| learning.limits),
     };
-    let (trainer, may_leave_out) = match node.spec.role() {
+    match node.spec.role() {
         Role::Estimator(estimator) if estimator.needs_constants() => {
             (estimator.trainer(&setup), MayLeaveOut::None)
         }
@@ -147,19 +228,6 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
             (encoder.trainer(&setup), MayLeaveOut::NotAll)
         }
         Role::Combiner(_) => unreachable!("a combiner is not fitted"),
-    };
-    Making {
-        trainer,
-        constant,
-        may_leave_out,
-        learns,
-        row: Vec::with_capacity(kept.len()),
-        ranges: vec![Extremes::NONE; kept.len() + 1],
-        all: Vec::new(),
-        lacking: Lacking::new(kept.iter().map(|&candidate| &regressors[candidate])),
-        kept,
-        truths: Truths::default(),
-        incomplete: 0,
     }
 }
 
@@ -214,7 +282,7 @@ pub(super) fn end(
             largest: making.ranges[nth].largest(),
         });
         // Some trainers would make a model of sums that overflowed.
-        match too_large {
+        match too_large.or(making.broken) {
             Some(error) => Err(error),
             None => {
                 let node = &node.instance();
@@ -299,8 +367,31 @@ pub(super) fn train_kept(
     options: &FitOptions,
     progress: &Listener<'_>,
 ) -> Vec<Made> {
-    let count = collector.trainees.len();
-    let threads = options.threads.clamp(1, count.max(1));
+    in_threads(collector.trainees.len(), options.threads, |index| {
+        let trainee = &collector.trainees[index];
+        naming_one(plan, trainee.node, When::Fit, || {
+            // The whole memory, or how folds are cut would depend on the number of threads.
+            let mut making = begin(plan, trainee, options.memory, Vec::new());
+            collector.replay(index, &mut making);
+            let constant = making.constant();
+            if !constant.is_empty() {
+                // What the first one keeps is gone before the next keeps as much.
+                drop(making);
+                making = begin(plan, trainee, options.memory, constant);
+                collector.replay(index, &mut making);
+            }
+            end(plan, collector, trainee, making, false, progress)
+        })
+    })
+}
+
+/// Works through so many things on several threads; the results are in the order of the things.
+pub(super) fn in_threads<T: Send>(
+    count: usize,
+    threads: usize,
+    make: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
+    let threads = threads.clamp(1, count.max(1));
     let next = AtomicUsize::new(0);
     let work = || {
         let mut made = Vec::new();
@@ -309,21 +400,7 @@ pub(super) fn train_kept(
             if index >= count {
                 return made;
             }
-            let trainee = &collector.trainees[index];
-            let trained = naming_one(plan, trainee.node, When::Fit, || {
-                // The whole memory, or how folds are cut would depend on the number of threads.
-                let mut making = begin(plan, trainee, options.memory, Vec::new());
-                collector.replay(index, &mut making);
-                let constant = making.constant();
-                if !constant.is_empty() {
-                    // What the first one keeps is gone before the next keeps as much.
-                    drop(making);
-                    making = begin(plan, trainee, options.memory, constant);
-                    collector.replay(index, &mut making);
-                }
-                end(plan, collector, trainee, making, false, progress)
-            });
-            made.push((index, trained));
+            made.push((index, make(index)));
         }
     };
     let mut made = if threads == 1 {

@@ -113,6 +113,22 @@ impl Means {
         }
     }
 
+    /// Of each the sum of its values, and how many there are.
+    pub(crate) fn sums(&self) -> Vec<(f64, u64)> {
+        self.0
+            .iter()
+            .map(|(_, sum, count)| (*sum, *count))
+            .collect()
+    }
+
+    /// Takes values that were summed elsewhere.
+    pub(crate) fn add(&mut self, sums: &[(f64, u64)]) {
+        for ((_, sum, count), (more, of)) in self.0.iter_mut().zip(sums) {
+            *sum += more;
+            *count += of;
+        }
+    }
+
     pub(crate) fn levels(&self, plan: &Plan) -> Levels {
         let known = self.0.iter().filter(|(_, _, count)| *count > 0);
         let mean = |(slot, sum, count): &(usize, f64, u64)| {

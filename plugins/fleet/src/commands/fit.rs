@@ -16,6 +16,7 @@ use serde_json::json;
 use super::pooled::Pooled;
 use super::table::{self, remark};
 use super::{Files, PoolFailure, Workers, few, largest_first, model_of, warn_died, warn_failed};
+use crate::blocks::BlockOptions;
 use crate::figure::{Figure, standings};
 use crate::found::Machines;
 use crate::job::{Job, Reply, Setup, Task, graph_hash};
@@ -27,6 +28,9 @@ use crate::pool::{Event, run};
 /// Each machine is fitted by a worker, a process of its own: one that fails or dies takes no other with it. What was
 /// fitted before on the same rows, with the same graph and program, is not fitted again: a fit that was stopped goes on
 /// where it was. Machines that failed are tried again. The exit status is 1 where any failed.
+///
+/// With `--blocks day` each machine is fitted as `athermal fit --blocks day` does it, on the sums of each UTC day in place of rows. With
+/// `--keep-blocks FOLDER` these are kept, and the next fit of years reads them and the days that are new.
 ///
 /// The table shows of each machine the estimator with the largest error beside the fleet: on how many rows, its error on
 /// them, that over the median error of this estimator over all machines, and the geometric mean of these ratios over all
@@ -51,6 +55,8 @@ pub(crate) struct Fit {
     output: PathBuf,
     #[command(flatten)]
     workers: Workers,
+    #[command(flatten)]
+    blocks: BlockOptions,
     /// Megabytes of rows that each worker keeps; beyond, rows are streamed in a second pass
     #[arg(
         long,
@@ -69,7 +75,7 @@ pub(crate) struct Fit {
     /// graph whose solver is `{ type = "ridge", prior = "type.json" }` is fitted towards it. The table shows the error of a machine that was
     /// left out, after a short stretch of its own data: with the prior, of its mean alone, and without it. Machines are fitted one after
     /// the other, in this process.
-    #[arg(long, conflicts_with_all = ["date", "all"])]
+    #[arg(long, conflicts_with_all = ["date", "all", "blocks"])]
     pooled: bool,
     /// How long the data of a new machine are, for which the prior is made
     #[arg(
@@ -133,6 +139,7 @@ impl Fit {
             athermal: env!("CARGO_PKG_VERSION").to_owned(),
             graph_hash: hash.clone(),
             reading: self.files.reading.clone(),
+            blocks: self.blocks.blocks,
         };
         let (jobs, stamps, unchanged) = self.jobs(&machines, &writing.manifest, &maker);
         let mut tally = Tally {
@@ -143,6 +150,7 @@ impl Fit {
         let setup = Setup {
             graph: Some((self.graph.clone(), hash)),
             reading: self.files.reading.clone(),
+            blocks: self.blocks.clone(),
             memory: self.memory.saturating_mul(1 << 20),
             ..Setup::default()
         };

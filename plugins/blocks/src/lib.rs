@@ -1,0 +1,336 @@
+//! Blocks of a fit that are kept in a folder beside the data, a file for each UTC day: which of them files of data leave as they are,
+//! and which are made anew. Not how rows become blocks, nor a fit on them.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use athermal_core::compile::Plan;
+use athermal_files::{Dataset, Report};
+use athermal_run::fit::{Block, Blocks, FitError, rows_identity};
+use athermal_run::live::store::write_whole;
+use athermal_run::model::{DataCard, content_of};
+use athermal_run::recording::{Recording as _, Samples, SourceError};
+use serde::{Deserialize, Serialize};
+
+/// The form that this version writes.
+const FORMAT: u64 = 1;
+const INDEX: &str = "index.json";
+const DAY_NS: i64 = 86_400_000_000_000;
+
+/// What the blocks of a folder were made of.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Index {
+    athermal_blocks: u64,
+    /// The checksum of what makes examples of rows.
+    graph: String,
+    /// How the files were read.
+    reading: String,
+    files: Vec<File>,
+}
+
+/// A file whose rows are in the blocks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    path: String,
+    bytes: u64,
+    /// When it was last written, in ns since 1970. A file of the same length that was not written since is not read for its checksum.
+    modified_ns: u64,
+    hash: String,
+    rows: u64,
+    /// The first instant and the last, in ns since 1970; none without rows.
+    period: Option<(i64, i64)>,
+}
+
+impl File {
+    /// What a file is now, with its rows where it is a known one.
+    fn of(path: &Path, known: &[Self]) -> io::Result<Self> {
+        let of = fs::metadata(path)?;
+        let modified = of.modified()?.duration_since(UNIX_EPOCH);
+        let modified = modified.map_or(0, |since| since.as_nanos());
+        let modified_ns = u64::try_from(modified).unwrap_or(u64::MAX);
+        let path = path.display().to_string();
+        let is_same = |known: &&Self| {
+            known.path == path && known.bytes == of.len() && known.modified_ns == modified_ns
+        };
+        if let Some(known) = known.iter().find(is_same) {
+            return Ok(known.clone());
+        }
+        let (bytes, hash) = content_of(Path::new(&path))?;
+        let is_same = |known: &&Self| known.bytes == bytes && known.hash == hash;
+        let known = known.iter().find(is_same);
+        Ok(Self {
+            path,
+            bytes,
+            modified_ns,
+            hash,
+            rows: known.map_or(0, |known| known.rows),
+            period: known.and_then(|known| known.period),
+        })
+    }
+
+    fn is_content_of(&self, other: &Self) -> bool {
+        self.bytes == other.bytes && self.hash == other.hash
+    }
+
+    /// The days whose blocks depend on its rows: its own, and the one after, which knows the day before.
+    fn days(&self) -> impl Iterator<Item = i64> + use<> {
+        let days = self
+            .period
+            .map(|(from, to)| (from.div_euclid(DAY_NS), to.div_euclid(DAY_NS) + 1));
+        days.into_iter().flat_map(|(from, to)| from..=to)
+    }
+
+    fn take(&mut self, reports: &[(String, Report)]) {
+        if let Some((_, report)) = reports.iter().find(|(file, _)| *file == self.path) {
+            (self.rows, self.period) = (report.rows, report.period);
+        }
+    }
+}
+
+/// The blocks of a folder, as they are now.
+#[derive(Debug)]
+pub struct KeptBlocks {
+    folder: PathBuf,
+    days: Vec<String>,
+    /// The files that their rows are of.
+    pub cards: Vec<DataCard>,
+    /// How many of the blocks were made just now.
+    pub made: u64,
+}
+
+/// Why blocks could not be brought up to date.
+fn failed(path: &Path, what: impl std::fmt::Display) -> FitError {
+    FitError::Recording(format!("{}: {what}", path.display()).into())
+}
+
+/// The file of a day.
+fn name_of(day: i64) -> Option<String> {
+    let at = jiff::Timestamp::from_second(day.checked_mul(86_400)?).ok()?;
+    Some(at.strftime("%Y-%m-%d.json").to_string())
+}
+
+fn is_name(name: &str) -> bool {
+    let date = name.strip_suffix(".json");
+    date.is_some_and(|date| date.parse::<jiff::civil::Date>().is_ok())
+}
+
+/// The files of a folder that are named as blocks, in the order of their days.
+fn names_in(folder: &Path) -> io::Result<Vec<String>> {
+    let entries = fs::read_dir(folder)?.flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| is_name(name)).collect();
+    names.sort();
+    Ok(names)
+}
+
+/// Writes a file so that it is there whole or not at all.
+fn write(path: &Path, text: &str) -> Result<(), FitError> {
+    write_whole(path, text.as_bytes()).map_err(|error| failed(path, error))
+}
+
+/// The first and last instant of rows that are needed, in ns since 1970; all where there is none.
+pub type Within = Option<(i64, i64)>;
+
+/// Makes the blocks of the wanted days of some files, in order: [`blocks_of`](athermal_run::fit::blocks_of).
+pub type Make<'a> = &'a mut dyn FnMut(
+    &Dataset,
+    &dyn Fn(i64) -> bool,
+    &mut dyn FnMut(Block) -> Result<(), FitError>,
+) -> Result<(), FitError>;
+
+impl KeptBlocks {
+    /// Brings the blocks of a folder up to date with files of data. Where these, the graph as far as it makes examples of rows, and
+    /// `reading` (how files are read, in any words) are those of the last time, nothing but the folder is read. Days of files that are
+    /// new, changed or gone, and the days after them, are made anew by `make`, from the files that have rows of these days. `data` is a
+    /// data set of some of the files, of which no rows outside of a stretch of time are needed.
+    ///
+    /// # Errors
+    /// When files cannot be read or written, the folder holds something else, or `make` fails. What was made until then is kept.
+    pub fn refresh(
+        folder: &Path,
+        plan: &Plan,
+        files: &[PathBuf],
+        reading: &str,
+        data: &dyn Fn(Vec<PathBuf>, Within) -> Dataset,
+        make: Make<'_>,
+    ) -> Result<Self, FitError> {
+        fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
+        let identity = rows_identity(plan);
+        let reading = format!("{reading}, {:?}", plan.table);
+        let mut index = index_of(folder, &identity, &reading)?;
+        let files = files
+            .iter()
+            .map(|path| File::of(path, &index.files).map_err(|error| failed(path, error)));
+        let mut files: Vec<File> = files.collect::<Result<_, _>>()?;
+        let is_known = |file: &File| index.files.iter().any(|known| known.is_content_of(file));
+        let is_given = |known: &File| files.iter().any(|file| file.is_content_of(known));
+        let gone: Vec<File> = index
+            .files
+            .iter()
+            .filter(|of| !is_given(of))
+            .cloned()
+            .collect();
+        let new: Vec<PathBuf> = files
+            .iter()
+            .filter(|of| !is_known(of))
+            .map(|of| (&of.path).into())
+            .collect();
+        let mut made = 0;
+        if !gone.is_empty() || !new.is_empty() {
+            if !index.files.is_empty() && !new.is_empty() {
+                // Which days they have is known once they have been read.
+                let reports = reports_of(plan, &data(new.clone(), None))?;
+                files.iter_mut().for_each(|file| file.take(&reports));
+            }
+            let changed = files
+                .iter()
+                .filter(|file| new.contains(&PathBuf::from(&file.path)));
+            let stale: BTreeSet<i64> = changed.chain(&gone).flat_map(File::days).collect();
+            let is_first = index.files.is_empty();
+            // A call that ends here leaves nothing that is taken for up to date.
+            index
+                .files
+                .retain(|file| !file.days().any(|day| stale.contains(&day)));
+            index.write(folder)?;
+            for name in stale.iter().filter_map(|&day| name_of(day)) {
+                let path = folder.join(name);
+                if path.exists() {
+                    fs::remove_file(&path).map_err(|error| failed(&path, error))?;
+                }
+            }
+            // A block knows the day before.
+            let is_near = |file: &&File| {
+                is_first
+                    || file
+                        .days()
+                        .any(|day| stale.contains(&day) || stale.contains(&(day + 1)))
+            };
+            let near: Vec<PathBuf> = files
+                .iter()
+                .filter(is_near)
+                .map(|of| (&of.path).into())
+                .collect();
+            if !near.is_empty() {
+                let first = stale.first().map(|day| (day - 1) * DAY_NS);
+                let last = stale.last().map(|day| (day + 1) * DAY_NS);
+                let dataset = data(near, first.zip(last).filter(|_| !is_first));
+                let wanted = |day: i64| is_first || stale.contains(&day);
+                make(&dataset, &wanted, &mut |block| {
+                    let name = name_of(block.day);
+                    let name =
+                        name.ok_or_else(|| failed(folder, "a day is beyond all calendars"))?;
+                    let path = folder.join(name);
+                    let text = block.to_json().map_err(|error| failed(&path, error))?;
+                    made += 1;
+                    write(&path, &text)
+                })?;
+                if is_first {
+                    let reports = dataset.reports();
+                    files.iter_mut().for_each(|file| file.take(&reports));
+                }
+            }
+        }
+        index.files = files;
+        index.write(folder)?;
+        let cards = index.files.into_iter().map(|file| DataCard {
+            path: file.path,
+            rows: file.rows,
+            bytes: file.bytes,
+            hash: file.hash,
+        });
+        Ok(Self {
+            days: names_in(folder).map_err(|error| failed(folder, error))?,
+            folder: folder.to_owned(),
+            cards: cards.collect(),
+            made,
+        })
+    }
+}
+
+/// What the blocks of a folder were made of; where that was something else, the folder is emptied of blocks first.
+fn index_of(folder: &Path, identity: &str, reading: &str) -> Result<Index, FitError> {
+    let path = folder.join(INDEX);
+    let names = names_in(folder).map_err(|error| failed(folder, error))?;
+    let index = match fs::read_to_string(&path) {
+        Ok(text) => serde_json::from_str::<Index>(&text).map_err(|error| {
+            failed(
+                &path,
+                format_args!(
+                    "it is no index of blocks ({error}); name another folder, or delete this one"
+                ),
+            )
+        })?,
+        Err(error) if error.kind() == io::ErrorKind::NotFound && names.is_empty() => {
+            Index::default()
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(failed(
+                folder,
+                format_args!(
+                    "it holds {} and no {INDEX}; name a folder for blocks alone",
+                    names[0]
+                ),
+            ));
+        }
+        Err(error) => return Err(failed(&path, error)),
+    };
+    if (index.athermal_blocks, &*index.graph, &*index.reading) == (FORMAT, identity, reading) {
+        return Ok(index);
+    }
+    for name in names {
+        let path = folder.join(name);
+        fs::remove_file(&path).map_err(|error| failed(&path, error))?;
+    }
+    Ok(Index {
+        athermal_blocks: FORMAT,
+        graph: identity.to_owned(),
+        reading: reading.to_owned(),
+        files: Vec::new(),
+    })
+}
+
+impl Index {
+    fn write(&self, folder: &Path) -> Result<(), FitError> {
+        let path = folder.join(INDEX);
+        let text = serde_json::to_string_pretty(self).map_err(|error| failed(&path, error))?;
+        write(&path, &text)
+    }
+}
+
+/// Reads files to their end for what is in them.
+fn reports_of(plan: &Plan, dataset: &Dataset) -> Result<Vec<(String, Report)>, FitError> {
+    let (mut samples, mut source) = (Samples::default(), dataset.open(plan)?);
+    while source.next(&mut samples)?.is_some() {}
+    drop(source);
+    Ok(dataset.reports())
+}
+
+impl Blocks for KeptBlocks {
+    fn count(&self) -> usize {
+        self.days.len()
+    }
+
+    fn read(&self, nth: usize, take: &mut dyn FnMut(&Block)) -> Result<(), SourceError> {
+        let Some(name) = self.days.get(nth) else {
+            return Ok(());
+        };
+        let path = self.folder.join(name);
+        let wrong = |error: &dyn std::fmt::Display| {
+            let folder = self.folder.display();
+            format!(
+                "{}: {error}; delete {folder}, and its blocks are made anew",
+                path.display()
+            )
+        };
+        let text = fs::read_to_string(&path).map_err(|error| wrong(&error))?;
+        take(&Block::from_json(&text).map_err(|error| wrong(&error))?);
+        Ok(())
+    }
+}
