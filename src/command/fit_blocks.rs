@@ -7,7 +7,7 @@ use athermal::run::fit::{
     Block, FitError, FitOptions, FitProgress, blocks_of, check_blocks, fit_from_blocks,
 };
 use athermal::run::model::{Card, DataCard};
-use athermal_blocks::KeptBlocks;
+use athermal_blocks::{KeptBlocks, OtherFolder};
 use athermal_fleet::blocks::BlockOptions;
 
 use super::data::{self, Data};
@@ -96,7 +96,13 @@ fn refresh(
         &data.reading_words(),
         &|files, within| data.dataset_of(files, within),
         make,
-    )?;
+    )
+    .map_err(|error| match error {
+        FitError::Recording(error) if error.is::<OtherFolder>() => {
+            Failure::Request(format!("--keep-blocks {error}"))
+        }
+        other => other.into(),
+    })?;
     let cards = std::mem::take(&mut kept.cards);
     Ok((kept, cards))
 }

@@ -111,6 +111,81 @@ fn files_of_a_folder_are_one_recording_with_what_their_paths_say() {
     refused("no_key", "no_key");
 }
 
+/// Of blocks: the least that is fitted.
+const GRAPH: &str = r#"
+schema = 1
+name = "of-blocks"
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["plate1", "room"]
+column = "{channel}_degC"
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["Z1"]
+column = "{channel}_nm"
+max_age = "3min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+unit = "nm/min"
+[nodes.gradients]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["5min"]
+unit = "mK/min"
+[nodes.thermal]
+type = "linear"
+inputs.features = "gradients"
+inputs.truth = "drift.Z1"
+ahead = "5min"
+[outputs]
+predicted = "thermal"
+"#;
+
+#[test]
+fn blocks_of_parquet_are_those_of_csv_and_follow_what_paths_say() {
+    let scratch = Scratch::new("parquet-blocks");
+    let of = |name: &str| scratch.path(name);
+    let graph = scratch.file("graph.toml", GRAPH);
+    let fit = |graph, log: &std::path::Path, blocks: &str| {
+        let folder = of(blocks);
+        let words: [&dyn AsRef<std::ffi::OsStr>; 6] = [
+            &"--blocks",
+            &"day",
+            &"--keep-blocks",
+            &folder,
+            &"-o",
+            &of(&format!("{blocks}.json")),
+        ];
+        athermal_on("fit", graph, log, &words).ended(0);
+        let model = std::fs::read(of(&format!("{blocks}.json"))).unwrap();
+        let model: serde_json::Value = serde_json::from_slice(&model).unwrap();
+        let kept = ["1970-01-01", "1970-01-02"]
+            .map(|day| std::fs::read_to_string(folder.join(format!("{day}.json"))).unwrap());
+        (kept, model["fitted"].clone())
+    };
+    std::fs::create_dir_all(of("logs/line=4")).unwrap();
+    let (csv, parquet) = (of("log.csv"), of("logs/line=4/log.parquet"));
+    for log in [&csv, &parquet] {
+        athermal(&[&"simulate", &"die-tester", &"--days", &"1.2", &"-o", log]).ended(0);
+    }
+    let of_csv = fit(&graph, &csv, "csv");
+    assert!(of_csv.1["thermal"].is_object());
+    assert!(fit(&graph, &parquet, "parquet") == of_csv);
+    // A graph that measures what the folder says, and the same file in another folder.
+    let signal = "[signals.of_folder]\nunit = \"1\"\nchannels = [\"line\"]\nmax_age = \"1min\"\n";
+    let keyed = scratch.file("keyed.toml", format!("{GRAPH}{signal}"));
+    let (four, _) = fit(&keyed, &of("logs"), "keyed");
+    std::fs::rename(of("logs/line=4"), of("logs/line=5")).unwrap();
+    let (five, _) = fit(&keyed, &of("logs"), "keyed");
+    assert!(five != four);
+    assert!(five == fit(&keyed, &of("logs"), "anew").0);
+}
+
 #[test]
 fn a_run_that_keeps_a_state_writes_no_parquet() {
     let scratch = Scratch::new("parquet-state");

@@ -3,7 +3,8 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -43,6 +44,9 @@ struct File {
     /// When it was last written, in ns since 1970. A file of the same length that was not written since is not read for its checksum.
     modified_ns: u64,
     hash: String,
+    /// What is read into it beside its content: `key=value` in its path, which of the patterns of `[[table.files]]` matches its name, and
+    /// what is added to its times, in ns.
+    place: String,
     rows: u64,
     /// The first instant and the last, in ns since 1970; none without rows.
     period: Option<(i64, i64)>,
@@ -50,33 +54,36 @@ struct File {
 
 impl File {
     /// What a file is now, with its rows where it is a known one.
-    fn of(path: &Path, known: &[Self]) -> io::Result<Self> {
+    fn of(path: &Path, place: String, known: &[Self]) -> io::Result<Self> {
         let of = fs::metadata(path)?;
         let modified = of.modified()?.duration_since(UNIX_EPOCH);
         let modified = modified.map_or(0, |since| since.as_nanos());
         let modified_ns = u64::try_from(modified).unwrap_or(u64::MAX);
-        let path = path.display().to_string();
+        let name = path.display().to_string();
         let is_same = |known: &&Self| {
-            known.path == path && known.bytes == of.len() && known.modified_ns == modified_ns
+            let written = (known.bytes, known.modified_ns);
+            known.path == name && written == (of.len(), modified_ns) && known.place == place
         };
         if let Some(known) = known.iter().find(is_same) {
             return Ok(known.clone());
         }
-        let (bytes, hash) = content_of(Path::new(&path))?;
-        let is_same = |known: &&Self| known.bytes == bytes && known.hash == hash;
-        let known = known.iter().find(is_same);
+        let (bytes, hash) = content_of(path)?;
+        let own = (bytes, &*hash, &*place);
+        let known = known.iter().find(|known| known.content() == own);
         Ok(Self {
-            path,
+            rows: known.map_or(0, |known| known.rows),
+            period: known.and_then(|known| known.period),
+            path: name,
             bytes,
             modified_ns,
             hash,
-            rows: known.map_or(0, |known| known.rows),
-            period: known.and_then(|known| known.period),
+            place,
         })
     }
 
-    fn is_content_of(&self, other: &Self) -> bool {
-        self.bytes == other.bytes && self.hash == other.hash
+    /// What its rows depend on, wherever it is and whenever it was written.
+    fn content(&self) -> (u64, &str, &str) {
+        (self.bytes, &self.hash, &self.place)
     }
 
     /// The days whose blocks depend on its rows: its own, and the one after, which knows the day before.
@@ -94,6 +101,26 @@ impl File {
     }
 }
 
+/// What the rows of a file depend on beside its content.
+fn place_of(path: &Path, plan: &Plan, added_ns: i64) -> String {
+    let folders = path.parent().into_iter().flat_map(Path::components);
+    let folders = folders.filter_map(|of| of.as_os_str().to_str());
+    let keys: Vec<&str> = folders.filter(|of| of.contains('=')).collect();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut patterns = plan.table.files.iter();
+    let pattern = patterns.position(|(pattern, _)| pattern.matches(&name));
+    format!("{} {pattern:?} {added_ns}", keys.join("/"))
+}
+
+/// How many files have each content.
+fn counts(files: &[File]) -> BTreeMap<(u64, &str, &str), usize> {
+    let mut counts = BTreeMap::new();
+    for file in files {
+        *counts.entry(file.content()).or_default() += 1;
+    }
+    counts
+}
+
 /// The blocks of a folder, as they are now.
 #[derive(Debug)]
 pub struct KeptBlocks {
@@ -104,6 +131,27 @@ pub struct KeptBlocks {
     /// How many of the blocks were made just now.
     pub made: u64,
 }
+
+/// A folder for blocks that holds something else: it is left as it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OtherFolder {
+    /// The folder.
+    pub folder: PathBuf,
+    /// A file in it that would be taken for a block.
+    pub found: String,
+}
+
+impl fmt::Display for OtherFolder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (folder, found) = (self.folder.display(), &self.found);
+        write!(
+            f,
+            "{folder}: it holds {found} and no {INDEX}; name a folder for blocks alone"
+        )
+    }
+}
+
+impl std::error::Error for OtherFolder {}
 
 /// Why blocks could not be brought up to date.
 fn failed(path: &Path, what: impl std::fmt::Display) -> FitError {
@@ -146,13 +194,13 @@ pub type Make<'a> = &'a mut dyn FnMut(
 ) -> Result<(), FitError>;
 
 impl KeptBlocks {
-    /// Brings the blocks of a folder up to date with files of data. Where these, the graph as far as it makes examples of rows, and
-    /// `reading` (how files are read, in any words) are those of the last time, nothing but the folder is read. Days of files that are
+    /// Brings the blocks of a folder up to date with files of data. Where these, the version of this crate, the graph as far as it makes
+    /// examples of rows, and `reading` (how files are read, in any words) are those of the last time, nothing but the folder is read. Days of files that are
     /// new, changed or gone, and the days after them, are made anew by `make`, from the files that have rows of these days. `data` is a
     /// data set of some of the files, of which no rows outside of a stretch of time are needed.
     ///
     /// # Errors
-    /// When files cannot be read or written, the folder holds something else, or `make` fails. What was made until then is kept.
+    /// When files cannot be read or written, the folder holds something else ([`OtherFolder`]), or `make` fails. What was made until then is kept.
     pub fn refresh(
         folder: &Path,
         plan: &Plan,
@@ -163,60 +211,56 @@ impl KeptBlocks {
     ) -> Result<Self, FitError> {
         fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
         let identity = rows_identity(plan);
-        let reading = format!("{reading}, {:?}", plan.table);
+        let version = env!("CARGO_PKG_VERSION");
+        let reading = format!("athermal {version}, {reading}, {:?}", plan.table);
         let mut index = index_of(folder, &identity, &reading)?;
-        let files = files
+        let whole = data(files.to_vec(), None);
+        let now = files.iter().map(|path| {
+            let place = place_of(path, plan, whole.added_to(path));
+            File::of(path, place, &index.files).map_err(|error| failed(path, error))
+        });
+        let mut now: Vec<File> = now.collect::<Result<_, _>>()?;
+        let (known, given) = (counts(&index.files), counts(&now));
+        let is_other = |file: &&File| known.get(&file.content()) != given.get(&file.content());
+        let gone: Vec<File> = index.files.iter().filter(is_other).cloned().collect();
+        let new: BTreeSet<String> = now
             .iter()
-            .map(|path| File::of(path, &index.files).map_err(|error| failed(path, error)));
-        let mut files: Vec<File> = files.collect::<Result<_, _>>()?;
-        let is_known = |file: &File| index.files.iter().any(|known| known.is_content_of(file));
-        let is_given = |known: &File| files.iter().any(|file| file.is_content_of(known));
-        let gone: Vec<File> = index
-            .files
-            .iter()
-            .filter(|of| !is_given(of))
-            .cloned()
-            .collect();
-        let new: Vec<PathBuf> = files
-            .iter()
-            .filter(|of| !is_known(of))
-            .map(|of| (&of.path).into())
+            .filter(is_other)
+            .map(|of| of.path.clone())
             .collect();
         let mut made = 0;
         if !gone.is_empty() || !new.is_empty() {
-            if !index.files.is_empty() && !new.is_empty() {
-                // Which days they have is known once they have been read.
-                let reports = reports_of(plan, &data(new.clone(), None))?;
-                files.iter_mut().for_each(|file| file.take(&reports));
-            }
-            let changed = files
-                .iter()
-                .filter(|file| new.contains(&PathBuf::from(&file.path)));
-            let stale: BTreeSet<i64> = changed.chain(&gone).flat_map(File::days).collect();
             let is_first = index.files.is_empty();
+            if !is_first && !new.is_empty() {
+                // Which days they have is known once they have been read; one log of several that are merged is not read alone.
+                let alone = data(new.iter().map(PathBuf::from).collect(), None);
+                let reports = reports_of(plan, &alone).or_else(|_| reports_of(plan, &whole))?;
+                let changed = now.iter_mut().filter(|file| new.contains(&file.path));
+                changed.for_each(|file| file.take(&reports));
+            }
+            let changed = now.iter().filter(|file| new.contains(&file.path));
+            let stale: BTreeSet<i64> = changed.chain(&gone).flat_map(File::days).collect();
             // A call that ends here leaves nothing that is taken for up to date.
             index
                 .files
                 .retain(|file| !file.days().any(|day| stale.contains(&day)));
             index.write(folder)?;
-            for name in stale.iter().filter_map(|&day| name_of(day)) {
-                let path = folder.join(name);
+            let names = match is_first {
+                true => names_in(folder).map_err(|error| failed(folder, error))?,
+                false => stale.iter().filter_map(|&day| name_of(day)).collect(),
+            };
+            for path in names.iter().map(|name| folder.join(name)) {
                 if path.exists() {
                     fs::remove_file(&path).map_err(|error| failed(&path, error))?;
                 }
             }
             // A block knows the day before.
-            let is_near = |file: &&File| {
-                is_first
-                    || file
-                        .days()
-                        .any(|day| stale.contains(&day) || stale.contains(&(day + 1)))
-            };
-            let near: Vec<PathBuf> = files
+            let is_stale = |day: i64| stale.contains(&day) || stale.contains(&(day + 1));
+            let near = now
                 .iter()
-                .filter(is_near)
-                .map(|of| (&of.path).into())
-                .collect();
+                .filter(|of| is_first || of.days().any(is_stale))
+                .map(|of| PathBuf::from(&of.path));
+            let near: Vec<PathBuf> = near.collect();
             if !near.is_empty() {
                 let first = stale.first().map(|day| (day - 1) * DAY_NS);
                 let last = stale.last().map(|day| (day + 1) * DAY_NS);
@@ -233,11 +277,11 @@ impl KeptBlocks {
                 })?;
                 if is_first {
                     let reports = dataset.reports();
-                    files.iter_mut().for_each(|file| file.take(&reports));
+                    now.iter_mut().for_each(|file| file.take(&reports));
                 }
             }
         }
-        index.files = files;
+        index.files = now;
         index.write(folder)?;
         let cards = index.files.into_iter().map(|file| DataCard {
             path: file.path,
@@ -271,13 +315,8 @@ fn index_of(folder: &Path, identity: &str, reading: &str) -> Result<Index, FitEr
             Index::default()
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(failed(
-                folder,
-                format_args!(
-                    "it holds {} and no {INDEX}; name a folder for blocks alone",
-                    names[0]
-                ),
-            ));
+            let (folder, found) = (folder.to_owned(), names[0].clone());
+            return Err(FitError::Recording(OtherFolder { folder, found }.into()));
         }
         Err(error) => return Err(failed(&path, error)),
     };

@@ -13,7 +13,8 @@ use athermal_estimators as _;
 use athermal_features as _;
 use athermal_files::{Dataset, Options};
 use athermal_run::fit::{
-    Block, FitOptions, FitReport, blocks_of, check_blocks, fit, fit_from_blocks, rows_identity,
+    Block, FitError, FitOptions, FitReport, blocks_of, check_blocks, fit, fit_from_blocks,
+    rows_identity,
 };
 use athermal_run::model::Model;
 use athermal_run::recording::Table;
@@ -308,24 +309,33 @@ fn blocks_come_back_from_json_to_the_bit_and_each_knows_two_days_alone() {
 
 /// Keeps blocks of files, and gives the fit on them with how many were made.
 fn kept(folder: &Path, model: &Model, files: &[PathBuf]) -> (BTreeMap<String, Value>, u64) {
-    let read = Cell::new(0);
-    let open = |files: Vec<PathBuf>, _| {
-        read.set(read.get() + files.len());
-        data(&files)
-    };
+    kept_with(folder, model, files, &Options::default())
+}
+
+fn kept_with(
+    folder: &Path,
+    model: &Model,
+    files: &[PathBuf],
+    options: &Options,
+) -> (BTreeMap<String, Value>, u64) {
+    let open = |files: Vec<PathBuf>, _| Dataset::new(files, options.clone());
+    let is_read = Cell::new(false);
     let blocks = KeptBlocks::refresh(
         folder,
         &model.plan,
         files,
         "",
         &open,
-        &mut |data, wanted, take| blocks_of(&model.plan, data, wanted, &mut |_| {}, take),
+        &mut |data, wanted, take| {
+            is_read.set(true);
+            blocks_of(&model.plan, data, wanted, &mut |_| {}, take)
+        },
     );
     let blocks = blocks.unwrap();
     assert_eq!(blocks.cards.len(), files.len());
     assert!(blocks.cards.iter().all(|card| card.rows > 0));
     assert!(
-        blocks.made > 0 || read.get() == 0,
+        blocks.made > 0 || !is_read.get(),
         "nothing is read where nothing changes"
     );
     let fitted = fit_from_blocks(&model.plan, &blocks, &FitOptions::default(), &mut |_| {});
@@ -387,6 +397,121 @@ fn days_that_come_change_or_go_are_made_anew_and_others_stay() {
         "{words}"
     );
     assert!(own.exists());
+}
+
+#[test]
+fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
+    let folder = Folder::of("place");
+    let model = folder.model(GRAPH);
+    let days = days(4);
+    let name = |nth: usize| format!("day{nth}.csv");
+    let mut files: Vec<PathBuf> = (0..4)
+        .map(|nth| folder.file(&name(nth), text(&days[nth..=nth])))
+        .collect();
+    let blocks = folder.0.join("blocks");
+    // The clock of the last one is behind by an hour, so that it ends in a fifth day.
+    let hour = 3_600_000_000_000;
+    let options = Options {
+        offsets: vec![(files[3].clone(), hour)],
+        ..Options::default()
+    };
+    let fresh = |files: &[PathBuf], options: &Options| {
+        let mut blocks = Vec::new();
+        let mut take = |block| {
+            blocks.push(block);
+            Ok(())
+        };
+        let data = Dataset::new(files.to_vec(), options.clone());
+        blocks_of(&model.plan, &data, &|_| true, &mut |_| {}, &mut take).unwrap();
+        let options = FitOptions::default();
+        text_of(
+            &fit_from_blocks(&model.plan, &blocks[..], &options, &mut |_| {})
+                .unwrap()
+                .0,
+        )
+    };
+    let (shifted, made) = kept_with(&blocks, &model, &files, &options);
+    assert_eq!((&shifted, made), (&fresh(&files, &options), 5));
+    assert_eq!(kept_with(&blocks, &model, &files, &options).1, 0);
+    // Under another name nothing is added to its times.
+    let other = folder.0.join("other.csv");
+    std::fs::rename(&files[3], &other).unwrap();
+    files[3] = other;
+    let (fitted, made) = kept_with(&blocks, &model, &files, &options);
+    assert_eq!((&fitted, made), (&fresh(&files, &options), 1));
+    assert!(fitted != shifted);
+    // A file that is given twice is not there once: its times start again.
+    let half = days[3].lines().take(1440).map(|row| format!("{row}\n"));
+    let half = [half.collect::<String>()];
+    let twice = [
+        files[0].clone(),
+        folder.file("half.csv", text(&half)),
+        folder.file("again.csv", text(&half)),
+    ];
+    assert_eq!(kept(&blocks, &model, &twice[..2]).1, 1);
+    let (fitted, made) = kept(&blocks, &model, &twice);
+    assert_eq!((fitted, made), (fresh(&twice, &Options::default()), 1));
+    // What a first call made before it ended is not taken for blocks of other files.
+    std::fs::remove_dir_all(&blocks).unwrap();
+    let ends = KeptBlocks::refresh(
+        &blocks,
+        &model.plan,
+        &files,
+        "",
+        &|files, _| data(&files),
+        &mut |data, wanted, take| {
+            let mut rest = 2;
+            let mut some = |block| {
+                rest -= 1;
+                take(block)?;
+                if rest == 0 {
+                    return Err(FitError::Recording("no room is left".into()));
+                }
+                Ok(())
+            };
+            blocks_of(&model.plan, data, wanted, &mut |_| {}, &mut some)
+        },
+    );
+    assert!(ends.is_err() && blocks.join("1970-01-02.json").exists());
+    let (fitted, made) = kept(&blocks, &model, &files[2..]);
+    assert_eq!((fitted, made), (fresh(&files[2..], &Options::default()), 2));
+}
+
+#[test]
+fn one_of_two_logs_that_are_merged_may_change_alone() {
+    let folder = Folder::of("merged");
+    let model = folder.model(GRAPH);
+    let part = |name: &str, rows: &[String], columns: &[usize]| {
+        let text = text(rows);
+        let rows = text.lines().map(|row| {
+            let cells: Vec<&str> = row.split(',').collect();
+            let cells: Vec<&str> = columns.iter().map(|&nth| cells[nth]).collect();
+            cells.join(",") + "\n"
+        });
+        folder.file(name, rows.collect::<String>())
+    };
+    let days = days(4);
+    let (temperatures, position) = ([0, 1, 2, 3], [0, 4]);
+    let mut files: Vec<PathBuf> = Vec::new();
+    for (nth, day) in days.chunks(1).enumerate() {
+        files.push(part(&format!("t{nth}.csv"), day, &temperatures));
+        files.push(part(&format!("z{nth}.csv"), day, &position));
+    }
+    let options = Options {
+        merge: true,
+        ..Options::default()
+    };
+    let blocks = folder.0.join("blocks");
+    let of_all = |files: &[PathBuf]| kept_with(&folder.0.join("fresh"), &model, files, &options).0;
+    assert_eq!(kept_with(&blocks, &model, &files, &options).1, 4);
+    // The position of the second day ends at noon.
+    let short = days[1].lines().take(1440).map(|row| format!("{row}\n"));
+    part("z1.csv", &[short.collect::<String>()], &position);
+    let (fitted, made) = kept_with(&blocks, &model, &files, &options);
+    assert_eq!(made, 2);
+    assert_eq!(fitted, of_all(&files));
+    let (fitted, made) = kept_with(&blocks, &model, &files[2..], &options);
+    assert_eq!((fitted, made), (of_all(&files[2..]), 1));
 }
 
 #[test]
