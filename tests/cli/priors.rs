@@ -157,9 +157,9 @@ fn what_is_wrong_with_a_prior_is_reported_at_its_place() {
             "knows none of the node's regressors: it has `slopes.plate1@150s`",
         ),
         (
-            "nodes.expansion.ahead = \"5min\"",
+            "nodes.expansion.ahead = \"0s\"",
             Some(prior.clone()),
-            "predicts 0s ahead, and the node 5min",
+            "predicts 5min ahead, and the node 0s",
         ),
         (
             "",

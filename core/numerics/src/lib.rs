@@ -40,6 +40,7 @@ mod gram;
 mod huber;
 mod kalman;
 mod least_squares;
+mod likeness;
 mod non_negative;
 mod normal_equations;
 mod novelty;

@@ -1,11 +1,16 @@
 //! What machines of one type have in common. Decides the mean and covariance of their coefficients, and how much those count beside
 //! a new machine's own rows; does not decide which machines are of a type.
 
-use crate::prior::{CoefficientPrior, Known, Pull, Towards};
+use crate::likeness::{Distribution, Normal};
+use crate::prior::CoefficientPrior;
 use crate::{Gram, LeastSquares, NumericsError, Standardization};
+use faer::Mat;
 
 /// So many machines say how machines differ.
 pub const FEWEST_MACHINES: usize = 4;
+
+/// How much of the share of Ledoit and Wolf the covariance is shrunk by in each round, as is tried.
+const SHARES: [f64; 3] = [0.0, 0.1, 1.0];
 
 /// The rows of one machine.
 #[derive(Debug, Clone)]
@@ -36,15 +41,20 @@ pub struct Pooled {
 
 /// Pools machines whose rows have the same columns.
 ///
-/// Each machine's coefficients `θ` are those of ridge with the penalty `alpha` on columns in the scale `s` of all machines. Of
-/// `z = (a, s b)`, with `M` machines, the mean is the arithmetic one and the covariance the sample's, shrunk towards a multiple of the
-/// unit matrix by the share of Ledoit and Wolf (2004), lemma 3.2 and equations 14 to 17:
-/// `Σ = ρ m I + (1 − ρ) S` with `m = tr S / p`, `d² = ‖S − mI‖²`, `ρ = min(d², Σ ‖z zᵀ − S‖² / M²) / d²`. The penalty towards the prior
-/// is the one of `variances`, in variances of the residuals of the machines' own fits, whose fits to single stretches of a machine that is left out have the smallest error on its other rows.
+/// Columns are in the scale `s` of all machines: of `z = (a, s b)` with `M` machines mean and covariance are found in two steps.
+///
+/// 1. Each machine's coefficients are those of ridge with the penalty `alpha`. The mean is the arithmetic one and the covariance the
+///    sample's, shrunk towards a multiple of the unit matrix by the share of Ledoit and Wolf (2004), lemma 3.2 and equations 14 to 17:
+///    `Σ = ρ m I + (1 − ρ) S` with `m = tr S / p`, `d² = ‖S − mI‖²`, `ρ = min(d², Σ ‖z zᵀ − S‖² / M²) / d²`.
+/// 2. The sample's covariance has the doubt of each machine's own fit in it. Rounds of expectation and maximisation from there leave
+///    what the rows say differs, shrunk in each round by `ρ`, a tenth of it, or nothing.
+///
+/// That share and the penalty towards the prior, one of `variances`, in variances of the residuals of the machines' own fits, are those
+/// whose fits to single stretches of a machine that is left out have the smallest error on its other rows.
 ///
 /// # Errors
-/// [`NumericsError::TooFewRows`] for fewer than [`FEWEST_MACHINES`] machines, [`NumericsError::Width`], and those of [`LeastSquares::solve`]
-/// and [`CoefficientPrior::fit`].
+/// [`NumericsError::TooFewRows`] for fewer than [`FEWEST_MACHINES`] machines, [`NumericsError::Width`],
+/// [`NumericsError::NoConvergence`], and those of [`LeastSquares::solve`].
 pub fn pool(
     machines: &[MachineRows],
     alpha: f64,
@@ -57,88 +67,84 @@ pub fn pool(
         });
     }
     let scale = CommonScale::of(machines)?;
-    let columns: Vec<usize> = (0..scale.centre.len()).collect();
-    let squares = LeastSquares::ridge(alpha);
-    let mut noise = 0.0;
-    let estimates = machines.iter().map(|machine| {
-        let fit = squares.solve(&machine.total, &columns, &scale.scales, None)?;
-        noise += fit.residual_sum_of_squares / machine.total.weight() / machines.len() as f64;
-        let terms = fit.coefficients.iter().zip(&scale.centre);
-        let constant = terms.fold(fit.intercept, |sum, (b, c)| sum + b * c);
-        let scaled = fit.coefficients.iter().zip(&scale.scales);
-        Ok([constant]
-            .into_iter()
-            .chain(scaled.map(|(b, s)| b * s))
-            .collect())
-    });
-    let estimates: Vec<Vec<f64>> = estimates.collect::<Result<_, NumericsError>>()?;
-    // Rows without any error have to be pulled by something.
-    let noise = noise.max(f64::MIN_POSITIVE.sqrt());
+    let known = machines
+        .iter()
+        .map(|machine| scale.machine(machine, alpha))
+        .collect::<Result<Vec<Machine>, NumericsError>>()?;
+    let noise = known.iter().map(|of| of.noise).sum::<f64>() / known.len() as f64;
     let penalties: Vec<f64> = variances.iter().map(|variance| variance * noise).collect();
-    let mut logs = vec![0.0; penalties.len()];
-    let (mut of_mean, mut tests) = (0.0, 0.0);
-    for (nth, machine) in machines.iter().enumerate() {
-        let others = estimates.iter().enumerate();
-        let others: Vec<&[f64]> = others
+    let mut tried = SHARES.map(|_| (vec![0.0; penalties.len()], 0.0));
+    let mut tests = 0.0;
+    for (nth, (machine, own)) in machines.iter().zip(&known).enumerate() {
+        let others: Vec<&Machine> = known
+            .iter()
+            .enumerate()
             .filter(|(other, _)| *other != nth)
-            .map(|(_, of)| of.as_slice())
+            .map(|(_, of)| of)
             .collect();
-        let (prior, _) = scale.prior(&others);
-        for stretch in &machine.stretches {
-            let rest = machine.total.weight() - stretch.weight();
-            if stretch.count() == 0 || rest <= 0.0 {
-                continue;
-            }
-            let error = |of_fit: &dyn Fn(&Gram) -> Result<f64, NumericsError>| {
-                let left = of_fit(&machine.total)? - of_fit(stretch)?;
-                Ok::<f64, NumericsError>(0.5 * (left.max(f64::MIN_POSITIVE) / rest).ln())
-            };
-            let known: Vec<Known> = columns
-                .iter()
-                .map(|&column| (column, Some(column)))
-                .collect();
-            let errors_of = |theta: &[f64], gram: &Gram| {
-                let pull = Pull {
-                    penalty: 1.0,
-                    alpha,
+        let stretches = machine.stretches.iter().filter(|stretch| {
+            stretch.count() > 0 && machine.total.weight() - stretch.weight() > 0.0
+        });
+        let stretches: Vec<(Normal, f64)> = stretches
+            .map(|stretch| {
+                let rest = machine.total.weight() - stretch.weight();
+                (scale.normal(stretch), rest)
+            })
+            .collect();
+        tests += stretches.len() as f64;
+        for (share, (logs, of_mean)) in SHARES.iter().zip(&mut tried) {
+            let (prior, _) = distribution(&others, *share)?;
+            for (stretch, rest) in &stretches {
+                let error = |theta: &[f64]| {
+                    let left = own.rows.errors(theta) - stretch.errors(theta);
+                    0.5 * (left.max(f64::MIN_POSITIVE) / rest).ln()
                 };
-                Ok(Towards::new(&prior, gram, &known, &scale.scales, pull)?.errors(theta))
-            };
-            let mean: Vec<f64> = [0.0].iter().chain(&prior.mean[1..]).copied().collect();
-            of_mean += error(&|gram| errors_of(&mean, gram))?;
-            tests += 1.0;
-            for (&penalty, log) in penalties.iter().zip(&mut logs) {
-                let pull = Pull { penalty, alpha };
-                let fit = prior.fit(stretch, &known, &scale.scales, pull)?;
-                let terms = fit.coefficients.iter().zip(&scale.centre);
-                let constant = terms.fold(fit.intercept, |sum, (b, c)| sum + b * c);
-                let theta: Vec<f64> = [constant - prior.mean[0]]
-                    .iter()
-                    .chain(&fit.coefficients)
-                    .copied()
-                    .collect();
-                *log += error(&|gram| errors_of(&theta, gram))?;
+                *of_mean += error(&prior.mean);
+                for (&penalty, log) in penalties.iter().zip(&mut *logs) {
+                    let fit = prior.fit(stretch, penalty);
+                    *log += error(&fit.ok_or(NumericsError::NoConvergence)?);
+                }
             }
         }
     }
-    let better = |a: usize, b: usize| if logs[b] < logs[a] { b } else { a };
-    let place = (0..penalties.len()).reduce(better);
-    let (Some(place), true) = (place, tests > 0.0) else {
+    let places = (0..SHARES.len()).flat_map(|s| (0..penalties.len()).map(move |p| (s, p)));
+    let log = |(share, place): (usize, usize)| tried[share].0[place];
+    let better = |a, b| if log(b) < log(a) { b } else { a };
+    let (Some((share, place)), true) = (places.reduce(better), tests > 0.0) else {
         return Err(NumericsError::TooFewRows {
             needed: 1,
             found: 0,
         });
     };
-    let all: Vec<&[f64]> = estimates.iter().map(Vec::as_slice).collect();
-    let (prior, shrinkage) = scale.prior(&all);
+    let all: Vec<&Machine> = known.iter().collect();
+    let (prior, shrinkage) = distribution(&all, SHARES[share])?;
+    let (logs, of_mean) = &tried[share];
     Ok(Pooled {
-        prior,
+        prior: scale.prior(&prior),
         shrinkage,
         penalty: penalties[place],
         place,
         errors: logs.iter().map(|log| (log / tests).exp()).collect(),
         error_of_mean: (of_mean / tests).exp(),
     })
+}
+
+/// What is known of one machine, in the common scale.
+struct Machine {
+    rows: Normal,
+    /// The coefficients of its own fit.
+    own: Vec<f64>,
+    /// The variance of what that leaves.
+    noise: f64,
+}
+
+/// The distribution of machines' coefficients, and how much of its covariance is the same for all coefficients.
+fn distribution(machines: &[&Machine], share: f64) -> Result<(Distribution, f64), NumericsError> {
+    let estimates: Vec<&[f64]> = machines.iter().map(|of| of.own.as_slice()).collect();
+    let (start, shrinkage) = shrunk(&estimates).ok_or(NumericsError::NoConvergence)?;
+    let rows: Vec<(&Normal, f64)> = machines.iter().map(|of| (&of.rows, of.noise)).collect();
+    let shrinkage = share * shrinkage;
+    Ok((start.of_rows(&rows, shrinkage), shrinkage))
 }
 
 /// Where columns are counted from and in what, for all machines alike.
@@ -174,53 +180,87 @@ impl CommonScale {
         })
     }
 
-    /// Mean and shrunk covariance of machines' scaled coefficients, in the units of the columns, and the share of what was shrunk.
-    fn prior(&self, estimates: &[&[f64]]) -> (CoefficientPrior, f64) {
-        let (order, machines) = (estimates[0].len(), estimates.len() as f64);
-        let mean: Vec<f64> = (0..order)
-            .map(|k| estimates.iter().map(|of| of[k]).sum::<f64>() / machines)
-            .collect();
-        let apart: Vec<Vec<f64>> = estimates
-            .iter()
-            .map(|of| of.iter().zip(&mean).map(|(z, m)| z - m).collect())
-            .collect();
-        let sample =
-            |i: usize, j: usize| apart.iter().map(|of| of[i] * of[j]).sum::<f64>() / machines;
-        let cells = || (0..order).flat_map(|i| (0..=i).map(move |j| (i, j)));
-        let covariance: Vec<f64> = cells().map(|(i, j)| sample(i, j)).collect();
-        let level = (0..order).map(|i| sample(i, i)).sum::<f64>() / order as f64;
-        // Squared Frobenius norms: each cell beside the diagonal stands twice.
-        let norm = |cell: &dyn Fn(usize, usize, f64) -> f64| {
-            let terms = cells().zip(&covariance).map(|((i, j), s)| {
-                let twice = if i == j { 1.0 } else { 2.0 };
-                twice * cell(i, j, *s).powi(2)
-            });
-            terms.sum::<f64>()
-        };
-        let distance = norm(&|i, j, s| if i == j { s - level } else { s });
-        let errors = apart.iter().map(|of| norm(&|i, j, s| of[i] * of[j] - s));
-        let error = (errors.sum::<f64>() / (machines * machines)).min(distance);
-        let shrinkage = if distance > 0.0 {
-            error / distance
-        } else {
-            1.0
-        };
-        // Of a sample about its own mean.
-        let unbiased = machines / (machines - 1.0);
-        // Machines that are all the same leave something to divide by.
-        let level = level.max(f64::MIN_POSITIVE.sqrt());
-        let unit = |k: usize| if k == 0 { 1.0 } else { self.scales[k - 1] };
-        let shrunk = cells().zip(&covariance).map(|((i, j), s)| {
-            let target = if i == j { level } else { 0.0 };
-            unbiased * (shrinkage * target + (1.0 - shrinkage) * s) / (unit(i) * unit(j))
-        });
-        let prior = CoefficientPrior {
-            centre: self.centre.clone(),
-            covariance: shrunk.collect(),
-            mean: mean.iter().enumerate().map(|(k, z)| z / unit(k)).collect(),
-        };
-        (prior, shrinkage)
+    fn normal(&self, gram: &Gram) -> Normal {
+        Normal::of(gram, &self.centre, &self.scales)
     }
+
+    fn machine(&self, machine: &MachineRows, alpha: f64) -> Result<Machine, NumericsError> {
+        let columns: Vec<usize> = (0..self.centre.len()).collect();
+        let total = &machine.total;
+        let fit = LeastSquares::ridge(alpha).solve(total, &columns, &self.scales, None)?;
+        let terms = fit.coefficients.iter().zip(&self.centre);
+        let constant = terms.fold(fit.intercept, |sum, (b, c)| sum + b * c);
+        let scaled = fit.coefficients.iter().zip(&self.scales);
+        // Rows without any error have to be pulled by something.
+        let least = 1e-12 * total.variances().last().copied().unwrap_or(0.0);
+        let noise = fit.residual_sum_of_squares / total.weight();
+        Ok(Machine {
+            rows: self.normal(total),
+            own: [constant]
+                .into_iter()
+                .chain(scaled.map(|(b, s)| b * s))
+                .collect(),
+            noise: noise.max(least).max(f64::MIN_POSITIVE.sqrt()),
+        })
+    }
+
+    /// The same in the units of the columns.
+    fn prior(&self, of: &Distribution) -> CoefficientPrior {
+        let unit = |k: usize| if k == 0 { 1.0 } else { self.scales[k - 1] };
+        let cells = (0..of.mean.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        CoefficientPrior {
+            centre: self.centre.clone(),
+            covariance: cells
+                .map(|(i, j)| of.covariance[(i, j)] / (unit(i) * unit(j)))
+                .collect(),
+            mean: of
+                .mean
+                .iter()
+                .enumerate()
+                .map(|(k, z)| z / unit(k))
+                .collect(),
+        }
+    }
+}
+
+/// Mean and shrunk covariance of machines' own coefficients, and the share of what was shrunk.
+fn shrunk(estimates: &[&[f64]]) -> Option<(Distribution, f64)> {
+    let (order, machines) = (estimates[0].len(), estimates.len() as f64);
+    let mean: Vec<f64> = (0..order)
+        .map(|k| estimates.iter().map(|of| of[k]).sum::<f64>() / machines)
+        .collect();
+    let apart: Vec<Vec<f64>> = estimates
+        .iter()
+        .map(|of| of.iter().zip(&mean).map(|(z, m)| z - m).collect())
+        .collect();
+    let sample = Mat::from_fn(order, order, |i, j| {
+        apart.iter().map(|of| of[i] * of[j]).sum::<f64>() / machines
+    });
+    let level = (0..order).map(|i| sample[(i, i)]).sum::<f64>() / order as f64;
+    let norm = |cell: &dyn Fn(usize, usize) -> f64| {
+        let cells = (0..order).flat_map(|i| (0..order).map(move |j| (i, j)));
+        cells.map(|(i, j)| cell(i, j).powi(2)).sum::<f64>()
+    };
+    let unit = |i: usize, j: usize| if i == j { level } else { 0.0 };
+    let distance = norm(&|i, j| sample[(i, j)] - unit(i, j));
+    let errors = apart
+        .iter()
+        .map(|of| norm(&|i, j| of[i] * of[j] - sample[(i, j)]));
+    let error = (errors.sum::<f64>() / (machines * machines)).min(distance);
+    let shrinkage = if distance > 0.0 {
+        error / distance
+    } else {
+        1.0
+    };
+    // Of a sample about its own mean.
+    let unbiased = machines / (machines - 1.0);
+    // Machines that are all the same leave something to divide by.
+    let level = level.max(f64::MIN_POSITIVE.sqrt());
+    let covariance = Mat::from_fn(order, order, |i, j| {
+        let target = if i == j { level } else { 0.0 };
+        unbiased * (shrinkage * target + (1.0 - shrinkage) * sample[(i, j)])
+    });
+    Some((Distribution::new(mean, covariance)?, shrinkage))
 }
 
 #[cfg(test)]
@@ -258,7 +298,8 @@ mod tests {
             scales: vec![1.0, 4.0],
         };
         let estimates: Vec<&[f64]> = rows.iter().map(<[f64; 3]>::as_slice).collect();
-        let (prior, shrinkage) = scale.prior(&estimates);
+        let (found, shrinkage) = shrunk(&estimates).unwrap();
+        let prior = scale.prior(&found);
         assert!(
             (shrinkage - 0.083_728_438_741_662).abs() < 1e-12,
             "{shrinkage}"
@@ -325,6 +366,60 @@ mod tests {
         let pooled = pool(&fleet(12, 0.0), 1.0, &VARIANCES).unwrap();
         assert!(pooled.place >= 2, "{:?}", pooled.errors);
         assert!(pooled.errors[pooled.place] < 3.05);
+    }
+
+    #[test]
+    fn the_covariance_of_machines_with_few_rows_is_nearer_the_true_one_than_that_of_their_fits() {
+        let slopes_differ_by = [1.0, 0.5, 0.1];
+        let (mut of_machine, mut normal) = (draws::normal(31), draws::normal(32));
+        let machines: Vec<MachineRows> = (0..60)
+            .map(|_| {
+                let slopes = slopes_differ_by.map(|by| 2.0 + by * of_machine());
+                let mut rows = MachineRows {
+                    total: Gram::new(3),
+                    stretches: vec![Gram::new(3); 2],
+                };
+                for row in 0..20 {
+                    let x = [normal(), normal(), normal()];
+                    let y: f64 = x.iter().zip(slopes).map(|(x, b)| x * b).sum();
+                    let y = y + 2.0 * normal();
+                    rows.total.push(&x, y);
+                    rows.stretches[row / 10].push(&x, y);
+                }
+                rows
+            })
+            .collect();
+        let pooled = pool(&machines, 1.0, &VARIANCES).unwrap();
+        let fits = machines.iter().map(|of| {
+            let scales = Standardization::of(&of.total).scales;
+            let fit = LeastSquares::ridge(1.0).solve(&of.total, &[0, 1, 2], &scales, None);
+            fit.unwrap().coefficients
+        });
+        let fits: Vec<Vec<f64>> = fits.collect();
+        let mean = |k: usize| fits.iter().map(|of| of[k]).sum::<f64>() / 60.0;
+        let sample = |i: usize, j: usize| {
+            let terms = fits.iter().map(|of| (of[i] - mean(i)) * (of[j] - mean(j)));
+            terms.sum::<f64>() / 59.0
+        };
+        let distance = |covariance: &dyn Fn(usize, usize) -> f64| {
+            let cells = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
+            let apart = cells.map(|(i, j)| {
+                let truth = if i == j {
+                    slopes_differ_by[i].powi(2)
+                } else {
+                    0.0
+                };
+                (covariance(i, j) - truth).powi(2)
+            });
+            apart.sum::<f64>().sqrt()
+        };
+        // Behind the constant.
+        let own = |i: usize, j: usize| {
+            let (low, high) = (i.min(j) + 1, i.max(j) + 1);
+            pooled.prior.covariance[high * (high + 1) / 2 + low]
+        };
+        let (own, sample) = (distance(&own), distance(&sample));
+        assert!(own < 0.7 * sample, "{own} beside {sample}");
     }
 
     #[test]

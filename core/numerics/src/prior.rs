@@ -159,7 +159,7 @@ impl CoefficientPrior {
 }
 
 /// Normal equations about a prior: of the constant and the columns, all counted from the prior's centre and mean.
-pub(crate) struct Towards {
+struct Towards {
     centre: Vec<f64>,
     /// 0 for the constant and for what the prior does not know.
     mean: Vec<f64>,
@@ -172,7 +172,7 @@ pub(crate) struct Towards {
 }
 
 impl Towards {
-    pub(crate) fn new(
+    fn new(
         prior: &CoefficientPrior,
         gram: &Gram,
         columns: &[Known],
@@ -259,7 +259,7 @@ impl Towards {
 
     /// The weighted sum of the squared residuals of these coefficients, those of the columns whole and the constant as it is beyond the
     /// mean.
-    pub(crate) fn errors(&self, theta: &[f64]) -> f64 {
+    fn errors(&self, theta: &[f64]) -> f64 {
         let mut sum = self.squares;
         for (i, of) in theta.iter().enumerate() {
             let fitted: f64 = theta
