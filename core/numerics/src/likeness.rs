@@ -201,14 +201,12 @@ mod tests {
             [0.273_242_571_597_418_7, -0.060_897_578_911_787_3],
             [-0.060_897_578_911_787_3, 1.961_620_775_521_333_5],
         ];
-        for (i, mean) in [1.626_565_992_647_781_3, 0.842_715_390_779_230_9]
-            .into_iter()
-            .enumerate()
-        {
+        let mean = [1.626_565_992_647_781_3, 0.842_715_390_779_230_9];
+        for (i, (mean, row)) in mean.into_iter().zip(covariance).enumerate() {
             assert!((found.mean[i] - mean).abs() < 1e-12, "{:?}", found.mean);
-            for j in 0..2 {
+            for (j, expected) in row.into_iter().enumerate() {
                 let of = found.covariance[(i, j)];
-                assert!((of - covariance[i][j]).abs() < 1e-12, "{of} at {i}, {j}");
+                assert!((of - expected).abs() < 1e-12, "{of} at {i}, {j}");
             }
         }
     }
