@@ -1,5 +1,6 @@
 //! Recordings in Parquet, of a program that was built with them, beside the same recordings as CSV.
 
+use std::ffi::OsStr;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -7,7 +8,8 @@ use athermal::core::prng::Prng;
 use athermal::files::{Flush, Layout, Options, Reader, Row, TimeForm, Writer, recordings_in};
 
 use crate::services::{HEADER, SERVICE, desk, end, lines, rows as log_rows, serve, until_rows};
-use crate::workbench::{Scratch, athermal, athermal_on, graph};
+use crate::stretches::learned;
+use crate::workbench::{Scratch, athermal, athermal_on, graph, simulated};
 
 #[test]
 fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
@@ -213,4 +215,44 @@ fn a_run_that_keeps_a_state_writes_no_parquet() {
     run(of("out.csv")).ended(0);
     let lines = |name| std::fs::read_to_string(of(name)).unwrap().lines().count();
     assert_eq!(lines("out.csv"), lines("log.csv"));
+}
+
+#[test]
+fn a_fit_of_a_stretch_of_time_reads_no_group_of_rows_outside_of_it() {
+    let scratch = Scratch::new("parquet-stretch");
+    let graph = graph("linear-axis");
+    let csv = simulated(&scratch, "whole.csv", "linear-axis", 2.0, 1);
+    let text = std::fs::read_to_string(&csv).unwrap();
+    let (header, lines) = text.split_once('\n').unwrap();
+    let names: Vec<String> = header.split(',').skip(1).map(str::to_owned).collect();
+    let layout = Layout::new("time_s", TimeForm::SECONDS, names.clone());
+    let mut days = [1, 2].map(|day| {
+        let path = scratch.path(&format!("logs/day={day}/log.parquet"));
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        Writer::create(&path, "time_s", &names, Flush::Buffered).unwrap()
+    });
+    let mut reader = Reader::open(&csv, layout, Options::default()).unwrap();
+    let mut row = Row::default();
+    while reader.next_into(&mut row).unwrap() {
+        let day = usize::from(row.time_ns >= 86_400_000_000_000);
+        days[day].write_row("", row.time_ns, &row.values).unwrap();
+    }
+    days.into_iter().for_each(|of| of.finish().unwrap());
+    // Nothing but the table of contents is left of the second day.
+    let second = scratch.path("logs/day=2/log.parquet");
+    let mut bytes = std::fs::read(&second).unwrap();
+    let (_, length) = bytes[..bytes.len() - 4].split_last_chunk().unwrap();
+    let contents = bytes.len() - 8 - u32::from_le_bytes(*length) as usize;
+    bytes[4..contents].fill(0xff);
+    std::fs::write(&second, bytes).unwrap();
+    let is_before = |line: &&str| line.split(',').next().unwrap().parse::<f64>().unwrap() < 8e4;
+    let cut: Vec<&str> = lines.lines().filter(is_before).collect();
+    let cut = scratch.file("cut.csv", format!("{header}\n{}\n", cut.join("\n")));
+    let logs = scratch.path("logs");
+    let of = |name: &str| scratch.path(&format!("{name}.json"));
+    athermal_on("fit", &graph, &logs, &[&"-o", &of("all")]).ended(3);
+    let stretch: &[&dyn AsRef<OsStr>] = &[&"-o", &of("stretch"), &"--to", &"80000"];
+    athermal_on("fit", &graph, &logs, stretch).ended(0);
+    athermal_on("fit", &graph, &cut, &[&"-o", &of("cut")]).ended(0);
+    assert!(learned(&of("stretch")) == learned(&of("cut")));
 }
