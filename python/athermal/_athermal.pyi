@@ -1,5 +1,20 @@
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, final
+
+__all__ = [
+    "__version__",
+    "Table",
+    "Graph",
+    "Model",
+    "Engine",
+    "main",
+    "broken_rules",
+    "check_columns",
+    "fit_machine",
+    "init",
+    "compare",
+    "simulate",
+]
 
 __version__: str
 
@@ -8,6 +23,7 @@ class _Call(Protocol):
     tables: list[tuple[str, Table]]
     progress: Callable[[str, int, int | None], Any] | None
 
+@final
 class Table:
     @staticmethod
     def from_arrow(of: Any) -> Table: ...
@@ -22,6 +38,7 @@ class Table:
     def to_dict(self) -> dict[str, list[Any]]: ...
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
 
+@final
 class Graph:
     @staticmethod
     def of_path(path: str) -> Graph: ...
@@ -48,6 +65,7 @@ class Graph:
     def model(self) -> Model: ...
     def fit(self, call: _Call) -> tuple[Model, str]: ...
 
+@final
 class Model:
     @staticmethod
     def of_json(name: str, text: str) -> Model: ...
@@ -65,6 +83,7 @@ class Model:
     def diagnose(self, call: _Call) -> tuple[str, dict[str, Any]]: ...
     def report(self, call: _Call) -> tuple[str, dict[str, Any], str]: ...
 
+@final
 class Engine:
     def step(self, t_ns: int, values: dict[str, float | None]) -> dict[str, float | None]: ...
     def segment(self) -> None: ...
