@@ -302,7 +302,7 @@ impl Compare {
         let scored = times().min().zip(times().max());
         if let Some(((from, to), (first, last))) = report.period.zip(scored) {
             let fit = (seconds(from), seconds(to));
-            warn_overlap(terminal, fit, (seconds(first), seconds(last)));
+            warn_overlap(terminal, fit, (seconds(first), seconds(last)), false);
         }
     }
 }

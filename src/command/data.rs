@@ -1,5 +1,7 @@
 //! Recorded data on the command line: how files are named, and the warnings after reading them.
 
+mod cards;
+
 use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -21,6 +23,7 @@ use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
 use athermal_fleet::RowsId;
+use athermal_fleet::job::Times;
 
 /// Recorded data.
 #[derive(Debug, Args)]
@@ -33,6 +36,8 @@ pub struct Data {
     lenient: bool,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    times: Times,
 }
 
 /// A file, or the files of a folder, by the name that was given.
@@ -109,6 +114,7 @@ impl Data {
             given: files.into_iter().map(Given::from).collect(),
             lenient: false,
             reading,
+            times: Times::default(),
         }
     }
 
@@ -184,7 +190,7 @@ impl Data {
         let first = self.paths().next();
         if let Some((name, journal)) = first.and_then(|path| Some((path, journal_of(path)?))) {
             let recording = Rc::new(JournalRecording::in_state(&journal));
-            return Dataset::of(name.to_owned(), recording);
+            return Dataset::of(name.to_owned(), recording).of_stretch(self.times.stretch());
         }
         self.dataset_of(self.paths().map(Path::to_owned).collect(), None)
     }
@@ -219,6 +225,7 @@ impl Data {
                 merge: self.reading.merge,
                 offsets: offsets.collect(),
                 within,
+                stretch: self.times.stretch(),
                 ..Options::default()
             },
         )
@@ -238,7 +245,10 @@ impl Data {
             let offset = format!("{}={by}", file.display());
             ["--offset".to_owned(), quoted(&offset)]
         });
-        let options = options.chain(offsets);
+        let times = [("--from", &self.times.from), ("--to", &self.times.to)].into_iter();
+        let times = times.filter_map(|(option, time)| Some((option, time.as_ref()?)));
+        let times = times.flat_map(|(option, time)| [option.to_owned(), quoted(time)]);
+        let options = options.chain(offsets).chain(times);
         let files = self.given.iter();
         let files = files.map(|given| quoted(&given.name.display().to_string()));
         let words = options.chain(["--data".to_owned()]);
@@ -277,7 +287,8 @@ impl Data {
         }
         let of_fit = model.card.as_ref().and_then(|card| card.period);
         if !again && let Some((fit, data)) = of_fit.zip(period) {
-            warn_overlap(terminal, (fit.from_s, fit.to_s), data);
+            let is_one_clock = cards.clone().any(|card| self.has_rest_of(card));
+            warn_overlap(terminal, (fit.from_s, fit.to_s), data, is_one_clock);
         }
     }
 
@@ -286,6 +297,9 @@ impl Data {
     /// # Errors
     /// When a file cannot be read.
     pub fn cards(&self, plan: &Plan, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
+        if self.times != Times::default() {
+            return self.cards_of_rows(plan, dataset);
+        }
         let reports = dataset.reports();
         let card = |path: &Path| {
             let name = path.display().to_string();
@@ -306,6 +320,7 @@ impl Data {
                             rows,
                             bytes,
                             hash,
+                            ..DataCard::default()
                         })
                 }
             };
@@ -318,13 +333,13 @@ impl Data {
 /// What scores on the data of a fit show.
 pub const FITS: &str = "the scores show how well it fits, not how well it predicts";
 
-/// Warns of dated data from the time of a fit, both in s.
-pub fn warn_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
+/// Warns of data from the time of a fit, both in s, where they are dated or known to count from one instant.
+pub fn warn_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64), is_one_clock: bool) {
     let shared = (fit.0.max(data.0), fit.1.min(data.1));
     let length = |(from, to): (f64, f64)| to - from;
     // Other times begin anew with each recording.
     let dated = shared.0 >= DATES_S;
-    if dated && length(shared) > 0.01 * length(data) {
+    if (dated || is_one_clock) && length(shared) > 0.01 * length(data) {
         terminal.warning(format_args!(
             "the data of the fit are of the time from {} to {} too: there {FITS}",
             instant(shared.0),

@@ -54,6 +54,7 @@ mod several_loggers;
 mod shipped_graphs;
 mod starter_graphs;
 mod stopped_runs;
+mod stretches;
 mod swap_commands;
 mod trials;
 mod watched_runs;

@@ -1,8 +1,15 @@
 //! Recordings in Parquet, of a program that was built with them, beside the same recordings as CSV.
 
-use athermal::files::{Layout, Options, Reader, Row, TimeForm};
+use std::ffi::OsStr;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
-use crate::workbench::{Scratch, athermal, athermal_on, graph};
+use athermal::core::prng::Prng;
+use athermal::files::{Flush, Layout, Options, Reader, Row, TimeForm, Writer, recordings_in};
+
+use crate::services::{HEADER, SERVICE, desk, end, lines, rows as log_rows, serve, until_rows};
+use crate::stretches::learned;
+use crate::workbench::{Scratch, athermal, athermal_on, graph, simulated};
 
 #[test]
 fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
@@ -53,17 +60,94 @@ fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
     let text = std::fs::read_to_string(csv).unwrap();
     let (header, _) = text.split_once('\n').unwrap();
     let columns: Vec<&str> = header.split(',').skip(1).collect();
-    let rows = |path| {
-        let layout = Layout::new("time_s", TimeForm::SECONDS, columns.clone());
-        let mut reader = Reader::open(path, layout, Options::default()).unwrap();
-        let (mut rows, mut row) = (Vec::new(), Row::default());
-        while reader.next_into(&mut row).unwrap() {
-            let values: Vec<u64> = row.values.iter().map(|value| value.to_bits()).collect();
-            rows.push((row.time_ns, values));
-        }
-        rows
-    };
+    let rows = |path| rows(path, &columns);
     assert!(rows(csv).len() > 1000 && rows(csv) == rows(parquet));
+}
+
+/// The rows of a recording, to the bit.
+fn rows(path: &Path, columns: &[&str]) -> Vec<(i64, Vec<u64>)> {
+    let layout = Layout::new("time_s", TimeForm::SECONDS, columns.iter().copied());
+    let mut reader = Reader::open(path, layout, Options::default()).unwrap();
+    let (mut rows, mut row) = (Vec::new(), Row::default());
+    while reader.next_into(&mut row).unwrap() {
+        let values: Vec<u64> = row.values.iter().map(|value| value.to_bits()).collect();
+        rows.push((row.time_ns, values));
+    }
+    rows
+}
+
+#[test]
+fn the_sink_of_parquet_is_checked_listed_explained_and_in_the_schema() {
+    let sink = "[sinks.hours]\ntype = \"parquet\"\npath = \"hours\"\nevery = \"1h\"\n";
+    let scratch = desk("parquet-sink", &format!("{SERVICE}\n{sink}"));
+    let line = scratch.path("line.toml");
+    athermal(&[&"check", &line]).ended(0);
+    let explained = athermal(&[&"explain", &line]).ended(0);
+    assert!(explained.out.contains("hours") && explained.out.contains("parquet"));
+    let listed = athermal(&[&"nodes", &"parquet"]).ended(0);
+    for part in ["parquet (sink, from athermal-arrow", "path", "every"] {
+        assert!(listed.out.contains(part), "{part} in {}", listed.out);
+    }
+    let schema = athermal(&[&"schema"]).ended(0).json();
+    let of_sinks = &schema["properties"]["sinks"];
+    assert!(of_sinks.to_string().contains("\"parquet\""), "{of_sinks}");
+    let wrong = scratch.file(
+        "wrong.toml",
+        std::fs::read_to_string(&line)
+            .unwrap()
+            .replace("every =", "evry ="),
+    );
+    athermal(&[&"check", &wrong])
+        .ended(2)
+        .tells(&["evry", "every"]);
+}
+
+#[test]
+fn a_service_that_is_killed_at_random_has_each_row_once_in_files_of_parquet_that_are_whole() {
+    // A row is a tenth of a second, so each start ends a file and begins the next.
+    const KILLS: usize = 24;
+    const PIECE: usize = 300;
+    let sink = "[sinks.by_minute]\ntype = \"parquet\"\npath = \"minutes\"\nevery = \"1min\"\n";
+    let scratch = desk("parquet-kills", &format!("{SERVICE}\n{sink}"));
+    let (log, out) = (scratch.path("log.csv"), scratch.path("history.csv"));
+    let (mut prng, mut written) = (Prng::stream(7, "parquet"), 0);
+    scratch.file("log.csv", HEADER);
+    let mut add = |count: usize| {
+        let mut file = std::fs::OpenOptions::new().append(true).open(&log).unwrap();
+        let text = log_rows(written, written + count);
+        std::io::Write::write_all(&mut file, text.as_bytes()).unwrap();
+        written += count;
+    };
+    for nth in 0..KILLS {
+        let before = lines(&out);
+        add(PIECE);
+        let mut child = serve(&scratch, &[]);
+        let began = Instant::now();
+        while nth % 4 != 0 && lines(&out) <= before && began.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        add(PIECE);
+        std::thread::sleep(Duration::from_micros(prng.between(0.0, 30e3) as u64));
+        let _ = child.kill();
+        let _ = child.wait();
+        // What is there can be read, whenever the kill came.
+        for file in recordings_in(&scratch.path("minutes")) {
+            assert_eq!(rows(&file, &["drift.Z"]).len(), 600, "{}", file.display());
+        }
+    }
+    let mut child = serve(&scratch, &[]);
+    until_rows(&out, 2 * PIECE * KILLS, &mut child);
+    end(child);
+    let header = std::fs::read_to_string(&out).unwrap();
+    let columns: Vec<&str> = header.lines().next().unwrap().split(',').collect();
+    let columns = &columns[1..columns.len() - 1];
+    let of_csv = rows(&out, columns);
+    let files = recordings_in(&scratch.path("minutes"));
+    let of_files: Vec<_> = files.iter().flat_map(|file| rows(file, columns)).collect();
+    // The last minute is not over.
+    let whole = KILLS - 1;
+    assert_eq!((files.len(), of_files.len()), (whole, 600 * whole));
+    assert!(of_csv.len() == 600 * KILLS && of_csv[..600 * whole] == of_files);
 }
 
 #[test]
@@ -206,4 +290,44 @@ fn a_run_that_keeps_a_state_writes_no_parquet() {
     run(of("out.csv")).ended(0);
     let lines = |name| std::fs::read_to_string(of(name)).unwrap().lines().count();
     assert_eq!(lines("out.csv"), lines("log.csv"));
+}
+
+#[test]
+fn a_fit_of_a_stretch_of_time_reads_no_group_of_rows_outside_of_it() {
+    let scratch = Scratch::new("parquet-stretch");
+    let graph = graph("linear-axis");
+    let csv = simulated(&scratch, "whole.csv", "linear-axis", 2.0, 1);
+    let text = std::fs::read_to_string(&csv).unwrap();
+    let (header, lines) = text.split_once('\n').unwrap();
+    let names: Vec<String> = header.split(',').skip(1).map(str::to_owned).collect();
+    let layout = Layout::new("time_s", TimeForm::SECONDS, names.clone());
+    let mut days = [1, 2].map(|day| {
+        let path = scratch.path(&format!("logs/day={day}/log.parquet"));
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        Writer::create(&path, "time_s", &names, Flush::Buffered).unwrap()
+    });
+    let mut reader = Reader::open(&csv, layout, Options::default()).unwrap();
+    let mut row = Row::default();
+    while reader.next_into(&mut row).unwrap() {
+        let day = usize::from(row.time_ns >= 86_400_000_000_000);
+        days[day].write_row("", row.time_ns, &row.values).unwrap();
+    }
+    days.into_iter().for_each(|of| of.finish().unwrap());
+    // Nothing but the table of contents is left of the second day.
+    let second = scratch.path("logs/day=2/log.parquet");
+    let mut bytes = std::fs::read(&second).unwrap();
+    let (_, length) = bytes[..bytes.len() - 4].split_last_chunk().unwrap();
+    let contents = bytes.len() - 8 - u32::from_le_bytes(*length) as usize;
+    bytes[4..contents].fill(0xff);
+    std::fs::write(&second, bytes).unwrap();
+    let is_before = |line: &&str| line.split(',').next().unwrap().parse::<f64>().unwrap() < 8e4;
+    let cut: Vec<&str> = lines.lines().filter(is_before).collect();
+    let cut = scratch.file("cut.csv", format!("{header}\n{}\n", cut.join("\n")));
+    let logs = scratch.path("logs");
+    let of = |name: &str| scratch.path(&format!("{name}.json"));
+    athermal_on("fit", &graph, &logs, &[&"-o", &of("all")]).ended(3);
+    let stretch: &[&dyn AsRef<OsStr>] = &[&"-o", &of("stretch"), &"--to", &"80000"];
+    athermal_on("fit", &graph, &logs, stretch).ended(0);
+    athermal_on("fit", &graph, &cut, &[&"-o", &of("cut")]).ended(0);
+    assert!(learned(&of("stretch")) == learned(&of("cut")));
 }

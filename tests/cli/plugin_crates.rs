@@ -312,6 +312,67 @@ fn a_wheel_is_refused_where_what_makes_it_is_missing() {
     assert!(!wheels.exists() && !scratch.path("wheels-project").exists());
 }
 
+#[cfg(unix)]
+#[test]
+fn a_wheel_is_for_the_python_that_is_named_else_that_of_pyo3_and_one_that_cannot_be_it_is_refused_before_the_build()
+ {
+    use std::os::unix::fs::PermissionsExt;
+
+    let scratch = Scratch::new("build-python");
+    let core = format!(
+        "athermal-core = {{ path = {:?} }}",
+        format!("{ROOT}/core/framework")
+    );
+    let with = with_core(&scratch, "python-nodes", &core);
+    let script = |name: &str, text: &str| {
+        let path = scratch.file(name, format!("#!/bin/sh\n{text}\n"));
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
+        path
+    };
+    let called = scratch.path("called");
+    let note = format!("echo \"$PYO3_PYTHON $*\" >> {}; exit 1", called.display());
+    let maturin = script(
+        "maturin",
+        &format!("[ \"$1\" = --version ] && exit 0\n{note}"),
+    );
+    let old = script("old-python", "echo False 3.9.2");
+    let new = script("new-python", "echo True 3.12.1");
+    let build = |named: Option<&std::path::Path>, of_pyo3: &std::path::Path| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .args(["build", "--wheel", "--with", &with, "-o"])
+            .arg(scratch.path("wheels"))
+            .args(named.map(|path| format!("--python={}", path.display())))
+            .env("MATURIN", &maturin)
+            .env("PYO3_PYTHON", of_pyo3)
+            .output()
+            .unwrap();
+        let message = String::from_utf8(output.stderr).unwrap();
+        (output.status.code(), message)
+    };
+    let (status, message) = build(None, &old);
+    assert!(
+        status == Some(2) && message.contains("Python 3.9.2"),
+        "{message}"
+    );
+    let (status, message) = build(Some(&scratch.path("no-python")), &new);
+    assert!(
+        status == Some(3) && message.contains("--python PATH"),
+        "{message}"
+    );
+    assert!(!called.exists());
+    for (named, of_pyo3) in [(Some(&*new), &*old), (None, &*new)] {
+        let (_, message) = build(named, of_pyo3);
+        let asked = std::fs::read_to_string(&called).unwrap_or_else(|_| panic!("{message}"));
+        let (python, arguments) = asked.split_once(' ').unwrap();
+        assert_eq!(python, new.to_str().unwrap());
+        assert!(
+            arguments.contains(&format!("--interpreter {python}")),
+            "{arguments}"
+        );
+        std::fs::remove_file(&called).unwrap();
+    }
+}
+
 /// A cargo that notes how it is called to build, and builds nothing.
 #[cfg(unix)]
 #[test]

@@ -107,6 +107,51 @@ fn a_fit_towards_a_prior_needs_its_file_once_and_its_model_holds_it() {
 }
 
 #[test]
+fn a_fleet_that_is_pooled_gives_the_prior_that_new_machines_are_fitted_towards() {
+    let folder = Folder::new("pooled");
+    for seed in ["1", "2", "3", "4", "5"] {
+        let of_machine = folder.0.join(format!("logs/machine=m{seed}"));
+        std::fs::create_dir_all(&of_machine).unwrap();
+        let log = format!("logs/machine=m{seed}/log.csv");
+        let simulate = format!(
+            "simulate die-tester -o {log} --days 0.25 --spread 30% --machine-seed {seed} --seed {seed}"
+        );
+        let simulate: Vec<&str> = simulate.split(' ').collect();
+        assert_eq!(ran(&folder, &simulate).0, Some(0));
+    }
+    let graph = graph("die-tester-fleet").display().to_string();
+    let pool = |data: &str| {
+        let pool = [
+            "fleet",
+            "fit",
+            &graph,
+            "--data",
+            data,
+            "--pooled",
+            "-o",
+            "type.json",
+        ];
+        ran(&folder, &pool)
+    };
+    let (status, text) = pool("logs/machine=m1/*.csv");
+    assert_ne!(status, Some(0), "{text}");
+    assert!(!folder.0.join("type.json").exists());
+    let (status, text) = pool("logs/machine=*/*.csv");
+    assert_eq!(status, Some(0), "{text}");
+    let file = std::fs::read_to_string(folder.0.join("type.json")).unwrap();
+    let of = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
+    let (found, expected) = (of(&file), of(&prior()));
+    for axis in ["X1", "Y1", "Z1", "X2", "Y2", "Z2"] {
+        let of =
+            |prior: &serde_json::Value| prior["estimators"][format!("expansion.{axis}")].clone();
+        let (found, expected) = (of(&found), of(&expected));
+        assert_eq!(found["machines"], 5);
+        // The same recordings, by way of files.
+        assert_eq!(found, expected, "{axis}");
+    }
+}
+
+#[test]
 fn what_is_wrong_with_a_prior_is_reported_at_its_place() {
     let folder = Folder::new("wrong-prior");
     let write = |name: &str, text: &str| std::fs::write(folder.0.join(name), text).unwrap();

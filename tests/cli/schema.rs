@@ -6,6 +6,10 @@ use athermal::core::node::kinds;
 use athermal::schema::graph_schema;
 use serde_json::Value;
 
+#[cfg_attr(
+    feature = "parquet",
+    ignore = "it is of the program without this feature, which brings a kind of sink"
+)]
 #[test]
 fn the_schema_beside_the_graphs_is_the_one_that_is_printed() {
     let committed = graph("x").with_file_name("athermal.schema.json");

@@ -13,6 +13,7 @@ mod defaults;
 mod estimators;
 mod in_sample;
 mod missing_truths;
+mod new_machine;
 mod novelty;
 mod planned;
 mod random_worlds;

@@ -12,6 +12,9 @@ pub const FEWEST_MACHINES: usize = 4;
 /// How much of the share of Ledoit and Wolf the covariance is shrunk by in each round, as is tried.
 const SHARES: [f64; 3] = [0.0, 0.1, 1.0];
 
+/// So many groups of machines are left out in turn, at most.
+const GROUPS: usize = 30;
+
 /// The rows of one machine.
 #[derive(Debug, Clone)]
 pub struct MachineRows {
@@ -46,11 +49,12 @@ pub struct Pooled {
 /// 1. Each machine's coefficients are those of ridge with the penalty `alpha`. The mean is the arithmetic one and the covariance the
 ///    sample's, shrunk towards a multiple of the unit matrix by the share of Ledoit and Wolf (2004), lemma 3.2 and equations 14 to 17:
 ///    `Σ = ρ m I + (1 − ρ) S` with `m = tr S / p`, `d² = ‖S − mI‖²`, `ρ = min(d², Σ ‖z zᵀ − S‖² / M²) / d²`.
-/// 2. The sample's covariance has the doubt of each machine's own fit in it. Rounds of expectation and maximisation from there leave
-///    what the rows say differs, shrunk in each round by `ρ`, a tenth of it, or nothing.
+/// 2. That covariance also holds the doubt of each machine's own fit. Rounds of expectation and maximisation from there (Dempster, Laird
+///    and Rubin 1977; Laird and Ware 1982) leave what differs beyond it. In each round it is shrunk by `ρ`, a tenth of `ρ`, or nothing.
 ///
 /// That share and the penalty towards the prior, one of `variances`, in variances of the residuals of the machines' own fits, are those
-/// whose fits to single stretches of a machine that is left out have the smallest error on its other rows.
+/// whose fits to single stretches of a machine that is left out have the smallest error on its other rows. Of more than 30 machines each
+/// thirtieth is left out at a time.
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] for fewer than [`FEWEST_MACHINES`] machines, [`NumericsError::Width`],
@@ -75,28 +79,27 @@ pub fn pool(
     let penalties: Vec<f64> = variances.iter().map(|variance| variance * noise).collect();
     let mut tried = SHARES.map(|_| (vec![0.0; penalties.len()], 0.0));
     let mut tests = 0.0;
-    for (nth, (machine, own)) in machines.iter().zip(&known).enumerate() {
-        let others: Vec<&Machine> = known
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| *other != nth)
-            .map(|(_, of)| of)
-            .collect();
-        let stretches = machine.stretches.iter().filter(|stretch| {
-            stretch.count() > 0 && machine.total.weight() - stretch.weight() > 0.0
-        });
-        let stretches: Vec<(Normal, f64)> = stretches
-            .map(|stretch| {
-                let rest = machine.total.weight() - stretch.weight();
-                (scale.normal(stretch), rest)
-            })
-            .collect();
-        tests += stretches.len() as f64;
+    let groups = GROUPS.min(machines.len());
+    for group in 0..groups {
+        let (left_out, others): (Vec<usize>, Vec<usize>) =
+            (0..machines.len()).partition(|place| place % groups == group);
+        let others: Vec<&Machine> = others.iter().map(|&place| &known[place]).collect();
+        let mut of_machines = Vec::new();
+        for place in left_out {
+            let MachineRows { total, stretches } = &machines[place];
+            for stretch in stretches {
+                let rest = total.weight() - stretch.weight();
+                if stretch.count() > 0 && rest > 0.0 {
+                    of_machines.push((&known[place].rows, scale.normal(stretch), rest));
+                }
+            }
+        }
+        tests += of_machines.len() as f64;
         for (share, (logs, of_mean)) in SHARES.iter().zip(&mut tried) {
             let (prior, _) = distribution(&others, *share)?;
-            for (stretch, rest) in &stretches {
+            for (total, stretch, rest) in &of_machines {
                 let error = |theta: &[f64]| {
-                    let left = own.rows.errors(theta) - stretch.errors(theta);
+                    let left = total.errors(theta) - stretch.errors(theta);
                     0.5 * (left.max(f64::MIN_POSITIVE) / rest).ln()
                 };
                 *of_mean += error(&prior.mean);

@@ -4,14 +4,16 @@ use std::fmt::Display;
 use std::fs::File;
 use std::path::{Component, Path};
 
-use arrow_array::RecordBatch;
+use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, SchemaRef};
-use athermal_files::{Selection, TypedFile, TypedRows};
+use athermal_files::{Selection, TypedFile, TypedRows, Within};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_reader::statistics::StatisticsConverter;
 
-use crate::rows::{Column, Rows, Wanted};
+use crate::column::{self, Instants};
+use crate::rows::{Column, PassedOver, Rows, Wanted};
 
 /// So many rows are decoded at a time: the numbers of a wide table then stay in the second cache.
 pub(crate) const BATCH: usize = 2048;
@@ -25,8 +27,21 @@ struct Batched {
     /// What the folders on its path say.
     keys: Vec<(String, String)>,
     /// Its batches, of these columns at least, and where among theirs each of the file's stands.
-    #[allow(clippy::type_complexity)] // it is this once
-    read: Box<dyn FnOnce(&[usize]) -> Result<(Batches, Vec<usize>), String> + Send>,
+    read: Box<Read>,
+}
+
+/// Reads some columns. Rows outside of a stretch of time may be passed over.
+type Read = dyn FnOnce(&[usize], Option<OfTime>) -> Result<Begun, String> + Send;
+
+/// The column of the time, and the stretch that is asked for.
+type OfTime = (usize, Within);
+
+/// What is read.
+struct Begun {
+    batches: Batches,
+    /// Where in a batch each of the file's columns stands.
+    places: Vec<usize>,
+    passed_over: PassedOver,
 }
 
 impl TypedFile for Batched {
@@ -45,7 +60,12 @@ impl TypedFile for Batched {
         let mut read: Vec<usize> = all.filter(|place| *place < fields).collect();
         read.sort_unstable();
         read.dedup();
-        let (batches, places) = (self.read)(&read)?;
+        let within = match &wanted.time[..] {
+            [time] if *time < fields => wanted.within.map(|within| (*time, within)),
+            _ => None,
+        };
+        let begun = (self.read)(&read, within)?;
+        let places = begun.places;
         let column = |place: usize| match place.checked_sub(fields) {
             Some(key) => Column::Constant(self.keys[key].1.clone()),
             None => Column::At {
@@ -63,7 +83,11 @@ impl TypedFile for Batched {
             values: some(&wanted.values),
             texts: some(&wanted.texts),
         };
-        Ok(Box::new(Rows::new(batches, wanted)?))
+        Ok(Box::new(Rows::new(
+            begun.batches,
+            wanted,
+            begun.passed_over,
+        )?))
     }
 }
 
@@ -87,6 +111,15 @@ fn opened(path: &Path) -> Result<File, String> {
     File::open(path).map_err(words)
 }
 
+/// All rows of some batches.
+fn all(batches: Batches, places: Vec<usize>) -> Begun {
+    Begun {
+        batches,
+        places,
+        passed_over: PassedOver::default(),
+    }
+}
+
 /// Batches of this schema that come from elsewhere, as the columns of a file that is read once
 /// ([`athermal_files::Reader::from_typed`]).
 #[must_use]
@@ -95,7 +128,7 @@ pub fn batches(schema: SchemaRef, batches: Batches) -> Box<dyn TypedFile> {
     Box::new(Batched {
         schema,
         keys: Vec::new(),
-        read: Box::new(move |_| Ok((batches, places))),
+        read: Box::new(move |_, _| Ok(all(batches, places))),
     })
 }
 
@@ -108,13 +141,71 @@ pub(crate) fn parquet(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |columns| {
+        read: Box::new(move |columns, within| {
             let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
+            let groups = within.and_then(|within| groups_within(&builder, within));
+            let (builder, passed_over) = match groups {
+                Some(groups) => {
+                    let rows = builder.metadata().row_groups().iter();
+                    let rows = rows.map(|group| group.num_rows().unsigned_abs());
+                    let passed_over = PassedOver::of(rows, &groups);
+                    (builder.with_row_groups(groups), passed_over)
+                }
+                None => (builder, PassedOver::default()),
+            };
             let reader = builder.with_projection(mask).with_batch_size(BATCH).build();
-            let batches: Batches = Box::new(reader.map_err(words)?);
-            Ok((batches, columns.to_vec()))
+            Ok(Begun {
+                batches: Box::new(reader.map_err(words)?),
+                places: columns.to_vec(),
+                passed_over,
+            })
         }),
     }))
+}
+
+/// The row groups that may have rows of a stretch of time, by what the file says of their lowest and highest times; none where it
+/// says nothing, or the column has neither instants nor numbers.
+fn groups_within(
+    builder: &ParquetRecordBatchReaderBuilder<File>,
+    (time, within): OfTime,
+) -> Option<Vec<usize>> {
+    let (schema, groups) = (builder.schema(), builder.metadata().row_groups());
+    let name = schema.field(time).name();
+    let of = StatisticsConverter::try_new(name, schema, builder.parquet_schema()).ok()?;
+    let lowest = ends(&of.row_group_mins(groups).ok()?, within.unit)?;
+    let highest = ends(&of.row_group_maxes(groups).ok()?, within.unit)?;
+    let (from, to) = within.ends;
+    let may_be = |group: &usize| {
+        lowest[*group].is_none_or(|(first, _)| first <= to)
+            && highest[*group].is_none_or(|(_, last)| last >= from)
+    };
+    Some((0..groups.len()).filter(may_be).collect())
+}
+
+/// Between which two instants in ns each time of a column is at any rate; none where there is no time, or one that is not known.
+fn ends(times: &ArrayRef, unit: Option<(i64, i128)>) -> Option<Vec<Option<(i64, i64)>>> {
+    // A clock of which is not said where it stands is so much off at most.
+    const ANYWHERE_NS: i64 = 86_400_000_000_000;
+    // Numbers are rounded to doubles here; Julian days are off by some microseconds.
+    const ROUNDED_NS: f64 = 1e6;
+    if let Some(instants) = Instants::of(times) {
+        let margin = if instants.is_utc { 0 } else { ANYWHERE_NS };
+        let end = |at: i64| (at.saturating_sub(margin), at.saturating_add(margin));
+        return Some(
+            (0..times.len())
+                .map(|row| instants.at(row).map(end))
+                .collect(),
+        );
+    }
+    let (ns, origin_ns) = unit.filter(|_| times.data_type().is_numeric())?;
+    let mut all = vec![None; times.len()];
+    let mut put = |row: usize, number: f64| {
+        let at = number * ns as f64 - origin_ns as f64;
+        let end = ((at - ROUNDED_NS) as i64, (at + ROUNDED_NS) as i64);
+        all[row] = (!number.is_nan()).then_some(end);
+    };
+    column::numbers(times, &mut put, &mut |_, _| {});
+    Some(all)
 }
 
 pub(crate) fn arrow(path: &Path) -> Result<Box<dyn TypedFile>, String> {
@@ -125,10 +216,9 @@ pub(crate) fn arrow(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |columns| {
+        read: Box::new(move |columns, _| {
             let reader = FileReader::try_new_buffered(file, Some(columns.to_vec()));
-            let batches: Batches = Box::new(reader.map_err(words)?);
-            Ok((batches, columns.to_vec()))
+            Ok(all(Box::new(reader.map_err(words)?), columns.to_vec()))
         }),
     }))
 }
@@ -140,6 +230,6 @@ pub(crate) fn arrow_stream(path: &Path) -> Result<Box<dyn TypedFile>, String> {
     Ok(Box::new(Batched {
         keys: keys(path, &schema),
         schema,
-        read: Box::new(move |_| Ok((Box::new(reader), places))),
+        read: Box::new(move |_, _| Ok(all(Box::new(reader), places))),
     }))
 }

@@ -2,7 +2,8 @@
 //!
 //! A column of numbers gives them as 64-bit floats: whole numbers, decimals and truth values too, and texts that are numbers; what is
 //! null or not a number is absent. A column of instants gives them whatever form the graph declares; one without a zone goes by the
-//! `zone` of `[time]`, as a text does. `key=value` in the folders of a file's path stands for a column that the file itself lacks.
+//! `zone` of `[time]`, as a text does. Where a stretch of time is asked for, groups of rows outside of it are not read. `key=value` in
+//! the folders of a file's path stands for a column that the file itself lacks.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -11,10 +12,12 @@ mod file;
 mod memory;
 mod parquet_sink;
 mod rows;
+mod sink;
 mod stamp;
 
 pub use file::{Batches, batches};
 pub use memory::table;
+pub use sink::ParquetSink;
 
 use athermal_files::{FileKind, register_file_kind};
 

@@ -17,7 +17,7 @@ const GROUP: usize = 32 * BATCH;
 
 /// A file of Parquet that is being written: a column of the time, of 64-bit floats, and of texts where the last column is one. What
 /// is dated has instants of UTC; other times are seconds.
-struct ParquetSink {
+struct ParquetRows {
     output: Option<File>,
     names: Vec<String>,
     times: Vec<i64>,
@@ -32,7 +32,7 @@ struct ParquetSink {
 /// Begins a file.
 pub(crate) fn create(output: File, time_column: &str, columns: &[String]) -> Box<dyn TypedSink> {
     let time = [time_column.to_owned()];
-    Box::new(ParquetSink {
+    Box::new(ParquetRows {
         output: Some(output),
         names: [&time, columns].concat(),
         times: Vec::with_capacity(BATCH),
@@ -44,7 +44,7 @@ pub(crate) fn create(output: File, time_column: &str, columns: &[String]) -> Box
     })
 }
 
-impl ParquetSink {
+impl ParquetRows {
     fn writer(&mut self) -> io::Result<Option<&mut ArrowWriter<File>>> {
         if let Some(output) = self.output.take() {
             let properties = WriterProperties::builder()
@@ -105,7 +105,7 @@ impl ParquetSink {
     }
 }
 
-impl TypedSink for ParquetSink {
+impl TypedSink for ParquetRows {
     fn write(&mut self, time_ns: i64, values: &[f64], label: Option<&str>) -> io::Result<()> {
         if self.output.is_some() && self.times.is_empty() {
             self.is_dated = time_ns >= DATED_NS;
@@ -134,7 +134,7 @@ impl TypedSink for ParquetSink {
     }
 }
 
-impl Drop for ParquetSink {
+impl Drop for ParquetRows {
     fn drop(&mut self) {
         // Whoever wants to know of a failure has ended it before.
         let _ = self.finish();

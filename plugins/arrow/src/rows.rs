@@ -33,6 +33,24 @@ pub(crate) struct Wanted {
     pub texts: Vec<Option<Column>>,
 }
 
+/// Rows of a file that are not read: behind so many that are, so many are passed over.
+#[derive(Debug, Default)]
+pub(crate) struct PassedOver(Vec<(u64, u64)>);
+
+impl PassedOver {
+    /// Those of groups of so many rows of which these alone are read.
+    pub fn of(rows: impl Iterator<Item = u64>, read: &[usize]) -> Self {
+        let (mut all, mut before) = (Vec::new(), 0);
+        for (group, rows) in rows.enumerate() {
+            match read.contains(&group) {
+                true => before += rows,
+                false => all.push((before, rows)),
+            }
+        }
+        Self(all)
+    }
+}
+
 /// A column of the time in a batch.
 enum Time {
     At(Instants),
@@ -59,10 +77,11 @@ pub(crate) struct Rows {
     stamp: Stamp,
     /// The same of cells beside the time.
     cell_stamp: Stamp,
+    passed_over: PassedOver,
 }
 
 impl Rows {
-    pub fn new(batches: Batches, wanted: Wanted) -> Result<Self, String> {
+    pub fn new(batches: Batches, wanted: Wanted, passed_over: PassedOver) -> Result<Self, String> {
         for column in wanted.values.iter().flatten() {
             match column {
                 Column::At {
@@ -88,6 +107,7 @@ impl Rows {
             cells: vec![Vec::new(); cells],
             stamp: Stamp::default(),
             cell_stamp: Stamp::default(),
+            passed_over,
         })
     }
 
@@ -216,5 +236,11 @@ impl TypedRows for Rows {
     fn text(&self, index: usize) -> &[u8] {
         let cell = self.cells.get(self.wanted.time.len() + index);
         cell.map_or(&[], Vec::as_slice)
+    }
+
+    fn passed_over(&self, nth: u64) -> u64 {
+        let all = self.passed_over.0.iter();
+        let before = all.take_while(|(read, _)| *read < nth);
+        before.map(|(_, rows)| rows).sum()
     }
 }

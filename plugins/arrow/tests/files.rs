@@ -15,10 +15,12 @@ use arrow_array::{
 use arrow_ipc::writer::{FileWriter, StreamWriter};
 use athermal_arrow as _;
 use athermal_files::{
-    Description, FileError, Flush, Format, Layout, Options, Reader, Row, TimeForm, Writer,
+    Bound, Description, FileError, Flush, Format, Layout, Options, Reader, Row, Stretch, TimeForm,
+    Writer,
 };
 use parquet::arrow::ArrowWriter;
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use proptest::prelude::*;
 
 /// A folder of a test's own, which goes with it.
@@ -468,4 +470,114 @@ fn a_table_with_a_row_for_each_value_is_read_by_its_names() {
     let rows = read(&path, layout);
     assert_eq!(rows[0].values, [0.1, f64::INFINITY]);
     assert!(rows[1].values[0] == 0.3 && rows[1].values[1].is_nan());
+}
+
+#[test]
+fn groups_of_rows_outside_of_a_stretch_of_time_are_not_read() {
+    let folder = Folder::of("within");
+    let day = 86_400_000_i64;
+    let instants = || (0..30).map(|nth| 20_000 * day + nth * day / 2);
+    let rows = |zone: Option<&str>, within: Option<(i64, i64)>| {
+        let path = folder.file("log.parquet");
+        let time = TimestampMillisecondArray::from_iter_values(instants());
+        let time = time.with_timezone_opt(zone);
+        let values = Float64Array::from_iter_values((0..30).map(f64::from));
+        write_parquet(
+            &path,
+            &batch(&[("t", Arc::new(time)), ("x", Arc::new(values))]),
+        );
+        let layout = Layout::new("t", TimeForm::Rfc3339, ["x"]);
+        let options = Options {
+            within,
+            ..Options::default()
+        };
+        let rows = rows_of(&path, layout, options).unwrap();
+        rows.iter().map(|row| row.values[0]).collect::<Vec<_>>()
+    };
+    let numbers = |from: u32, to: u32| (from..to).map(f64::from).collect::<Vec<_>>();
+    let at = |nth: usize| instants().nth(nth).unwrap() * 1_000_000;
+    // A group has three rows.
+    assert_eq!(rows(Some("UTC"), None), numbers(0, 30));
+    assert_eq!(rows(Some("UTC"), Some((at(10), at(12)))), numbers(9, 15));
+    assert_eq!(
+        rows(Some("UTC"), Some((at(0) - 5, at(0) - 1))),
+        numbers(0, 0)
+    );
+    // Where it is not said where a clock stands, a day more is read on either side.
+    assert_eq!(rows(None, Some((at(10), at(12)))), numbers(6, 15));
+}
+
+/// Writes over the values of the groups of rows that are not named, so that reading them fails.
+fn spoil(path: &Path, but: &[usize]) {
+    let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+    let mut bytes = std::fs::read(path).unwrap();
+    for (nth, group) in reader.metadata().row_groups().iter().enumerate() {
+        for column in group.columns().iter().filter(|_| !but.contains(&nth)) {
+            let (from, length) = column.byte_range();
+            bytes[from as usize..(from + length) as usize].fill(0xff);
+        }
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn of_a_stretch_no_other_group_is_read_also_where_times_are_numbers_and_rows_are_counted_all_the_same()
+ {
+    let folder = Folder::of("stretch");
+    let path = folder.file("log.parquet");
+    let forms = [
+        (TimeForm::SECONDS, 1.0, 0.0),
+        (
+            TimeForm::Numbers {
+                ns_per_unit: 1_000_000,
+            },
+            1000.0,
+            0.0,
+        ),
+        // Julian days.
+        (
+            TimeForm::Since {
+                ns_per_unit: 86_400_000_000_000,
+                origin_ns: 210_866_760_000_000_000_000,
+            },
+            1.0 / 86_400.0,
+            2_440_587.5,
+        ),
+    ];
+    for (form, of_second, origin) in forms {
+        let time = |nth: u32| origin + f64::from(1_700_000_000 + 60 * nth) * of_second;
+        let times = Float64Array::from_iter_values((0..30).map(time));
+        let cells = (0..30).map(|nth| match nth {
+            13 => "warm".to_owned(),
+            nth => nth.to_string(),
+        });
+        let columns: [(&str, ArrayRef); 2] = [
+            ("time_s", Arc::new(times)),
+            ("x", Arc::new(StringArray::from_iter_values(cells))),
+        ];
+        write_parquet(&path, &batch(&columns));
+        let bound = |nth: u32| Some(Bound::Text(format!("{:?}", time(nth))));
+        let read = |from: u32, to: u32| {
+            let options = Options {
+                stretch: Stretch {
+                    from: bound(from),
+                    to: bound(to),
+                },
+                ..Options::default()
+            };
+            let rows = rows_of(&path, Layout::new("time_s", form.clone(), ["x"]), options);
+            let values = |rows: Vec<Row>| rows.iter().map(|row| row.values[0]).collect::<Vec<_>>();
+            rows.map(values).map_err(|error| error.to_string())
+        };
+        assert_eq!(read(7, 11).unwrap(), [7.0, 8.0, 9.0, 10.0], "{form:?}");
+        // A group has three rows.
+        spoil(&path, &[2, 3, 4]);
+        assert_eq!(read(7, 11).unwrap(), [7.0, 8.0, 9.0, 10.0], "{form:?}");
+        let wrong = read(7, 14).unwrap_err();
+        assert!(
+            wrong.contains("log.parquet:14: ") && wrong.contains("warm"),
+            "{wrong}"
+        );
+        assert!(read(4, 11).is_err(), "the second group cannot be read");
+    }
 }

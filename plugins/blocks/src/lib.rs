@@ -288,6 +288,7 @@ impl KeptBlocks {
             rows: file.rows,
             bytes: file.bytes,
             hash: file.hash,
+            ..DataCard::default()
         });
         Ok(Self {
             days: names_in(folder).map_err(|error| failed(folder, error))?,

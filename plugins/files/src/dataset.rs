@@ -12,7 +12,9 @@ use athermal_run::recording::{self, Samples, Source, SourceError};
 use crate::merge::{self, Joint};
 use crate::recording::offset_of;
 use crate::stream::next_of;
-use crate::{ChannelColumn, FileError, Format, Layout, Options, Report, TimeColumn, TimeForm};
+use crate::{
+    ChannelColumn, FileError, Format, Layout, Options, Report, Stretch, TimeColumn, TimeForm,
+};
 
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
@@ -117,6 +119,13 @@ impl Dataset {
         }
     }
 
+    /// The same rows, of a stretch of time alone.
+    #[must_use]
+    pub fn of_stretch(mut self, stretch: Stretch) -> Self {
+        self.options.stretch = stretch;
+        self
+    }
+
     /// The files.
     #[must_use]
     pub fn paths(&self) -> &[PathBuf] {
@@ -172,22 +181,39 @@ impl Dataset {
     pub fn reports(&self) -> Vec<(String, Report)> {
         self.reports.borrow().clone()
     }
+
+    /// Keeps what was met in each file, once all were read to their end. Of a stretch of time there must be a row.
+    fn ended(&self, reports: Vec<(String, Report)>, time: &TimeColumn) -> Result<(), FileError> {
+        let stretch = &self.options.stretch;
+        if stretch.is_part() && reports.iter().all(|(_, report)| report.rows == 0) {
+            let outside = reports.iter().filter_map(|(_, report)| report.outside);
+            let outside = outside.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1)));
+            let files: Vec<&str> = reports.iter().map(|(name, _)| name.as_str()).collect();
+            return Err(stretch.without_rows(&files.join(", "), time, outside));
+        }
+        *self.reports.borrow_mut() = reports;
+        Ok(())
+    }
 }
 
 impl recording::Recording for Dataset {
     fn open(&self, plan: &Plan) -> Result<Box<dyn Source + '_>, SourceError> {
+        let time = TimeColumn::from(&plan.time);
         if let Some(other) = &self.other {
             return Ok(Box::new(Other {
                 source: other.open(plan)?,
-                name: self.paths[0].display().to_string(),
+                taken: self.options.stretch.of(&time)?.ends(),
+                waiting: None,
                 report: Report::default(),
-                reports: &self.reports,
+                dataset: self,
+                time,
             }));
         }
         let recording = Joint::open(&self.paths, layout(plan), self.options.clone())?;
         Ok(Box::new(Reading {
             recording,
-            reports: &self.reports,
+            dataset: self,
+            time,
         }))
     }
 }
@@ -195,35 +221,71 @@ impl recording::Recording for Dataset {
 /// A recording that is no file.
 struct Other<'a> {
     source: Box<dyn Source + 'a>,
-    name: String,
+    /// The first instant that is taken in ns, and the first behind.
+    taken: Option<(i64, i64)>,
+    /// The first row of a segment, after the break before it was given.
+    waiting: Option<(recording::Event, Samples)>,
     report: Report,
-    reports: &'a RefCell<Vec<(String, Report)>>,
+    dataset: &'a Dataset,
+    time: TimeColumn,
+}
+
+impl Other<'_> {
+    /// Whether a row is taken; what is not is noted.
+    fn takes(&mut self, at: i64) -> bool {
+        let is_taken = self.taken.is_none_or(|(from, to)| (from..to).contains(&at));
+        if !is_taken {
+            let (first, last) = self.report.outside.unwrap_or((at, at));
+            self.report.outside = Some((first.min(at), last.max(at)));
+        }
+        is_taken
+    }
 }
 
 impl Source for Other<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
-        let next = self.source.next(samples)?;
-        match next {
-            Some(recording::Event::Row(_)) => self.report.rows += 1,
-            Some(recording::Event::Segment) => {}
-            None => {
-                *self.reports.borrow_mut() = vec![(self.name.clone(), self.report.clone())];
-            }
+        if let Some((row, of_row)) = self.waiting.take() {
+            *samples = of_row;
+            return Ok(Some(row));
         }
-        Ok(next)
+        let mut breaks = false;
+        loop {
+            let next = self.source.next(samples)?;
+            match next {
+                // One without a row that is taken before it or behind it parts nothing.
+                Some(recording::Event::Segment) if self.taken.is_some() => {
+                    breaks = self.report.rows > 0;
+                    continue;
+                }
+                Some(recording::Event::Row(at)) if !self.takes(at.as_ns()) => continue,
+                Some(recording::Event::Row(_)) => self.report.rows += 1,
+                Some(recording::Event::Segment) => {}
+                None => {
+                    let name = self.dataset.paths[0].display().to_string();
+                    let reports = vec![(name, self.report.clone())];
+                    self.dataset.ended(reports, &self.time)?;
+                }
+            }
+            if let (true, Some(row)) = (breaks, next) {
+                self.waiting = Some((row, std::mem::take(samples)));
+                return Ok(Some(recording::Event::Segment));
+            }
+            return Ok(next);
+        }
     }
 }
 
 struct Reading<'a> {
     recording: Joint,
-    reports: &'a RefCell<Vec<(String, Report)>>,
+    dataset: &'a Dataset,
+    time: TimeColumn,
 }
 
 impl Source for Reading<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<recording::Event>, SourceError> {
         let next = next_of(samples, |row| self.recording.next_into(row))?;
         if next.is_none() {
-            *self.reports.borrow_mut() = self.recording.reports();
+            self.dataset.ended(self.recording.reports(), &self.time)?;
         }
         Ok(next)
     }

@@ -277,6 +277,11 @@ pub enum FileError {
         /// What it is, and what to do.
         reason: String,
     },
+    /// A stretch of time that is asked for cannot be taken.
+    Stretch {
+        /// Why, and what to do.
+        reason: String,
+    },
     /// A table whose cells are parted by spaces.
     CellsOfSpaces {
         /// The header.
@@ -338,6 +343,7 @@ impl FileError {
             | Self::Empty { .. }
             | Self::NotBegun { .. }
             | Self::Unfit { .. }
+            | Self::Stretch { .. }
             | Self::ValueCount { .. } => None,
             Self::StillRefused { newest, .. } => newest.place(),
             Self::Read { place, .. }

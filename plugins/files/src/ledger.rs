@@ -40,6 +40,8 @@ pub struct Report {
     pub without_zone: Option<Place>,
     /// The last line, when it has no end and was left out: it was cut off in the middle, or may have been.
     pub truncated: Option<Place>,
+    /// The first instant and the last of rows that were read and lie outside of the stretch that is taken ([`Options::stretch`](crate::Options::stretch)), in ns.
+    pub outside: Option<(i64, i64)>,
     /// The first instant and the last, in ns; none without rows, and of a file that was read by itself.
     pub period: Option<(i64, i64)>,
     /// Files read before in the same recording, with how many rows are dated within the period of each.

@@ -47,6 +47,7 @@ mod reader;
 mod recording;
 mod runs;
 mod stream;
+mod stretch;
 mod typed;
 mod unpacked;
 mod writer;
@@ -67,7 +68,8 @@ pub use merge::{Joint, MergeError};
 pub use reader::{Options, Reader, Row};
 pub use recording::{DATED_NS, Event, Recording};
 pub use stream::WithRevision;
-pub use typed::{FileKind, Selection, TypedFile, TypedRows, TypedSink, TypedTime};
+pub use stretch::{Bound, Stretch};
+pub use typed::{FileKind, Selection, TypedFile, TypedRows, TypedSink, TypedTime, Within};
 pub use writer::{Flush, Writer};
 
 /// What the macros of this crate use.

@@ -17,7 +17,7 @@ use crate::lines::Lines;
 use crate::long::Long;
 use crate::recording::offset_of;
 use crate::typed::{self, TypedCells, TypedFile};
-use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, TimeColumn};
+use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, Stretch, TimeColumn};
 use commas::Commas;
 use reading::Reading;
 
@@ -42,6 +42,8 @@ pub struct Options {
     pub offsets: Vec<(PathBuf, i64)>,
     /// The first and last instant that is asked for, in ns: what can pass rows outside over without reading them does so.
     pub within: Option<(i64, i64)>,
+    /// The rows that are taken, by their times with what is added to them: others are as if they were not there.
+    pub stretch: Stretch,
     /// The time of files that have another than the layout says.
     pub times: Vec<(PathBuf, TimeColumn)>,
 }
@@ -104,6 +106,8 @@ impl Reader {
         through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
+        let stretch = options.stretch.of(&layout.time)?;
+        let options = Options { stretch, ..options };
         if let Some((_, time)) = options.times.iter().find(|(file, _)| file == path) {
             layout.time = time.clone();
         }
@@ -151,7 +155,8 @@ impl Reader {
     ) -> Result<Self, FileError> {
         lines.only_whole = options.goes_on;
         let wanted = wanted(&layout, table);
-        let (rows, separator) = match lines.format_or(options.format)? {
+        let taken = taken(Path::new(&*lines.place().file), &layout, &options)?;
+        let rows = match lines.format_or(options.format)? {
             Format::JsonLines => (Rows::Json(Box::new(JsonRows::new(lines, &wanted)?)), None),
             _ => {
                 let rows = CsvRows::new(lines, &wanted, table)?;
@@ -159,7 +164,7 @@ impl Reader {
                 (Rows::Csv(Box::new(rows)), Some(separator))
             }
         };
-        Ok(Self::of_rows(rows, separator, layout, table, &options))
+        Ok(Self::of_rows(rows, layout, table, &options, taken))
     }
 
     /// Reads columns that are no text, such as those of a data frame; the path stands for them in messages.
@@ -178,18 +183,23 @@ impl Reader {
         let numbers = if is_long { 0 } else { layout.channels.len() };
         let offset = offset_of(path, &options);
         let own = |at: i64| at.saturating_sub(offset);
+        let taken = taken(path, &layout, &options)?;
         let within = options.within.map(|(from, to)| (own(from), own(to)));
+        let within = match (within, taken) {
+            (Some((from, to)), Some(taken)) => Some((from.max(taken.0), to.min(taken.1))),
+            _ => within.or(taken),
+        };
         let cells = TypedCells::new(path, file, &wanted, numbers, within)?;
         let rows = Rows::Typed(Box::new(cells));
-        Ok(Self::of_rows(rows, None, layout, &table, &options))
+        Ok(Self::of_rows((rows, None), layout, &table, &options, taken))
     }
 
     fn of_rows(
-        rows: Rows,
-        separator: Option<u8>,
+        (rows, separator): (Rows, Option<u8>),
         layout: Layout,
         table: &TableFormat,
         options: &Options,
+        taken: Option<(i64, i64)>,
     ) -> Self {
         let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout));
         let cells = if long.is_some() {
@@ -216,6 +226,7 @@ impl Reader {
                 ahead: None,
                 joins,
                 lookahead: Lookahead::default(),
+                taken,
             },
             waiting: None,
         }
@@ -296,6 +307,17 @@ impl Reader {
     pub fn layout(&self) -> &Layout {
         &self.reading.layout
     }
+}
+
+/// The first instant that is taken of a file and the first behind, by its own clock; none where all are.
+fn taken(path: &Path, layout: &Layout, options: &Options) -> Result<Option<(i64, i64)>, FileError> {
+    let ends = options.stretch.of(&layout.time)?.ends();
+    // What has no end there has none by any clock.
+    let own = |at: i64| match at {
+        i64::MIN | i64::MAX => at,
+        at => at.saturating_sub(offset_of(path, options)),
+    };
+    Ok(ends.map(|(from, to)| (own(from), own(to))))
 }
 
 /// The columns whose cells are read: those of the channels, or where a row has one value its name and that; behind them the one for

@@ -9,7 +9,7 @@ use crate::cells::{Cells, Numbers};
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
 use crate::lent;
-use crate::{FileError, Layout, Place};
+use crate::{FileError, Layout, Place, TimeForm};
 
 /// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
 #[derive(Debug)]
@@ -57,8 +57,17 @@ pub struct Selection {
     pub values: Vec<Option<usize>>,
     /// The columns of texts; the same.
     pub texts: Vec<Option<usize>>,
-    /// The first and last instant that is asked for, in ns: rows outside may be passed over, and need not be. All where there is none.
-    pub within: Option<(i64, i64)>,
+    /// The stretch of time that is asked for: rows outside may be passed over, and need not be. All where there is none.
+    pub within: Option<Within>,
+}
+
+/// A stretch of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Within {
+    /// Its first and its last instant, in ns.
+    pub ends: (i64, i64),
+    /// Of times that are numbers how many ns one is, and how far before 1970 they begin, in ns.
+    pub unit: Option<(i64, i128)>,
 }
 
 /// What a cell of the time is.
@@ -92,6 +101,10 @@ pub trait TypedRows: Send {
     fn no_numbers(&self) -> &[(usize, String)];
     /// A cell as a text, by its place in the [`Selection`]; empty where there is none.
     fn text(&self, index: usize) -> &[u8];
+    /// How many rows of the file were passed over before the one that is given as the `nth`, from 1 on.
+    fn passed_over(&self, _nth: u64) -> u64 {
+        0
+    }
 }
 
 /// Takes rows to a file.
@@ -170,6 +183,15 @@ impl TypedCells {
         numbers: usize,
         within: Option<(i64, i64)>,
     ) -> Result<Self, FileError> {
+        let unit = match layout.time.form {
+            TimeForm::Numbers { ns_per_unit } => Some((ns_per_unit, 0)),
+            TimeForm::Samples { step_ns } => Some((step_ns, 0)),
+            TimeForm::Since {
+                ns_per_unit,
+                origin_ns,
+            } => Some((ns_per_unit, origin_ns)),
+            _ => None,
+        };
         let place = Place {
             file: path.display().to_string().into(),
             line: 0,
@@ -189,6 +211,7 @@ impl TypedCells {
             );
             return Err(FileError::unfit(path, reason));
         }
+        let within = within.map(|ends| Within { ends, unit });
         Self::of(path, file, names, columns, numbers, within)
     }
 
@@ -208,7 +231,7 @@ impl TypedCells {
         names: Vec<String>,
         columns: Columns,
         numbers: usize,
-        within: Option<(i64, i64)>,
+        within: Option<Within>,
     ) -> Result<Self, FileError> {
         let (values, texts) = columns.channels.split_at(numbers);
         let wanted = Selection {
@@ -265,7 +288,7 @@ impl Cells for TypedCells {
     fn place(&self) -> Place {
         Place {
             file: self.file.clone(),
-            line: self.row,
+            line: self.row + self.rows.passed_over(self.row),
         }
     }
 

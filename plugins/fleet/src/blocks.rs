@@ -30,7 +30,7 @@ pub struct BlockOptions {
     pub blocks: Option<Cut>,
     /// Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of the data only
     /// what is new or changed
-    #[arg(long, value_name = "FOLDER", requires = "blocks")]
+    #[arg(long, value_name = "FOLDER", requires = "blocks", conflicts_with_all = ["from", "to"])]
     pub keep_blocks: Option<PathBuf>,
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use athermal_core::quantity::Quantity;
+use athermal_files::{Bound, Stretch};
 use athermal_run::model::Model;
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,36 @@ pub struct Reading {
     /// Merge files of different columns by time although their times are no dates
     #[arg(long, conflicts_with = "segments")]
     pub merge: bool,
+    /// Which rows of them are taken.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub times: Times,
+}
+
+/// Which rows of data are taken, by their times.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args, Serialize, Deserialize)]
+pub struct Times {
+    /// Read rows from this time on alone: an instant (`2026-03-01T06:00:00Z`), a date, or what stands in the log's column of time, such as
+    /// seconds. Without an offset from UTC it goes by the `zone` of `[time]`
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Read rows before this time alone
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+}
+
+impl Times {
+    /// The same for the reader.
+    #[must_use]
+    pub fn stretch(&self) -> Stretch {
+        let bound = |text: &Option<String>| text.clone().map(Bound::Text);
+        Stretch {
+            from: bound(&self.from),
+            to: bound(&self.to),
+        }
+    }
 }
 
 impl Reading {
@@ -33,6 +64,7 @@ impl Reading {
             lenient: self.lenient,
             segments: self.segments,
             merge: self.merge,
+            stretch: self.times.stretch(),
             ..athermal_files::Options::default()
         }
     }

@@ -64,10 +64,10 @@ impl RowsId {
     #[must_use]
     pub fn card(&self) -> DataCard {
         DataCard {
-            path: String::new(),
             rows: self.rows,
             bytes: self.bytes,
             hash: self.hash.clone(),
+            ..DataCard::default()
         }
     }
 }

@@ -111,8 +111,7 @@ pub fn propose(
     let of = DataCard {
         path: "journal".to_owned(),
         rows,
-        bytes: 0,
-        hash: String::new(),
+        ..DataCard::default()
     };
     model.card = Some(Card::of(&report, vec![of], created));
     Ok(Proposal { model, ratio })

@@ -1,7 +1,7 @@
 //! Calling cargo and maturin, and what is reported where one is missing or fails.
 
 use std::ffi::{OsStr, OsString};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
 use serde_json::Value;
@@ -69,13 +69,20 @@ impl Cargo {
         built(status, "cargo", folder)
     }
 
-    /// Builds the wheel of the crate in a folder, into another folder.
+    /// Builds the wheel of the crate in a folder, into another folder, for an interpreter.
     ///
     /// # Errors
     /// When maturin fails.
-    pub(super) fn build_wheel(&self, folder: &Path, into: &Path) -> Result<(), Failure> {
+    pub(super) fn build_wheel(
+        &self,
+        folder: &Path,
+        into: &Path,
+        python: &OsStr,
+    ) -> Result<(), Failure> {
         let mut command = self.called(&maturin(), folder, "build");
         command.arg("--out").arg(into);
+        command.arg("--interpreter").arg(python);
+        command.env("PYO3_PYTHON", python);
         let status = self.release(command);
         let status = status.map_err(|error| without_maturin(&error))?;
         built(status, "maturin", folder)
@@ -122,6 +129,39 @@ pub(super) fn find_maturin() -> Result<(), Failure> {
     let mut asked = Command::new(maturin());
     let answer = asked.arg("--version").output();
     answer.map(drop).map_err(|error| without_maturin(&error))
+}
+
+/// The interpreter that a wheel is built for: the one that is asked for, else what `PYO3_PYTHON` names, else `python3`.
+///
+/// # Errors
+/// When it is not there, or too old.
+pub(super) fn find_python(asked: Option<&Path>) -> Result<OsString, Failure> {
+    let of_environment = || std::env::var_os("PYO3_PYTHON").filter(|of| !of.is_empty());
+    let python = asked.map(|path| path.as_os_str().to_owned());
+    let python = python.or_else(of_environment);
+    let python = python.unwrap_or_else(|| "python3".into());
+    // The project is built in another folder.
+    let python = match Path::new(&python).components().count() {
+        2.. => std::path::absolute(&python).map_or(python, PathBuf::into_os_string),
+        _ => python,
+    };
+    let what = "import sys; print(sys.version_info >= (3, 10), sys.version.split()[0])";
+    let answer = Command::new(&python).args(["-c", what]).output();
+    let shown = python.display();
+    let failed = |why: &str| {
+        Failure::Outside(format!(
+            "`{shown}` is no Python that runs ({why}); name the interpreter that the wheel is for with `--python PATH`"
+        ))
+    };
+    let answer = answer.map_err(|error| failed(&error.to_string()))?;
+    let version = String::from_utf8_lossy(&answer.stdout);
+    match version.trim().split_once(' ') {
+        Some(("True", _)) => Ok(python),
+        Some((_, version)) => Err(Failure::Request(format!(
+            "`{shown}` is Python {version}, and the package needs 3.10 or later; name another with `--python PATH`"
+        ))),
+        None => Err(failed(&answer.status.to_string())),
+    }
 }
 
 fn without_maturin(error: &std::io::Error) -> Failure {

@@ -5,6 +5,7 @@ mod project;
 mod wish;
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -15,7 +16,7 @@ use serde_json::{Value, json};
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal::run::live::store::copy_whole;
-use cargo::{Cargo, find_maturin};
+use cargo::{Cargo, find_maturin, find_python};
 use project::Product;
 use wish::Wish;
 
@@ -41,6 +42,9 @@ pub struct Build {
     /// Build the Python package with these crates instead, as a wheel; needs maturin
     #[arg(long)]
     wheel: bool,
+    /// The Python that the wheel is built for and asked with, 3.10 or later; by default what `PYO3_PYTHON` names, else `python3`
+    #[arg(long, value_name = "PATH", requires = "wheel")]
+    python: Option<PathBuf>,
     /// The folder of the cargo project; by default the name of what is built and `-project`
     #[arg(long, value_name = "DIR")]
     project: Option<PathBuf>,
@@ -66,8 +70,10 @@ impl Build {
         let wishes = self.with.iter().map(|text| Wish::read(text));
         let wishes: Vec<Wish> = wishes.collect::<Result<_, _>>()?;
         let folder = self.folder();
+        let mut python = None;
         let product = if self.wheel {
             find_maturin()?;
+            python = Some(find_python(self.python.as_deref())?);
             Product::Wheel
         } else {
             Product::Program
@@ -84,19 +90,20 @@ impl Build {
         without_testkit(&resolved)?;
         let target = resolved["target_directory"].as_str().unwrap_or_default();
         let target = Path::new(target).join("release");
-        let built = match product {
-            Product::Program => {
+        let built = match python {
+            None => {
                 cargo.build(&folder)?;
                 Built::Program(target.join(format!("athermal{EXE_SUFFIX}")))
             }
-            Product::Wheel => {
+            Some(python) => {
                 let into =
                     std::path::absolute(&self.output).unwrap_or_else(|_| self.output.clone());
-                cargo.build_wheel(&folder, &into)?;
-                Built::Package(
-                    folder.clone(),
-                    target.join(format!("{DLL_PREFIX}athermal_with_plugins{DLL_SUFFIX}")),
-                )
+                cargo.build_wheel(&folder, &into, &python)?;
+                Built::Package {
+                    folder: folder.clone(),
+                    library: target.join(format!("{DLL_PREFIX}athermal_with_plugins{DLL_SUFFIX}")),
+                    python,
+                }
             }
         };
         let kinds = built.known("nodes", "nodes")?;
@@ -178,8 +185,15 @@ fn brought(all: &[Known], package: &str) -> String {
 enum Built {
     /// A program.
     Program(PathBuf),
-    /// The folder of a Python package, and the library that belongs into it.
-    Package(PathBuf, PathBuf),
+    /// A Python package.
+    Package {
+        /// Its folder.
+        folder: PathBuf,
+        /// The library that belongs into it.
+        library: PathBuf,
+        /// What runs it.
+        python: OsString,
+    },
 }
 
 impl Built {
@@ -190,7 +204,7 @@ impl Built {
             let mut listed: Value = serde_json::from_slice(&output.stdout)?;
             Ok(serde_json::from_value(listed[what].take())?)
         };
-        let (Self::Program(path) | Self::Package(path, _)) = self;
+        let (Self::Program(path) | Self::Package { folder: path, .. }) = self;
         listed().map_err(|error| {
             Failure::Outside(format!(
                 "{} was built and cannot list its {what}: {error}",
@@ -202,10 +216,14 @@ impl Built {
     fn called(&self, words: &[&str]) -> Result<Output, std::io::Error> {
         match self {
             Self::Program(program) => Command::new(program.canonicalize()?).args(words).output(),
-            Self::Package(folder, library) => {
+            Self::Package {
+                folder,
+                library,
+                python,
+            } => {
                 let beside = folder.join("athermal").join("_athermal.abi3.so");
                 std::fs::copy(library, &beside)?;
-                let python = Command::new("python3")
+                let python = Command::new(python)
                     .args(["-m", "athermal"])
                     .args(words)
                     .current_dir(folder)

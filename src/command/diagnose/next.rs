@@ -1,7 +1,5 @@
 //! The commands worth trying after a diagnosis: two at most, each for something that was found.
 
-use std::path::PathBuf;
-
 use athermal::Model;
 use athermal::diagnosis::lag::FeatureLags;
 use athermal::diagnosis::text::is_of;
@@ -33,10 +31,10 @@ impl Diagnose {
     /// Fits the graph anew on what the model was fitted on, since what is diagnosed is kept for tests; on what is diagnosed where the
     /// model does not say. More data may follow.
     fn fit(&self, model: &Model, more: &[&str]) -> String {
-        let cards = model.card.iter().flat_map(|card| &card.data);
-        let cards = cards.filter(|card| !card.path.is_empty());
-        let seen: Vec<PathBuf> = cards.map(|card| PathBuf::from(&card.path)).collect();
-        let seen = (!seen.is_empty()).then(|| self.data.others(seen));
+        let seen = model
+            .card
+            .as_ref()
+            .and_then(|card| self.data.of_fit(&card.data));
         let data = seen.as_ref().unwrap_or(&self.data);
         let mut words = data.words_with("fit", &self.model);
         words.extend(more.iter().map(|&word| word.to_owned()));

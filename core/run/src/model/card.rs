@@ -39,7 +39,7 @@ pub struct Card {
 }
 
 /// A file that was read, or rows that came from elsewhere.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DataCard {
     /// Its path as given; empty where rows did not come from a file.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -50,6 +50,12 @@ pub struct DataCard {
     pub bytes: u64,
     /// A checksum of its content, by which files are known again, or of the values of the rows (FNV-1a, 64 bits).
     pub hash: String,
+    /// Rows from this time on alone were taken, as it was given. The checksum is of the rows then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// The same of rows before a time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
 }
 
 impl DataCard {
@@ -64,7 +70,14 @@ impl DataCard {
             rows,
             bytes,
             hash,
+            ..Self::default()
         })
+    }
+
+    /// Whether rows of a stretch of time alone were taken.
+    #[must_use]
+    pub fn is_part(&self) -> bool {
+        self.from.is_some() || self.to.is_some()
     }
 
     /// Whether a file has the content of this one. Only a file of the same length is read for its checksum.

@@ -6,6 +6,9 @@ use crate::diagnostic::{Names, Place, names, nearest, problem};
 use crate::quantity::Quantity;
 use crate::unit::Unit;
 
+/// Kinds of sources and sinks that the program has only where it was built with the feature of that name.
+const OF_FEATURES: [&str; 2] = ["mqtt", "parquet"];
+
 problem! {
     /// A `type` that no linked crate brings.
     A200 UnknownKind {
@@ -19,6 +22,9 @@ problem! {
     message: format!("there is no kind of {role} `{kind}`"),
     label: "no such kind",
     help: match nearest(kind, known.iter().copied()) {
+        _ if OF_FEATURES.contains(&&**kind) => {
+            format!("this needs a program that was built with `--features {kind}`")
+        }
         Some(near) => format!("did you mean `{near}`?"),
         None => format!(
             "`athermal build --with CRATE` brings those of a plugin crate; kinds of {role}s in this program: {}",

@@ -33,5 +33,4 @@ pub use record::{Record, output_hash};
 pub use recorder::{JournalOptions, Recorder};
 pub use recording::JournalRecording;
 pub use retention::{Keep, oldest, retire};
-
-pub(crate) use writer::sync_folder;
+pub use writer::sync_folder;

@@ -222,6 +222,7 @@ impl FileError {
                 "`{found}` stands behind the last column that has a name; it is passed over"
             ),
             Self::Unfit { file, reason } => write!(f, "{file}: {reason}"),
+            Self::Stretch { reason } => f.write_str(reason),
             Self::CellsOfSpaces { .. } => f.write_str(
                 "the cells are parted by spaces, which is not read; write commas between them, as `tr -s ' ' ',' < LOG` does"
             ),

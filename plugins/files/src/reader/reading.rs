@@ -32,6 +32,8 @@ pub(super) struct Reading {
     /// Where rows of one time are put together.
     pub(super) joins: bool,
     pub(super) lookahead: Lookahead,
+    /// The first instant that is taken in ns, and the first behind; none where all are.
+    pub(super) taken: Option<(i64, i64)>,
 }
 
 /// A row with the cell that its time is from.
@@ -188,6 +190,14 @@ impl Reading {
             let Some(time_ns) = self.read_time(rows, &mut row.time_text)? else {
                 continue;
             };
+            if let Some((from, to)) = self.taken
+                && !(from..to).contains(&time_ns)
+            {
+                let outside = &mut self.ledger.report.outside;
+                let (first, last) = outside.unwrap_or((time_ns, time_ns));
+                *outside = Some((first.min(time_ns), last.max(time_ns)));
+                continue;
+            }
             row.time_ns = time_ns;
             row.begins_segment = self.segment_cell.is_some_and(|at| {
                 let segment = cell::trim(rows.channel(at));

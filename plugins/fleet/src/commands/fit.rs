@@ -8,6 +8,7 @@ use athermal_command::{Answer, Failure, Format, Terminal, numbers, println};
 use athermal_core::compile::Wanted;
 use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_core::time::Duration;
+use athermal_files::TimeColumn;
 use athermal_run::live::store::{FileLock, write_whole};
 use athermal_run::model::Model;
 use clap::Args;
@@ -189,6 +190,9 @@ impl Fit {
         let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
         let graph = Model::load_to_fit(&self.graph, Wanted::default(), &mut sources, &mut doubts)?;
         terminal.doubts(&doubts, &sources);
+        // What is wrong with these is wrong for all machines.
+        let times = self.files.reading.times.stretch();
+        times.of(&TimeColumn::from(&graph.plan.time))?;
         graph_hash(&graph).map_err(|error| Failure::Outside(error.to_string()))
     }
 

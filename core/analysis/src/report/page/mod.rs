@@ -260,10 +260,16 @@ fn card(html: &mut String, facts: &Facts) {
     html.push_str(".</p><ul>");
     for data in &card.data {
         let path = Some(&*data.path).filter(|path| !path.is_empty());
+        let time = |word: &str, of: &Option<String>| {
+            let of = of.as_deref().map(escaped);
+            of.map_or(String::new(), |of| format!(" {word} {of}"))
+        };
         let _ = write!(
             html,
-            "<li>{}: {} rows, {} bytes, checksum {}</li>",
+            "<li>{}{}{}: {} rows, {} bytes, checksum {}</li>",
             escaped(path.unwrap_or("rows from elsewhere")),
+            time("from", &data.from),
+            time("to", &data.to),
             data.rows,
             data.bytes,
             escaped(&data.hash)

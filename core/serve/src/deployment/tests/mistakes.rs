@@ -44,6 +44,10 @@ fn a_kind_or_key_that_there_is_not_is_reported_with_the_nearest() {
         &format!("{TABLE}[sinks.b]\ntype = \"test_stag\"\n"),
         &["A200 … no kind of sink `test_stag` … did you mean `test_stage`?"],
     );
+    assert_wrong(
+        &format!("{TABLE}[sinks.b]\ntype = \"parquet\"\n"),
+        &["A200 … no kind of sink `parquet` … a program that was built with `--features parquet`"],
+    );
 }
 
 #[test]
