@@ -26,7 +26,7 @@ pub fn fit_on_blocks(
     options: &FitOptions,
     terminal: &Terminal,
 ) -> Result<FitOutcome, Failure> {
-    check_blocks(&model.plan).map_err(|error| Failure::Request(error.to_string()))?;
+    check_blocks(&model.plan).map_err(FitError::from)?;
     let mut faults = Vec::new();
     let mut progress = terminal.progress("summing");
     let plan = &model.plan;

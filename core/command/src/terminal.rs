@@ -8,7 +8,7 @@ use std::time::Duration;
 use athermal_analysis::figures::counted;
 use athermal_core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
 use athermal_files::FileError;
-use athermal_run::fit::{BlockError, FitError};
+use athermal_run::fit::FitError;
 use athermal_run::live::{RunError, StateError};
 use athermal_run::model::ModelError;
 use athermal_trial::fault::FaultError;
@@ -397,9 +397,7 @@ impl From<StateError> for Failure {
 pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
     match error.downcast::<FileError>() {
         Ok(error) => (*error).into(),
-        Err(error) if error.is::<FaultError>() || error.is::<BlockError>() => {
-            Failure::Request(error.to_string())
-        }
+        Err(error) if error.is::<FaultError>() => Failure::Request(error.to_string()),
         Err(error) => Failure::Outside(error.to_string()),
     }
 }
@@ -408,7 +406,7 @@ impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
         match error {
             FitError::Recording(error) => outside(error),
-            FitError::Engine(error) => Self::Request(error.to_string()),
+            FitError::Engine(_) | FitError::Blocks(_) => Self::Request(error.to_string()),
             FitError::Panicked { .. } => Self::Outside(error.to_string()),
         }
     }

@@ -108,7 +108,7 @@ impl std::error::Error for BlockError {}
 
 impl From<BlockError> for FitError {
     fn from(error: BlockError) -> Self {
-        Self::Recording(error.into())
+        Self::Blocks(error)
     }
 }
 

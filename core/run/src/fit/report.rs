@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::BlockError;
 use crate::engine::{EngineError, SampleRange};
 use crate::node::{TrainingError, TrainingReport};
 use crate::recording::SourceError;
@@ -17,6 +18,8 @@ pub enum FitError {
     Recording(SourceError),
     /// The engine cannot be built.
     Engine(EngineError),
+    /// The fit cannot be made by blocks.
+    Blocks(BlockError),
     /// A node panicked.
     Panicked {
         /// Which, when, and what it says.
@@ -29,6 +32,7 @@ impl fmt::Display for FitError {
         match self {
             Self::Recording(error) => write!(f, "{error}"),
             Self::Engine(error) => write!(f, "{error}"),
+            Self::Blocks(error) => write!(f, "{error}"),
             Self::Panicked { text } => write!(f, "the fit cannot go on: {text}"),
         }
     }
