@@ -6,8 +6,8 @@ use crate::diagnostic::{Names, Place, names, nearest, problem};
 use crate::quantity::Quantity;
 use crate::unit::Unit;
 
-/// Kinds of sources and sinks that the program has only where it was built with the feature of that name.
-const OF_FEATURES: [&str; 2] = ["mqtt", "parquet"];
+/// Roles and kinds that the program has only where it was built with the feature of that name.
+const OF_FEATURES: [(&str, &str); 3] = [("source", "mqtt"), ("sink", "mqtt"), ("sink", "parquet")];
 
 problem! {
     /// A `type` that no linked crate brings.
@@ -22,7 +22,7 @@ problem! {
     message: format!("there is no kind of {role} `{kind}`"),
     label: "no such kind",
     help: match nearest(kind, known.iter().copied()) {
-        _ if OF_FEATURES.contains(&&**kind) => {
+        _ if OF_FEATURES.contains(&(*role, &**kind)) => {
             format!("this needs a program that was built with `--features {kind}`")
         }
         Some(near) => format!("did you mean `{near}`?"),

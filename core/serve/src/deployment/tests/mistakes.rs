@@ -48,6 +48,11 @@ fn a_kind_or_key_that_there_is_not_is_reported_with_the_nearest() {
         &format!("{TABLE}[sinks.b]\ntype = \"parquet\"\n"),
         &["A200 … no kind of sink `parquet` … a program that was built with `--features parquet`"],
     );
+    // No program reads it as a source.
+    assert_wrong(
+        "[sources.a]\ntype = \"parquet\"\n",
+        &["A200 … no kind of source `parquet` … kinds of sources in this program"],
+    );
 }
 
 #[test]
