@@ -1,8 +1,10 @@
 //! The command line as a whole; each command stands in a file of its own.
 
+use std::env::consts::{ARCH, OS};
 use std::ffi::OsString;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
@@ -22,6 +24,29 @@ Start here:
 `athermal COMMAND --help` says more, with examples.
 Exit status: 0 fine, 1 the answer is no, 2 the request was wrong, 3 something
 outside failed, such as reading a file.";
+
+/// What `--version` says: the version, how the program was built, and from which commit where a release says so.
+static BUILT: LazyLock<String> = LazyLock::new(|| {
+    let features = [
+        ("mqtt", cfg!(feature = "mqtt")),
+        ("tls", cfg!(feature = "tls")),
+        ("parquet", cfg!(feature = "parquet")),
+    ];
+    let features = features.iter().filter(|(_, is_in)| *is_in);
+    let features: Vec<&str> = features.map(|(name, _)| *name).collect();
+    let libc = match () {
+        () if cfg!(target_env = "gnu") => "-gnu",
+        () if cfg!(target_env = "musl") => "-musl",
+        () if cfg!(target_env = "msvc") => "-msvc",
+        () => "",
+    };
+    let commit = option_env!("ATHERMAL_COMMIT").unwrap_or("not of a release");
+    format!(
+        "{}\nfeatures: {}\ntarget: {ARCH}-{OS}{libc}\ncommit: {commit}",
+        env!("CARGO_PKG_VERSION"),
+        features.join(" ")
+    )
+});
 
 /// The command line of athermal, with every plugin that the program links: all that its `main` has to do.
 #[must_use]
@@ -68,6 +93,7 @@ fn run(arguments: &ArgMatches, terminal: &mut Terminal) -> Result<Answer, Failur
 pub fn whole() -> clap::Command {
     let whole = clap::Command::new("athermal")
         .version(env!("CARGO_PKG_VERSION"))
+        .long_version(BUILT.as_str())
         .subcommand_required(true)
         .arg_required_else_help(true)
         .max_term_width(80)

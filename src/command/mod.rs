@@ -18,6 +18,7 @@ pub(crate) mod fit;
 mod fit_blocks;
 pub(crate) mod found;
 pub(crate) mod init;
+mod man;
 pub(crate) mod model;
 mod new;
 mod nodes;
@@ -68,7 +69,7 @@ commands! {
     Explain(explain::Explain), Diff(diff::Diff), Nodes(nodes::Nodes), Fit(fit::Fit),
     Evaluate(evaluate::Evaluate), Compare(compare::Compare), Diagnose(diagnose::Diagnose),
     Report(report::Report), Run(run::Run), Serve(serve::Serve), Replay(replay::Replay), Simulate(simulate::Simulate),
-    Completions(completions::Completions), Test(test::Test), Schema(schema::Schema),
+    Completions(completions::Completions), Man(man::Man), Test(test::Test), Schema(schema::Schema),
     New(new::New), Build(build::Build),
 }
 

@@ -266,3 +266,42 @@ fn shells_get_their_completions() {
         assert!(script.contains("simulate"), "{shell}");
     }
 }
+
+#[test]
+fn the_version_says_how_the_program_was_built_and_from_which_commit() {
+    let folder = Folder::new("version");
+    let (out, _) = folder.fine(&["--version"]);
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(out.starts_with(&format!("athermal {version}\n")), "{out}");
+    let line = |name: &str| out.lines().find_map(|line| line.strip_prefix(name));
+    let features = line("features: ").unwrap();
+    assert_eq!(features.contains("mqtt"), cfg!(feature = "mqtt"), "{out}");
+    assert_eq!(features.contains("parquet"), cfg!(feature = "parquet"));
+    assert!(line("target: ").unwrap().starts_with(std::env::consts::ARCH));
+    assert_eq!(line("commit: "), Some("not of a release"));
+    assert_eq!(folder.fine(&["-V"]).0, format!("athermal {version}\n"));
+}
+
+#[test]
+fn each_command_has_a_page_in_the_manual_with_what_its_help_says() {
+    let folder = Folder::new("man");
+    folder.fine(&["man", "pages/of/man1"]);
+    let page = |name: &str| {
+        let path = folder.0.join(format!("pages/of/man1/{name}.1"));
+        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    assert!(page("athermal").contains("athermal\\-fit"));
+    let (help, _) = folder.fine(&["--help"]);
+    let (_, commands) = help.split_once("Commands:\n").unwrap();
+    let commands = commands.lines().take_while(|line| !line.is_empty());
+    let commands = commands.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    let commands: Vec<&str> = commands.filter(|name| !name.is_empty() && *name != "help").collect();
+    assert!(commands.len() > 30, "{commands:?}");
+    for command in commands {
+        assert!(page(&format!("athermal-{command}")).contains("SYNOPSIS"));
+    }
+    assert!(page("athermal-fit").contains("\\-\\-data"));
+    std::fs::write(folder.0.join("file"), "").unwrap();
+    let output = folder.run(&["man", "file"]);
+    assert_eq!(output.status.code(), Some(3));
+}

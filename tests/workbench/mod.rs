@@ -41,6 +41,15 @@ pub fn case(name: &str) -> Option<PathBuf> {
     None
 }
 
+/// The die tester's graph of the one axis Z1, which is fitted and looked at in a sixth of the time.
+pub fn one_axis(scratch: &Scratch) -> PathBuf {
+    let graph = graph("die-tester");
+    scratch.file(
+        "one-axis.toml",
+        format!("schema = 1\nextends = {graph:?}\nsets.axis = [\"Z1\"]\ntests = []\n"),
+    )
+}
+
 /// A graph file of this project.
 pub fn graph(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");

@@ -12,17 +12,27 @@ use crate::terminal::Failure;
 #[derive(Debug)]
 pub(super) struct Cargo {
     program: OsString,
+    profile: String,
     offline: bool,
     quiet: bool,
 }
 
 impl Cargo {
-    /// With `quiet` it prints errors only.
-    pub(super) fn new(offline: bool, quiet: bool) -> Self {
+    /// One that builds in a profile; with `quiet` it prints errors only.
+    pub(super) fn new(profile: &str, offline: bool, quiet: bool) -> Self {
         Self {
             program: std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()),
+            profile: profile.to_owned(),
             offline,
             quiet,
+        }
+    }
+
+    /// The folder of what is built, inside of the target folder.
+    pub(super) fn folder(&self) -> &str {
+        match &*self.profile {
+            "dev" => "debug",
+            other => other,
         }
     }
 
@@ -64,7 +74,7 @@ impl Cargo {
     /// When cargo is not there or fails.
     pub(super) fn build(&self, folder: &Path) -> Result<(), Failure> {
         let command = self.command(folder, "build");
-        let status = self.release(command);
+        let status = self.in_profile(command);
         let status = status.map_err(|error| self.missing(&error))?;
         built(status, "cargo", folder)
     }
@@ -83,13 +93,14 @@ impl Cargo {
         command.arg("--out").arg(into);
         command.arg("--interpreter").arg(python);
         command.env("PYO3_PYTHON", python);
-        let status = self.release(command);
+        let status = self.in_profile(command);
         let status = status.map_err(|error| without_maturin(&error))?;
         built(status, "maturin", folder)
     }
 
-    fn release(&self, mut command: Command) -> std::io::Result<ExitStatus> {
-        command.arg("--release").stdout(Stdio::null());
+    fn in_profile(&self, mut command: Command) -> std::io::Result<ExitStatus> {
+        command.args(["--profile", &self.profile]);
+        command.stdout(Stdio::null());
         if self.quiet {
             command.arg("--quiet");
         }

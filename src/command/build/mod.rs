@@ -48,6 +48,9 @@ pub struct Build {
     /// The folder of the cargo project; by default the name of what is built and `-project`
     #[arg(long, value_name = "DIR")]
     project: Option<PathBuf>,
+    /// The profile of cargo: `dev` is compiled sooner and runs slower
+    #[arg(long, value_name = "NAME", default_value = "release")]
+    profile: String,
     /// Take crates from this folder, as `cargo vendor` writes it, and never from a network
     #[arg(long, value_name = "DIR")]
     vendored: Option<PathBuf>,
@@ -66,7 +69,11 @@ impl Build {
     /// When athermal or a crate is not found, they do not go together, or cargo fails.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let checkout = Checkout::find(self.athermal.as_deref())?;
-        let cargo = Cargo::new(self.offline || self.vendored.is_some(), terminal.quiet);
+        let cargo = Cargo::new(
+            &self.profile,
+            self.offline || self.vendored.is_some(),
+            terminal.quiet,
+        );
         let wishes = self.with.iter().map(|text| Wish::read(text));
         let wishes: Vec<Wish> = wishes.collect::<Result<_, _>>()?;
         let folder = self.folder();
@@ -89,7 +96,7 @@ impl Build {
         one_core(&resolved, &wishes)?;
         without_testkit(&resolved)?;
         let target = resolved["target_directory"].as_str().unwrap_or_default();
-        let target = Path::new(target).join("release");
+        let target = Path::new(target).join(cargo.folder());
         let built = match python {
             None => {
                 cargo.build(&folder)?;

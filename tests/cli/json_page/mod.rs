@@ -293,6 +293,7 @@ fn printed(scratch: &Scratch) -> Vec<(&'static str, Value)> {
 extends = {:?}
 tests = []
 [sets]
+axis = ["Z1"]
 sensor = ["room", "chuck"]
 [nodes.side]
 type = "linear"
