@@ -382,7 +382,7 @@ fn told_soon(files: &Memory, told: &str, help: &str) -> usize {
         .find(|found| found.message.contains(told));
     let found = one.and_then(|found| found.help.as_deref());
     assert_eq!(found, Some(help), "{told}");
-    assert!(taken < TOO_LONG, "{told}: {taken:?}");
+    assert!(taken < TOO_LONG / 3, "{told}: {taken:?}");
     diagnostics.error_count()
 }
 
@@ -398,12 +398,12 @@ fn thousands_of_unknown_references_are_told_soon() {
     }
     text.push_str("[outputs]\nfirst = \"slope_0000\"\n");
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "slop_1999", "did you mean `slope_1999`?");
+    let errors = told_soon(&files, "slop_0999", "did you mean `slope_0999`?");
     assert_eq!(errors, 2 * MANY);
 }
 
 /// How many names there are, and how many more are not there, of each sort of names that a file may have many of.
-const MANY: usize = 2_000;
+const MANY: usize = 1_000;
 
 /// A graph of nodes that read a signal, with what each of them has beside its type.
 fn of_nodes(before: &str, each: impl Fn(usize) -> String) -> String {
@@ -432,13 +432,13 @@ fn signal_of_many() -> String {
 fn thousands_of_unknown_channels_are_told_soon() {
     let text = of_nodes(&signal_of_many(), |nth| slope(&format!("t.plat_{nth:04}")));
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "plat_1999", "did you mean `plate_1999`?");
+    let errors = told_soon(&files, "plat_0999", "did you mean `plate_0999`?");
     assert_eq!(errors, MANY);
 
     let optional = many(|nth| format!("\"plat_{nth:04}\", "));
     let signal = signal_of_many() + &format!("optional = [{optional}]\n");
     let files = Memory::new().with("a.toml", format!("schema = 1\n{signal}"));
-    told_soon(&files, "plat_1999", "did you mean \"plate_1999\"?");
+    told_soon(&files, "plat_0999", "did you mean \"plate_0999\"?");
 }
 
 #[test]
@@ -453,7 +453,7 @@ fn thousands_of_unknown_channels_of_tests_are_told_soon() {
     let (signal, tests) = (signal_of_many(), many(test));
     let text = format!("schema = 1\n{signal}[nodes.s]\n{node}\n[outputs]\nfirst = \"s\"\n{tests}");
     let files = Memory::new().with("a.toml", text);
-    told_soon(&files, "plat_1999", "did you mean `plate_1999`?");
+    told_soon(&files, "plat_0999", "did you mean `plate_0999`?");
 }
 
 #[test]
@@ -464,7 +464,7 @@ fn thousands_of_unknown_sets_are_told_soon() {
         let sets = many(|nth| format!("axis_{nth:04} = {members}\n"));
         let text = of_nodes(&format!("[sets]\n{sets}{PLATE}"), using);
         let files = Memory::new().with("a.toml", text);
-        let errors = told_soon(&files, "axs_1999", "did you mean \"axis_1999\"?");
+        let errors = told_soon(&files, "axs_0999", "did you mean \"axis_0999\"?");
         assert_eq!(errors, MANY + more);
     }
 }
@@ -477,7 +477,7 @@ fn thousands_of_unknown_modules_and_parts_of_modules_are_told_soon() {
         format!("module = \"md_{nth:04}\"\ninputs.x = \"t\"")
     });
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "md_1999", "did you mean \"mod_1999\"?");
+    let errors = told_soon(&files, "md_0999", "did you mean \"mod_0999\"?");
     assert_eq!(errors, MANY);
 
     let instance = "[nodes.i]\nmodule = \"m\"\ninputs.x = \"t\"\n";
@@ -485,7 +485,7 @@ fn thousands_of_unknown_modules_and_parts_of_modules_are_told_soon() {
     let module = format!("[modules.m]\n{inner}{outputs}{PLATE}{instance}");
     let text = of_nodes(&module, |nth| slope(&format!("i:prt_{nth:04}")));
     let files = Memory::new().with("a.toml", text);
-    let errors = told_soon(&files, "prt_1999", "did you mean \"part_1999\"?");
+    let errors = told_soon(&files, "prt_0999", "did you mean \"part_0999\"?");
     assert_eq!(errors, MANY);
 
     let nodes = many(|nth| {
@@ -496,8 +496,8 @@ fn thousands_of_unknown_modules_and_parts_of_modules_are_told_soon() {
     });
     let text = format!("schema = 1\n[modules.m]\ninputs = [\"x\"]\n{nodes}{PLATE}{instance}");
     let files = Memory::new().with("a.toml", text);
-    told_soon(&files, "\"slop_1999\"", "did you mean \"slope_1999\"?");
-    told_soon(&files, "\"slo_1999\"", "did you mean \"slope_1999\"?");
+    told_soon(&files, "\"slop_0999\"", "did you mean \"slope_0999\"?");
+    told_soon(&files, "\"slo_0999\"", "did you mean \"slope_0999\"?");
 }
 
 #[test]
@@ -509,6 +509,6 @@ fn thousands_of_nodes_that_are_not_there_to_be_removed_are_told_soon() {
             format!("schema = 1\nextends = \"b.toml\"\n{removed}"),
         )
         .with("b.toml", of_nodes(PLATE, |_| slope("t")));
-    let errors = told_soon(&files, "slop_1999", "did you mean \"slope_1999\"?");
+    let errors = told_soon(&files, "slop_0999", "did you mean \"slope_0999\"?");
     assert_eq!(errors, MANY);
 }

@@ -66,7 +66,7 @@ fn in_two_hours_of_a_random_world_the_virtual_sensor_is_hardly_worse_than_no_mod
     let seeds = if std::env::var_os("ATHERMAL_LONG").is_some() {
         200
     } else {
-        10
+        5
     };
     let text = format!(
         "schema = 1\nextends = '{}'\nname = \"random-worlds\"\n[outputs]\ndrift = \"drift\"\n",

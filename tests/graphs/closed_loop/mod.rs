@@ -92,7 +92,7 @@ fn bounded_and_recovering(looped: &Looped, cases: usize, moving: &[usize], share
 #[test]
 fn over_random_faults_and_schedules_the_loop_is_bounded_and_recovers() {
     // X and Y barely move.
-    bounded_and_recovering(&die_tester(), 12, &[2, 5], 0.6);
+    bounded_and_recovering(&die_tester(), 8, &[2, 5], 0.6);
 }
 
 #[test]

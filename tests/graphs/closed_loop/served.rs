@@ -307,7 +307,7 @@ fn over_random_kills_outages_and_swaps_no_axis_moves_faster_than_its_rate() {
     let cases = if std::env::var_os("ATHERMAL_LONG").is_some() {
         100
     } else {
-        16
+        8
     };
     let looped = Looped::new("die-tester", &graph("die-tester-control"), 200_000.0, 50.0);
     let (next, all) = (Mutex::new(0), Mutex::new(History::default()));

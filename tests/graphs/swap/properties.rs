@@ -30,7 +30,7 @@ fn cases() -> u64 {
     if std::env::var_os("ATHERMAL_LONG").is_some() {
         100_000
     } else {
-        2_400
+        1_200
     }
 }
 
