@@ -104,6 +104,7 @@ unit = "K/min"
 type = "linear"
 inputs.features = "slope"
 inputs.truth = "position.z"
+ahead = "0s"
 [outputs]
 z = "linear"
 "#;
