@@ -193,6 +193,8 @@ z = "linear"
                 &mut |_| {},
             );
             let fit = fit.unwrap();
+            // What rows that are read again leave out of a model they leave out of either.
+            let of_csv = fit_machine(&graph, &csv, &options, date(), &mut |_| {}).unwrap();
             assert_eq!(fit.rows, of_csv.rows);
             let text = |fit: &MachineFit| String::from_utf8(fit.bytes().unwrap()).unwrap();
             let behind_card = |text: &str| text[text.find("\n  \"graph\"").unwrap()..].to_owned();
