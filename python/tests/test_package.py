@@ -211,7 +211,9 @@ def test_other_threads_run_while_a_model_is_fitted(graph):
 def test_an_interrupt_ends_a_fit(tmp_path):
     program = tmp_path / "long.py"
     program.write_text(
-        "import athermal, sys\n"
+        "import athermal, signal\n"
+        # A shell that starts tests in the background has it ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"graph = athermal.Graph({GRAPH!r})\n"
         "data = athermal.simulate('die-tester', days=2)\n"
         "print('ready', flush=True)\n"
