@@ -3,66 +3,28 @@
 
 use std::fmt::Write as _;
 
-use crate::workbench::{Scratch, athermal, athermal_on};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on};
 
 /// A drift by one temperature: of which signal or node it is the slope, and in which unit time is. `RATE` stands for what is integrated.
-fn graph(position: &str, time: &str) -> String {
-    format!(
-        r#"
-schema = 1
-name = "stage"
-time.column = "time"
-time.unit = "{time}"
-[signals.temperature]
-unit = "Cel"
-channels = ["t"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "1min"
-[signals.applied]
-unit = "nm"
-channels = ["Z"]
-column = "applied"
-optional = ["Z"]
-max_age = "1min"
-[nodes.free]
-type = "uncorrected"
-inputs.position = "position"
-inputs.applied = "applied"
-until_first = "zero"
-[nodes.drift]
-type = "slope"
-inputs.signal = "{position}"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradient]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["5min"]
-unit = "mK/min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "gradient"
-inputs.truth = "drift.Z"
-ahead = "150s"
-[nodes.vote]
-type = "auto_weighted"
-inputs.voters = ["thermal"]
-inputs.truth = "drift.Z"
-memory = "15min"
-[nodes.correction]
-type = "compensate"
-inputs.rate = "RATE"
-range = "50 um"
-max_rate = "1000 nm/min"
-max_slew = "50 nm/s"
-[outputs]
-predicted = "vote"
-correction = "correction"
-"#
-    )
+fn graph(position: &str, time: &str) -> Graph {
+    Graph::named("stage")
+        .time("time")
+        .with(&format!("unit = '{time}'"))
+        .signal("temperature", "Cel", "t", "1min")
+        .signal("position", "nm", "Z", "1min")
+        .signal("applied", "nm", "Z", "1min")
+        .with("column = 'applied'; optional = ['Z']")
+        .section("nodes.free", "type = 'uncorrected'")
+        .with("inputs = { position = 'position', applied = 'applied' }; until_first = 'zero'")
+        .slope("drift", position, "5min", "nm/min")
+        .slope("gradient", "temperature", "5min", "mK/min")
+        .model("thermal", "linear", "gradient", "drift.Z", "150s")
+        .vote("vote", "auto_weighted", "['thermal']", "drift.Z")
+        .with("memory = '15min'")
+        .section("nodes.correction", "type = 'compensate'")
+        .with("inputs.rate = 'RATE'; range = '50 um'; max_rate = '1000 nm/min'")
+        .with("max_slew = '50 nm/s'")
+        .outputs("predicted = 'vote'; correction = 'correction'")
 }
 
 /// Six hours, one row a minute, from an instant in min on; its time as seconds or as a date of 2026.

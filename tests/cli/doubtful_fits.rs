@@ -2,36 +2,22 @@
 
 use std::fmt::Write as _;
 
-use crate::workbench::{Finished, Scratch, athermal};
+use crate::workbench::{Finished, Graph, Scratch, athermal};
 
 const FEATURES: &str = "inputs.features = \"in\"";
 
 /// A graph in which one node predicts `out.y`, maybe from `in.u` and `in.v`; a row each second.
-fn graph(node: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[time]
-column = "s"
-step = "1s"
-[signals.in]
-unit = "V"
-channels = ["u", "v"]
-column = "{{channel}}"
-max_age = "1s"
-[signals.out]
-unit = "nm"
-channels = ["y"]
-column = "{{channel}}"
-max_age = "1s"
-[nodes.m]
-inputs.truth = "out.y"
-ahead = "0 samples"
-{node}
-[outputs]
-p = "m"
-"#
-    )
+fn graph(node: &str) -> Graph {
+    Graph::new()
+        .time("s")
+        .with("step = '1s'")
+        .signal("in", "V", "u v", "1s")
+        .with("column = '{channel}'")
+        .signal("out", "nm", "y", "1s")
+        .with("column = '{channel}'")
+        .section("nodes.m", "inputs.truth = 'out.y'; ahead = '0 samples'")
+        .with(node)
+        .outputs("p = 'm'")
 }
 
 /// Numbers about zero that hang together in no way.

@@ -2,50 +2,30 @@
 
 use std::path::Path;
 
-use crate::workbench::{Scratch, athermal, data, graph};
+use crate::workbench::{Graph, Scratch, athermal, data, graph};
 
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "time_s"
-[signals.input]
-unit = "V"
-channels = ["a"]
-column = "{channel}"
-max_age = "10s"
-[signals.output]
-unit = "V"
-channels = ["y"]
-column = "{channel}"
-max_age = "10s"
-[nodes.lasting]
-type = "persistence"
-inputs.truth = "output.y"
-ahead = "10s"
-[nodes.features]
-type = "linear"
-inputs = { features = "input.a", truth = "output.y" }
-ahead = "10s"
-[nodes.level]
-type = "kalman"
-inputs.truth = "output.y"
-ahead = "10s"
-LEARN
-[outputs]
-lasting = "lasting"
-features = "features"
-level = "level"
-"#;
+fn modes(learn: &str) -> Graph {
+    Graph::new()
+        .time("time_s")
+        .signal("input", "V", "a", "10s")
+        .with("column = '{channel}'")
+        .signal("output", "V", "y", "10s")
+        .with("column = '{channel}'")
+        .model("lasting", "persistence", "", "output.y", "10s")
+        .section("nodes.features", "type = 'linear'; ahead = '10s'")
+        .with("inputs = { features = 'input.a', truth = 'output.y' }")
+        .model("level", "kalman", "", "output.y", "10s")
+        .with(learn)
+        .outputs("lasting = 'lasting'; features = 'features'; level = 'level'")
+}
 
-/// An estimator that follows truths, to stand behind a graph.
-const FOLLOWED: &str = r#"
-[nodes.followed]
-type = "arma"
-inputs.truth = "output.y"
-ahead = "0s"
-na = 1
-nc = 0
-"#;
+/// The same with an estimator that follows truths.
+fn followed() -> Graph {
+    modes("")
+        .with("followed = 'followed'")
+        .model("followed", "arma", "", "output.y", "0s")
+        .with("na = 1; nc = 0")
+}
 
 /// Numbers without a pattern that a model of these could learn by heart.
 fn series(length: usize) -> Vec<[f64; 2]> {
@@ -109,7 +89,7 @@ fn the_last_truth_is_repeated_from_as_far_back_as_the_mode_says() {
     let scratch = Scratch::new("modes");
     let rows = series(200);
     let data = scratch.file("data.csv", csv(&rows));
-    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
+    let graph = scratch.file("graph.toml", modes(""));
     let model = fitted(&scratch, "model.json", &graph, &data);
     let y: Vec<f64> = rows.iter().map(|row| row[1]).collect();
 
@@ -168,9 +148,7 @@ fn persistence_of_some_steps_repeats_the_last_truth_so_far_back_also_where_rows_
     let data = scratch.file("data.csv", text);
     let last = |limit: f64| times.iter().rposition(|&time| time <= limit);
     for ahead in [10.0, 0.0] {
-        let text = GRAPH
-            .replace("LEARN", "")
-            .replace("max_age = \"10s\"", "max_age = \"20s\"");
+        let text = modes("").replace("max_age = \"10s\"", "max_age = \"20s\"");
         let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}s\""));
         let graph = scratch.file("graph.toml", text);
         let model = fitted(&scratch, "model.json", &graph, &data);
@@ -217,7 +195,7 @@ fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
         ("30s", features),
         ("30s", "inputs.features = \"input.a\"\nlearn = false"),
     ] {
-        let text = GRAPH.replace("LEARN", "");
+        let text = modes("");
         let text = text.replace(node, &format!("{node}{more}\n"));
         let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}\""));
         let graph = scratch.file("graph.toml", text);
@@ -251,8 +229,8 @@ fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
 fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
     let scratch = Scratch::new("modes-learning");
     let data = scratch.file("data.csv", csv(&series(200)));
-    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
-    let still = scratch.file("still.toml", GRAPH.replace("LEARN", "learn = false"));
+    let graph = scratch.file("graph.toml", modes(""));
+    let still = scratch.file("still.toml", modes("learn = false"));
     let model = fitted(&scratch, "model.json", &graph, &data);
     let still = fitted(&scratch, "still.json", &still, &data);
     let free = scores(&model, &data, &["--mode", "free-run"]);
@@ -288,7 +266,7 @@ fn what_follows_truths_predicts_from_as_many_steps_back_as_are_asked_for() {
     let scratch = Scratch::new("modes-followed");
     let rows = series(400);
     let data = scratch.file("data.csv", csv(&rows));
-    let text = GRAPH.replace("LEARN", "") + "followed = \"followed\"\n" + FOLLOWED;
+    let text = followed();
     let graph = scratch.file("graph.toml", text);
     let model = fitted(&scratch, "model.json", &graph, &data);
     let told = athermal(&[&"show", &model, &"--format", &"json"]).ended(0);
@@ -319,7 +297,7 @@ fn a_model_that_goes_on_from_the_last_truth_knows_as_many_with_a_horizon_of_one_
     let scratch = Scratch::new("modes-horizon");
     // A gap before the last truth is not how far ahead the others are predicted.
     let data = scratch.file("data.csv", csv(&series(400)) + "4470,0.5,0.5\n");
-    let text = GRAPH.replace("LEARN", "") + "followed = \"followed\"\n" + FOLLOWED;
+    let text = followed();
     let models = ["0s", "10s"].map(|ahead| {
         let node = format!("inputs.truth = \"output.y\"\nahead = \"{ahead}\"");
         let text = text.replace("inputs.truth = \"output.y\"\nahead = \"10s\"", &node);
@@ -347,17 +325,12 @@ fn a_model_that_goes_on_from_the_last_truth_knows_as_many_with_a_horizon_of_one_
 fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
     let scratch = Scratch::new("modes-deviations");
     let data = scratch.file("data.csv", csv(&series(2000)));
-    let nodes = r#"
-        [nodes.past]
-        type = "ar"
-        inputs.truth = "output.y"
-        ahead = "10s"
-        lags = ["0s"]
-        solver = { type = "ols" }
-        [outputs]
-    "#;
-    let text = GRAPH.replace("LEARN", "").replace("[outputs]", nodes);
-    let text = text + "past = \"past\"\nfollowed = \"followed\"\n" + FOLLOWED;
+    let text = modes("")
+        .with("past = 'past'; followed = 'followed'")
+        .model("past", "ar", "", "output.y", "10s")
+        .with("lags = ['0s']; solver = { type = 'ols' }")
+        .model("followed", "arma", "", "output.y", "0s")
+        .with("na = 1; nc = 0");
     let graph = scratch.file("graph.toml", text);
     let model = fitted(&scratch, "model.json", &graph, &data);
     let widths = |mode: &[&str]| {
@@ -396,11 +369,11 @@ fn what_learns_and_reads_past_truths_predicts_several_steps_from_those_that_were
     let rows = series(1500);
     let data = scratch.file("data.csv", csv(&rows));
     let nodes = |learn: &str| {
-        let nodes = format!(
-            "[nodes.past]\ntype = \"arx\"\ninputs.features = \"input.a\"\ninputs.truth = \"output.y\"\n\
-             ahead = \"10s\"\nlags = [\"0s\"]\nsolver = {{ type = \"sgd\", eta0 = 0.01 }}\n{learn}\n[outputs]\n"
-        );
-        GRAPH.replace("LEARN", "").replace("[outputs]", &nodes) + "past = \"past\"\n"
+        modes("")
+            .with("past = 'past'")
+            .model("past", "arx", "input.a", "output.y", "10s")
+            .with("lags = ['0s']; solver = { type = 'sgd', eta0 = 0.01 }")
+            .with(learn)
     };
     let learns = scratch.file("learns.toml", nodes("learn = true"));
     let still = scratch.file("still.toml", nodes("learn = false\noutside = \"pass\""));
@@ -429,7 +402,7 @@ fn what_learns_and_reads_past_truths_predicts_several_steps_from_those_that_were
 fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
     let scratch = Scratch::new("modes-steps");
     let data = scratch.file("data.csv", csv(&series(20)));
-    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
+    let graph = scratch.file("graph.toml", modes(""));
     let model = fitted(&scratch, "model.json", &graph, &data);
     let evaluate = |mode: &[&str], code: i32| {
         let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
@@ -532,34 +505,17 @@ fn arx_runs_free_on_a_wall_and_on_a_plate_and_output_error_no_worse() {
 }
 
 /// A slow filter of an input that jumps and a fast one of another, with noise that is soon forgotten.
-const SLOW: &str = r#"
-schema = 1
-name = "slow"
-[time]
-column = "time_s"
-[signals.input]
-unit = "V"
-channels = ["a", "b"]
-column = "{channel}"
-max_age = "10s"
-[signals.output]
-unit = "V"
-channels = ["y"]
-column = "{channel}"
-max_age = "10s"
-[nodes.jenkins]
-type = "bj"
-inputs = { features = "input", truth = "output.y" }
-ahead = "0s"
-nb = 1
-nf = 1
-nk = 0
-nc = 0
-nd = 1
-penalty = 0.0
-[outputs]
-jenkins = "jenkins"
-"#;
+fn slow_graph() -> Graph {
+    Graph::named("slow")
+        .time("time_s")
+        .signal("input", "V", "a b", "10s")
+        .with("column = '{channel}'")
+        .signal("output", "V", "y", "10s")
+        .with("column = '{channel}'")
+        .model("jenkins", "bj", "input", "output.y", "0s")
+        .with("nb = 1; nf = 1; nk = 0; nc = 0; nd = 1; penalty = 0.0")
+        .outputs("jenkins = 'jenkins'")
+}
 
 #[test]
 fn a_run_may_begin_while_filters_are_far_from_rest() {
@@ -578,7 +534,7 @@ fn a_run_may_begin_while_filters_are_far_from_rest() {
         lines.push(format!("{},{jumping},{b},{y}\n", 10 * nth));
     }
     let table = |lines: &[String]| format!("time_s,a,b,y\n{}", lines.concat());
-    let graph = scratch.file("slow.toml", SLOW);
+    let graph = scratch.file("slow.toml", slow_graph());
     let train = scratch.file("train.csv", table(&lines[..3000]));
     let model = fitted(&scratch, "model.json", &graph, &train);
     let from_there = |from: usize| {

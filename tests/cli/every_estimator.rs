@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 use athermal::Model;
 use athermal::core::node::{Kind, RoleName, kinds};
 use athermal::files::{Dataset, Options};
@@ -12,23 +12,12 @@ use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 /// They choose among products of features, and do not say which of them are alike.
 const CHOOSING: [&str; 2] = ["narx", "polynomial"];
 
-const SIGNALS: &str = r#"
-schema = 1
-name = "every-estimator"
-
-[time]
-column = "time_s"
-
-[signals.x]
-unit = "K"
-channels = ["wanders", "stays", "follows", "apart"]
-max_age = "1s"
-
-[signals.y]
-unit = "nm"
-channels = ["y"]
-max_age = "1s"
-"#;
+fn signals() -> Graph {
+    Graph::named("every-estimator")
+        .time("time_s")
+        .signal("x", "K", "wanders stays follows apart", "1s")
+        .signal("y", "nm", "y", "1s")
+}
 
 /// Four features, of which one stays as it is and one is twice another, and what two of them bring about.
 fn rows() -> String {
@@ -56,7 +45,7 @@ fn fitted_on(
 ) -> (Model, FitReport) {
     let estimators = kinds().values().flatten();
     let estimators = estimators.filter(|kind| kind.role == RoleName::Estimator && wanted(kind));
-    let (mut graph, mut outputs) = (SIGNALS.to_owned(), "[outputs]\n".to_owned());
+    let (mut graph, mut outputs) = (signals().to_string(), "[outputs]\n".to_owned());
     for kind in estimators {
         let name = kind.name;
         writeln!(

@@ -3,40 +3,28 @@
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 
-use crate::workbench::{Scratch, athermal_on};
+use crate::workbench::{Graph, Scratch, athermal_on};
 use serde_json::json;
 
 /// A graph in which zero is predicted of a measured truth, and put together by combiners with these parameters.
-fn graph(combiners: &[(&str, &str)]) -> String {
-    let mut text = String::from(
-        r#"schema = 1
-[time]
-column = "time_s"
-[signals.out]
-unit = "nm"
-channels = ["y"]
-column = "{channel}"
-max_age = "2min"
-[nodes.none]
-type = "zero"
-inputs.truth = "out"
-ahead = "0s"
-"#,
-    );
-    let mut outputs = String::new();
-    for (kind, parameters) in combiners {
-        let port = if *kind == "conformal" {
-            "prediction"
-        } else {
-            "voters"
-        };
-        let _ = writeln!(
-            text,
-            "[nodes.{kind}]\ntype = \"{kind}\"\ninputs.{port} = \"none\"\ninputs.truth = \"out\"\n{parameters}"
-        );
-        let _ = writeln!(outputs, "{kind} = \"{kind}\"");
-    }
-    text + "[outputs]\n" + &outputs
+fn graph(combiners: &[(&str, &str)]) -> Graph {
+    let zero = Graph::new()
+        .time("time_s")
+        .signal("out", "nm", "y", "2min")
+        .with("column = '{channel}'")
+        .model("none", "zero", "", "out", "0s");
+    let graph = combiners.iter().fold(zero, |graph, (kind, parameters)| {
+        let port = ["voters", "prediction"][usize::from(*kind == "conformal")];
+        let inputs = format!("inputs.{port} = 'none'; inputs.truth = 'out'");
+        graph
+            .section(&format!("nodes.{kind}"), &format!("type = '{kind}'"))
+            .with(&inputs)
+            .with(parameters)
+    });
+    let outputs = combiners
+        .iter()
+        .map(|(kind, _)| format!("{kind} = '{kind}'"));
+    graph.outputs(&outputs.collect::<Vec<_>>().join("; "))
 }
 
 /// Truths at these instants, in s.
@@ -145,30 +133,16 @@ fn members_of_a_node_that_lack_the_same_are_told_of_once() {
     let scratch = Scratch::new("members");
     let graph = scratch.file(
         "graph.toml",
-        r#"schema = 1
-[sets]
-axis = ["x", "y", "z"]
-[time]
-column = "time_s"
-[signals.out]
-unit = "nm"
-channels = "axis"
-column = "{channel}"
-max_age = "2min"
-[nodes.none]
-type = "zero"
-each = "axis"
-inputs.truth = "out.{axis}"
-ahead = "0s"
-[nodes.vote]
-type = "best"
-each = "axis"
-inputs.voters = "none.{axis}"
-inputs.truth = "out.{axis}"
-memory = "30s"
-[outputs]
-vote = "vote"
-"#,
+        Graph::new()
+            .section("sets", "axis = ['x', 'y', 'z']")
+            .time("time_s")
+            .section("signals.out", "unit = 'nm'; channels = 'axis'")
+            .with("column = '{channel}'; max_age = '2min'")
+            .model("none", "zero", "", "out.{axis}", "0s")
+            .with("each = 'axis'")
+            .vote("vote", "best", "none.{axis}", "out.{axis}")
+            .with("each = 'axis'; memory = '30s'")
+            .outputs("vote = 'vote'"),
     );
     // `z` has only half of the truths, so that another number is told of it: all 50 are known at the last row, which has none
     // of its own. Of the others the truth of the last row comes too late.

@@ -3,31 +3,19 @@
 
 use std::fmt::Write as _;
 
-use crate::workbench::{Scratch, athermal, athermal_on};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on};
 
 /// A position that follows one temperature at once.
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["plate", "room"]
-column = "{channel}_degC"
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-column = "{channel}_nm"
-max_age = "1min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "position.Z"
-ahead = "0s"
-[outputs]
-predicted = "thermal"
-"#;
+fn thermal() -> Graph {
+    Graph::new()
+        .time("time_s")
+        .signal("temperature", "Cel", "plate room", "1min")
+        .with("column = '{channel}_degC'")
+        .signal("position", "nm", "Z", "1min")
+        .with("column = '{channel}_nm'")
+        .model("thermal", "linear", "temperature", "position.Z", "0s")
+        .outputs("predicted = 'thermal'")
+}
 
 /// Between -1 and 1, in no order.
 fn noise(row: usize, of: f64) -> f64 {
@@ -77,7 +65,7 @@ fn in_one_line(text: &str) -> String {
 fn a_fit_names_the_sensor_that_failed_in_its_data() {
     let scratch = Scratch::new("faulty-sensor");
     let (graph, data) = (
-        scratch.file("graph.toml", GRAPH),
+        scratch.file("graph.toml", thermal()),
         scratch.file("log.csv", log(broken)),
     );
     let model = scratch.path("model.json");
@@ -99,7 +87,7 @@ fn a_fit_names_the_sensor_that_failed_in_its_data() {
     assert_eq!(leaps[0]["channel"], "temperature.plate");
     assert_eq!(leaps[0]["first"]["to"], 850.0);
 
-    let ranged = GRAPH.replacen("max_age", "range = [\"-30 Cel\", \"75 Cel\"]\nmax_age", 1);
+    let ranged = thermal().replacen("max_age", "range = [\"-30 Cel\", \"75 Cel\"]\nmax_age", 1);
     let graph = scratch.file("ranged.toml", ranged);
     let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
     fitted.tells(&["temperature.plate: 60 samples are infinite or out of range"]);
@@ -109,7 +97,7 @@ fn a_fit_names_the_sensor_that_failed_in_its_data() {
 #[test]
 fn a_fit_names_the_position_that_was_zeroed_anew_and_says_nothing_of_sound_data() {
     let scratch = Scratch::new("faulty-zero");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let zeroed = log(|row, values| values[2] -= if row < 2000 { 0.0 } else { 900.0 });
     let (zeroed, sound) = (
         scratch.file("zeroed.csv", zeroed),
@@ -128,7 +116,7 @@ fn a_fit_names_the_position_that_was_zeroed_anew_and_says_nothing_of_sound_data(
 #[test]
 fn a_log_that_is_split_where_its_position_was_zeroed_anew_has_no_leap_in_segments_of_its_own() {
     let scratch = Scratch::new("split");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let whole = log(|row, values| values[2] -= if row < 1500 { 0.0 } else { 4000.0 });
     let (header, rows) = whole.split_once('\n').unwrap();
     let rows: Vec<&str> = rows.lines().collect();
@@ -174,7 +162,7 @@ fn a_leap_between_usual_values_is_nothing_that_a_range_takes_out() {
     });
     let data = scratch.file("data.csv", data);
     let (graph, model) = (
-        scratch.file("graph.toml", GRAPH),
+        scratch.file("graph.toml", thermal()),
         scratch.path("model.json"),
     );
     let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
@@ -216,7 +204,7 @@ fn a_starter_graph_keeps_what_a_failed_sensor_says_out_of_the_fit() {
 fn a_report_says_which_sensors_leap_or_lie_where_the_fit_saw_none() {
     let scratch = Scratch::new("faulty-report");
     let (graph, sound) = (
-        scratch.file("graph.toml", GRAPH),
+        scratch.file("graph.toml", thermal()),
         scratch.file("sound.csv", log(|_, _| ())),
     );
     let model = scratch.path("model.json");
@@ -249,7 +237,7 @@ fn dead(row: usize, values: &mut [f64; 3]) {
 #[test]
 fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
     let scratch = Scratch::new("faulty-silent");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let file = |name: &str, text: String| scratch.file(name, text);
     let sound = file("sound.csv", log(|_, _| ()));
     let (sound_model, model) = (scratch.path("sound.json"), scratch.path("model.json"));
@@ -279,7 +267,7 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
                 .ended(0)
                 .tells(&[expected, in_scores]);
         }
-        let other = file("other.toml", GRAPH.replace("linear", "rls"));
+        let other = file("other.toml", thermal().replace("linear", "rls"));
         let compared =
             athermal_on("compare", &graph, &sound, &[&"--on", &data, &"--", &other]).ended(0);
         assert_eq!(
@@ -304,7 +292,7 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
     fitted.tells(&["warning: temperature.room is 20.036 in 960 samples one after the other"]);
     // That it goes on is no failure of its own.
     assert!(!fitted.told.contains("leaps"), "{}", fitted.told);
-    let watched = GRAPH.replace(
+    let watched = thermal().replace(
         "inputs.features = \"temperature\"",
         "inputs.features = \"watched\"",
     );
@@ -326,7 +314,7 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
 #[test]
 fn a_sensor_without_any_sample_and_positions_that_stop_are_told_by_whoever_scores_or_runs() {
     let scratch = Scratch::new("faulty-from-the-start");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let (sound, model) = (
         scratch.file("sound.csv", log(|_, _| ())),
         scratch.path("model.json"),
@@ -374,7 +362,7 @@ fn a_coarse_sensor_that_freezes_looks_stuck_though_it_often_repeats_its_value() 
             values[1] = (10.0 * temperatures(at).1).round() / 10.0;
         })
     };
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let (sound, frozen) = (
         scratch.file("sound.csv", coarse(false)),
         scratch.file("frozen.csv", coarse(true)),
@@ -394,7 +382,7 @@ fn a_coarse_sensor_that_freezes_looks_stuck_though_it_often_repeats_its_value() 
 #[test]
 fn what_is_doubtful_in_a_graph_is_told_by_the_fit_too() {
     let scratch = Scratch::new("faulty-unit");
-    let graph = GRAPH.replace("unit = \"nm\"", "unit = \"um\"");
+    let graph = thermal().replace("unit = \"nm\"", "unit = \"um\"");
     let (graph, data) = (
         scratch.file("graph.toml", graph),
         scratch.file("log.csv", log(|_, _| ())),
@@ -410,7 +398,7 @@ fn what_is_doubtful_in_a_graph_is_told_by_the_fit_too() {
 #[test]
 fn a_unit_below_the_name_of_a_column_that_is_not_that_of_its_signal_is_told() {
     let scratch = Scratch::new("faulty-unit-row");
-    let graph = GRAPH.replace("column = \"{channel}_nm\"", "column = \"{channel}\"");
+    let graph = thermal().replace("column = \"{channel}_nm\"", "column = \"{channel}\"");
     let log = log(|_, _| ()).replacen("Z_nm\n", "Z\ns,degC,degC,um\n", 1);
     let (graph, data) = (
         scratch.file("graph.toml", graph),
@@ -433,7 +421,7 @@ fn a_unit_below_the_name_of_a_column_that_is_not_that_of_its_signal_is_told() {
 fn scores_on_the_data_of_the_fit_are_told_to_be_that() {
     let scratch = Scratch::new("faulty-seen");
     let (graph, data) = (
-        scratch.file("graph.toml", GRAPH),
+        scratch.file("graph.toml", thermal()),
         scratch.file("log.csv", log(|_, _| ())),
     );
     let model = scratch.path("model.json");
@@ -454,7 +442,7 @@ fn scores_on_the_data_of_the_fit_are_told_to_be_that() {
 #[test]
 fn scores_say_how_much_they_leave_out_where_one_of_several_predictions_fell_silent() {
     let scratch = Scratch::new("faulty-left-out");
-    let several = GRAPH.replace(
+    let several = thermal().replace(
         "[outputs]",
         "[nodes.last]\ntype = \"persistence\"\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n\
          [nodes.fall]\ntype = \"fallback\"\ninputs.voters = [\"thermal\", \"last\"]\n[outputs]",

@@ -3,24 +3,16 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 use serde_json::Value;
 
-const SIGNALS: &str = r#"
-schema = 1
-[time]
-column = "s"
-[signals.x]
-unit = "K"
-channels = ["wanders", "stays", "follows", "apart"]
-max_age = "1s"
-[signals.y]
-unit = "nm"
-channels = ["y"]
-max_age = "1s"
-[outputs]
-mix = "mix"
-"#;
+fn signals() -> Graph {
+    Graph::new()
+        .time("s")
+        .signal("x", "K", "wanders stays follows apart", "1s")
+        .signal("y", "nm", "y", "1s")
+        .outputs("mix = 'mix'")
+}
 
 const FEATURES: &str = "inputs.features = \"x\"\n";
 
@@ -79,7 +71,7 @@ const NODES: [(&str, bool, &str); 14] = [
 ];
 
 fn graph() -> String {
-    let mut graph = SIGNALS.to_owned();
+    let mut graph = signals().to_string();
     for (name, has_features, node) in NODES {
         let features = if has_features { FEATURES } else { "" };
         writeln!(
@@ -270,7 +262,7 @@ fn figures_are_what_the_model_computes_with() {
 fn a_filter_that_follows_some_of_the_rows_says_what_it_found_on_how_many() {
     let scratch = Scratch::new("fit-some-rows");
     let node = "[nodes.noises]\ntype = \"kalman\"\n";
-    let signals = SIGNALS.replace("\"mix\"", "\"noises\"");
+    let signals = signals().replace("\"mix\"", "\"noises\"");
     let graph = format!("{signals}{node}{FEATURES}inputs.truth = \"y.y\"\nahead = \"0s\"\n");
     let (graph, data) = (
         scratch.file("graph.toml", graph),

@@ -5,41 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::workbench::{Finished, Scratch, athermal};
+use crate::workbench::{Finished, Graph, Scratch, athermal};
 
-const GRAPH: &str = r#"
-schema = 1
-name = "fleet"
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["plate1", "holder1", "room"]
-column = "{channel}_degC"
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z1"]
-column = "{channel}_nm"
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["5min"]
-unit = "mK/min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z1"
-ahead = "5min"
-[outputs]
-predicted = "thermal"
-"#;
+fn thermal() -> Graph {
+    Graph::of_die_tester("fleet", "plate1 holder1 room")
+}
 
 /// A graph and machines, a folder with a log for each.
 struct Fleet {
@@ -52,7 +22,7 @@ struct Fleet {
 impl Fleet {
     fn new(test: &str, machines: &[&str]) -> Self {
         let scratch = Scratch::new(test);
-        let graph = scratch.file("graph.toml", GRAPH);
+        let graph = scratch.file("graph.toml", thermal());
         let fleet = Self {
             graph,
             pattern: scratch.path("logs/machine=*/*.csv").display().to_string(),
@@ -172,7 +142,7 @@ fn each_machine_of_a_fleet_has_the_bytes_of_a_fit_by_itself_and_is_fitted_once()
     assert_eq!(fleet.counts(), [1, 2, 0]);
     fs::write(
         &fleet.graph,
-        GRAPH.replace(
+        thermal().replace(
             "windows = [\"5min\"]\nunit = \"mK/min\"",
             "windows = [\"6min\"]\nunit = \"mK/min\"",
         ),
@@ -497,7 +467,7 @@ fn a_fleet_on_kept_blocks_has_the_bytes_of_fits_on_blocks_of_the_rows() {
     // What is fitted to the rows of a day may change: the sums stay.
     for alpha in ["1.0", "3.0"] {
         let solver = format!("solver = {{ type = \"ridge\", alpha = {alpha} }}\n[outputs]");
-        fs::write(&fleet.graph, GRAPH.replace("[outputs]", &solver)).unwrap();
+        fs::write(&fleet.graph, thermal().replace("[outputs]", &solver)).unwrap();
         fit(&[]).tells(&["2 machines fitted"]);
         for machine in ["a", "b"] {
             let of_rows = alone(machine, &["--blocks", "day"]);

@@ -2,58 +2,30 @@
 
 use std::path::PathBuf;
 
-use crate::workbench::{Scratch, athermal, athermal_fed, athermal_on, simulated};
+use crate::workbench::{Graph, Scratch, athermal, athermal_fed, athermal_on, simulated};
 
 /// Two axes of a machine, each by a model that goes on learning.
-const GRAPH: &str = r#"
-schema = 1
-name = "learning"
-[sets]
-axis = ["X", "Y"]
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["t1", "t2"]
-column = "{channel}_degC"
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = "axis"
-column = "{channel}_nm"
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["5min", "15min"]
-unit = "mK/min"
-[nodes.model]
-type = "rls"
-each = "axis"
-inputs.features = "gradients"
-inputs.truth = "drift.{axis}"
-ahead = "5min"
-forgetting = { type = "constant", factor = 0.999 }
-learn = true
-[nodes.vote]
-type = "auto_weighted"
-each = "axis"
-inputs.voters = ["model.{axis}"]
-inputs.truth = "drift.{axis}"
-memory = "15min"
-[outputs]
-predicted = "vote"
-"#;
+fn learning() -> Graph {
+    Graph::named("learning")
+        .section("sets", "axis = ['X', 'Y']")
+        .time("time_s")
+        .signal("temperature", "Cel", "t1 t2", "1min")
+        .with("column = '{channel}_degC'")
+        .section("signals.position", "unit = 'nm'; channels = 'axis'")
+        .with("column = '{channel}_nm'; max_age = '3min'")
+        .slope("drift", "position", "5min", "nm/min")
+        .slope("gradients", "temperature", "5min 15min", "mK/min")
+        .model("model", "rls", "gradients", "drift.{axis}", "5min")
+        .with("each = 'axis'; forgetting = { type = 'constant', factor = 0.999 }; learn = true")
+        .vote("vote", "auto_weighted", "['model.{axis}']", "drift.{axis}")
+        .with("each = 'axis'; memory = '15min'")
+        .outputs("predicted = 'vote'")
+}
 
 /// A folder with half a day of a machine, a model that was fitted on half of another, and what a run in one piece gives.
 fn desk(test: &str) -> (Scratch, PathBuf, PathBuf, String) {
     let scratch = Scratch::new(&format!("kept-runs-{test}"));
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", learning());
     let history = simulated(&scratch, "history.csv", "linear-axis", 0.5, 1);
     let data = simulated(&scratch, "data.csv", "linear-axis", 0.5, 2);
     let model = scratch.path("model.json");

@@ -1,6 +1,6 @@
 //! What `check`, `explain` and `diff` print, and the status with which they end.
 
-use crate::workbench::{Scratch, athermal, graph};
+use crate::workbench::{Graph, Scratch, athermal, graph};
 
 #[test]
 fn a_forecast_and_a_virtual_sensor_differ_in_their_horizons() {
@@ -64,27 +64,14 @@ fn a_model_that_could_not_be_fitted_differs_from_one_that_was() {
     let scratch = Scratch::new("unfitted");
     let graph = scratch.file(
         "graph.toml",
-        r#"schema = 1
-[time]
-column = "time_s"
-[signals.t]
-unit = "Cel"
-channels = ["a"]
-column = "{channel}"
-max_age = "1min"
-[signals.z]
-unit = "nm"
-channels = ["z"]
-column = "{channel}"
-max_age = "1min"
-[nodes.plain]
-type = "linear"
-inputs.features = "t"
-inputs.truth = "z"
-ahead = "0s"
-[outputs]
-out = "plain"
-"#,
+        Graph::new()
+            .time("time_s")
+            .signal("t", "Cel", "a", "1min")
+            .with("column = '{channel}'")
+            .signal("z", "nm", "z", "1min")
+            .with("column = '{channel}'")
+            .model("plain", "linear", "t", "z", "0s")
+            .outputs("out = 'plain'"),
     );
     let rows: String = (0..60)
         .map(|row| format!("{},{},{}\n", 10 * row, 20 + row % 7, row % 7))

@@ -1,6 +1,6 @@
 //! Truths that are levels, numbers that differ late, and fits after which nothing is left to predict from.
 
-use crate::workbench::{Scratch, athermal, athermal_on, case};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on, case};
 
 #[test]
 fn no_model_of_a_position_is_its_mean_over_the_fit() {
@@ -43,24 +43,11 @@ fn no_model_of_a_position_is_its_mean_over_the_fit() {
 #[test]
 fn the_mean_is_that_of_the_fit_and_not_of_what_is_scored() {
     let scratch = Scratch::new("level-apart");
-    let graph = r#"
-schema = 1
-[signals.temperature]
-unit = "Cel"
-channels = ["a"]
-max_age = "1min"
-[signals.height]
-unit = "um"
-channels = ["Z"]
-max_age = "1min"
-[nodes.level]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "height.Z"
-ahead = "0s"
-[outputs]
-level = "level"
-"#;
+    let graph = Graph::new()
+        .signal("temperature", "Cel", "a", "1min")
+        .signal("height", "um", "Z", "1min")
+        .model("level", "linear", "temperature", "height.Z", "0s")
+        .outputs("level = 'level'");
     let graph = scratch.file("g.toml", graph);
     let rows = |from: i32| {
         let row = |i: i32| format!("{},{},{}\n", 10 * i, from + i % 7, 1000 + from + i % 7);

@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 
-use crate::workbench::{Scratch, athermal, athermal_on, numbers, own_oracle, plan};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on, numbers, own_oracle, plan};
 use athermal::Instant;
 use athermal::run::fit::{FitOptions, FitProgress, fit};
 use athermal::run::recording::Table;
@@ -13,26 +13,15 @@ fn graph_up_to(most: usize, by: &str, node: &str) -> String {
     graph(by, node).replace("1..6", &format!("1..{most}"))
 }
 
-fn graph(by: &str, node: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[time]
-column = "time_s"
-[signals.output]
-unit = "V"
-channels = ["y"]
-column = "{{channel}}"
-max_age = "10s"
-[nodes.model]
-inputs.truth = "output.y"
-ahead = "0s"
-{node}
-order = {{ by = "{by}", na = "1..6" }}
-[outputs]
-model = "model"
-"#
-    )
+fn graph(by: &str, node: &str) -> Graph {
+    Graph::new()
+        .time("time_s")
+        .signal("output", "V", "y", "10s")
+        .with("column = '{channel}'")
+        .section("nodes.model", "inputs.truth = 'output.y'; ahead = '0s'")
+        .with(node)
+        .with(&format!("order = {{ by = '{by}', na = '1..6' }}"))
+        .outputs("model = 'model'")
 }
 
 const AR: &str = r#"

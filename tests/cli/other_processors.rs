@@ -4,54 +4,29 @@
 use std::fmt::Write;
 use std::process::Command;
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 
 /// Nodes that compute exponentials, logarithms and powers at ticks.
-const GRAPH: &str = r#"
-schema = 1
-name = "other-processors"
-time.column = "time_s"
-signals.x = { unit = "K", channels = ["wanders", "apart"], max_age = "1s" }
-signals.y = { unit = "nm", channels = ["y"], max_age = "1s" }
-
-[nodes.masses]
-type = "first_order"
-inputs.signal = "x"
-time_constants = ["7s", "1min"]
-
-[nodes.plain]
-type = "linear"
-inputs = { features = "x", truth = "y.y" }
-ahead = "0s"
-
-[nodes.level]
-type = "kalman"
-inputs = { features = "x", truth = "y.y" }
-ahead = "0s"
-noises = { observation = "0.1 nm", level = "0.3 nm", per = "1min", returns = "47s" }
-
-[nodes.steady]
-type = "hedge"
-inputs = { voters = ["plain", "level"], truth = "y.y" }
-
-[nodes.recent]
-type = "hedge"
-inputs = { voters = ["plain", "level"], truth = "y.y" }
-half_life = "37s"
-
-[nodes.weighted]
-type = "auto_weighted"
-inputs = { voters = ["plain", "level"], truth = "y.y" }
-memory = { half_life = "37s" }
-power = 3
-
-[outputs]
-masses = "masses"
-level = "level"
-steady = "steady"
-recent = "recent"
-weighted = "weighted"
-"#;
+fn of_other_processors() -> Graph {
+    Graph::named("other-processors")
+        .time("time_s")
+        .signal("x", "K", "wanders apart", "1s")
+        .signal("y", "nm", "y", "1s")
+        .node("masses", "first_order", "x")
+        .with("time_constants = ['7s', '1min']")
+        .model("plain", "linear", "x", "y.y", "0s")
+        .model("level", "kalman", "x", "y.y", "0s")
+        .with(
+            "noises = { observation = '0.1 nm', level = '0.3 nm', per = '1min', returns = '47s' }",
+        )
+        .vote("steady", "hedge", "plain level", "y.y")
+        .vote("recent", "hedge", "plain level", "y.y")
+        .with("half_life = '37s'")
+        .vote("weighted", "auto_weighted", "plain level", "y.y")
+        .with("memory = { half_life = '37s' }; power = 3")
+        .outputs("masses = 'masses'; level = 'level'; steady = 'steady'; recent = 'recent'")
+        .with("weighted = 'weighted'")
+}
 
 fn rows() -> String {
     let mut text = "time_s,wanders,apart,y\n".to_owned();
@@ -67,7 +42,7 @@ fn rows() -> String {
 #[test]
 fn what_runs_gives_the_same_bits_on_a_processor_without_fused_multiplication() {
     let scratch = Scratch::new("other-processors");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", of_other_processors());
     let log = scratch.file("log.csv", rows());
     let model = scratch.path("model.json");
     athermal(&[&"fit", &graph, &"--data", &log, &"-o", &model]).ended(0);

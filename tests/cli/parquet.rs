@@ -9,7 +9,7 @@ use athermal::files::{Flush, Layout, Options, Reader, Row, TimeForm, Writer, rec
 
 use crate::services::{HEADER, SERVICE, desk, end, lines, rows as log_rows, serve, until_rows};
 use crate::stretches::learned;
-use crate::workbench::{Scratch, athermal, athermal_on, graph, simulated};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on, graph, simulated};
 
 #[test]
 fn fit_evaluate_and_run_give_the_same_from_parquet_and_from_csv() {
@@ -196,45 +196,15 @@ fn files_of_a_folder_are_one_recording_with_what_their_paths_say() {
 }
 
 /// Of blocks: the least that is fitted.
-const GRAPH: &str = r#"
-schema = 1
-name = "of-blocks"
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["plate1", "room"]
-column = "{channel}_degC"
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z1"]
-column = "{channel}_nm"
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["5min"]
-unit = "mK/min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z1"
-ahead = "5min"
-[outputs]
-predicted = "thermal"
-"#;
+fn thermal() -> Graph {
+    Graph::of_die_tester("of-blocks", "plate1 room")
+}
 
 #[test]
 fn blocks_of_parquet_are_those_of_csv_and_follow_what_paths_say() {
     let scratch = Scratch::new("parquet-blocks");
     let of = |name: &str| scratch.path(name);
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", thermal());
     let fit = |graph, log: &std::path::Path, blocks: &str| {
         let folder = of(blocks);
         let words: [&dyn AsRef<std::ffi::OsStr>; 6] = [
@@ -262,7 +232,7 @@ fn blocks_of_parquet_are_those_of_csv_and_follow_what_paths_say() {
     assert!(fit(&graph, &parquet, "parquet") == of_csv);
     // A graph that measures what the folder says, and the same file in another folder.
     let signal = "[signals.of_folder]\nunit = \"1\"\nchannels = [\"line\"]\nmax_age = \"1min\"\n";
-    let keyed = scratch.file("keyed.toml", format!("{GRAPH}{signal}"));
+    let keyed = scratch.file("keyed.toml", format!("{}{signal}", thermal()));
     let (four, _) = fit(&keyed, &of("logs"), "keyed");
     std::fs::rename(of("logs/line=4"), of("logs/line=5")).unwrap();
     let (five, _) = fit(&keyed, &of("logs"), "keyed");

@@ -2,46 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::workbench::{Finished, Scratch, athermal_on, simulated};
+use crate::workbench::{Finished, Graph, Scratch, athermal_on, simulated};
 use serde_json::Value;
 
 /// The die tester with two axes, their drift and the gradients of four sensors.
-const BASE: &str = r#"schema = 1
-name = "small"
-[sets]
-axis = ["X1", "Z1"]
-kind = ["150s", "600s"]
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["plate1", "holder1", "room", "chuck"]
-column = "{channel}_degC"
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = "axis"
-column = "{channel}_nm"
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["150s", "5min", "10min"]
-unit = "mK/min"
-[nodes.thermal]
-type = "linear"
-each = "axis"
-inputs.features = "gradients"
-inputs.truth = "drift.{axis}"
-ahead = "150s"
-"#;
+fn base() -> Graph {
+    Graph::named("small")
+        .section("sets", "axis = ['X1', 'Z1']; kind = ['150s', '600s']")
+        .time("time_s")
+        .signal("temperature", "Cel", "plate1 holder1 room chuck", "1min")
+        .with("column = '{channel}_degC'")
+        .section("signals.position", "unit = 'nm'; channels = 'axis'")
+        .with("column = '{channel}_nm'; max_age = '3min'")
+        .slope("drift", "position", "5min", "nm/min")
+        .slope("gradients", "temperature", "150s 5min 10min", "mK/min")
+        .model("thermal", "linear", "gradients", "drift.{axis}", "150s")
+        .with("each = 'axis'")
+}
 
-/// A model of [`BASE`] with more nodes, fitted on half a day, and eight hours of another.
+/// A model of [`base`] with more nodes, fitted on half a day, and eight hours of another.
 struct Reported {
     scratch: Scratch,
     model: PathBuf,
@@ -51,7 +30,7 @@ struct Reported {
 impl Reported {
     fn new(name: &str, more: &str) -> Self {
         let scratch = Scratch::new(name);
-        let graph = scratch.file("graph.toml", format!("{BASE}{more}"));
+        let graph = scratch.file("graph.toml", format!("{}{more}", base()));
         let fit = simulated(&scratch, "fit.csv", "die-tester", 0.5, 1);
         let data = simulated(&scratch, "data.csv", "die-tester", 0.35, 2);
         let model = scratch.path("model.json");

@@ -5,47 +5,21 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::workbench::{Scratch, athermal, case};
+use crate::workbench::{Graph, Scratch, athermal, case};
 
-const GRAPH: &str = r#"
-schema = 1
-
-[time]
-column = "time"
-unit = "rfc3339"
-
-[signals.temperature]
-unit = "Cel"
-channels = ["spindle", "bed", "room"]
-column = "{channel}_degC"
-max_age = "3min"
-
-[signals.position]
-unit = "um"
-channels = ["Z"]
-column = "{channel}_um"
-max_age = "6min"
-
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["8min"]
-unit = "nm/min"
-
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["4min", "8min", "12min"]
-
-[nodes.thermal]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z"
-ahead = "0s"
-
-[outputs]
-predicted = "thermal"
-"#;
+fn thermal() -> Graph {
+    Graph::new()
+        .time("time")
+        .with("unit = 'rfc3339'")
+        .signal("temperature", "Cel", "spindle bed room", "3min")
+        .with("column = '{channel}_degC'")
+        .signal("position", "um", "Z", "6min")
+        .with("column = '{channel}_um'")
+        .slope("drift", "position", "8min", "nm/min")
+        .slope("gradients", "temperature", "4min 8min 12min", "")
+        .model("thermal", "linear", "gradients", "drift.Z", "0s")
+        .outputs("predicted = 'thermal'")
+}
 
 /// One table of two: a row for each time, with empty cells.
 fn joined(files: [&Path; 2]) -> String {
@@ -79,7 +53,7 @@ fn two_logs_give_the_model_and_the_scores_of_the_same_data_in_one_file() {
         return;
     };
     let scratch = Scratch::new("two-loggers");
-    let graph = scratch.file("g.toml", GRAPH);
+    let graph = scratch.file("g.toml", thermal());
     let (one, other) = (case.join("temperatures.csv"), case.join("positions.csv"));
     let table = scratch.file("table.csv", joined([&one, &other]));
     let model = scratch.path("m.json");
@@ -107,7 +81,7 @@ fn two_logs_give_the_model_and_the_scores_of_the_same_data_in_one_file() {
 #[test]
 fn an_offset_moves_the_times_of_one_log_and_needs_to_name_one() {
     let scratch = Scratch::new("offset");
-    let graph = scratch.file("g.toml", GRAPH);
+    let graph = scratch.file("g.toml", thermal());
     let time = |at: i64| format!("2026-03-02T{:02}:{:02}:00Z", at / 60, at % 60);
     // Temperatures that go up and down without a period.
     let mut state = 7_u64;

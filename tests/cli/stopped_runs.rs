@@ -5,26 +5,16 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use crate::workbench::{Scratch, athermal, athermal_fed};
+use crate::workbench::{Graph, Scratch, athermal, athermal_fed};
 
-const GRAPH: &str = r#"
-schema = 1
-name = "stopped"
-[time]
-column = "time_s"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-column = "{channel}"
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["30s"]
-unit = "nm/min"
-[outputs]
-now = "drift"
-"#;
+fn drift() -> Graph {
+    Graph::named("stopped")
+        .time("time_s")
+        .signal("position", "nm", "Z", "3min")
+        .with("column = '{channel}'")
+        .slope("drift", "position", "30s", "nm/min")
+        .outputs("now = 'drift'")
+}
 
 /// Rows from one number to before another; every tenth cell is none.
 fn rows(from: u32, to: u32) -> String {
@@ -99,7 +89,7 @@ impl Live {
 
 fn desk(test: &str) -> Scratch {
     let scratch = Scratch::new(&format!("stopped-{test}"));
-    scratch.file("graph.toml", GRAPH);
+    scratch.file("graph.toml", drift());
     scratch
 }
 

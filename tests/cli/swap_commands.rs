@@ -5,31 +5,18 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::workbench::{Finished, Live, Scratch, athermal, athermal_fed};
+use crate::workbench::{Finished, Graph, Live, Scratch, athermal, athermal_fed};
 
 /// Two predictions of a drift, of which the graph shows one.
-const GRAPH: &str = r#"
-schema = 1
-name = "shown"
-[time]
-column = "time_s"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[modules.model]
-from = "model.toml"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["30s"]
-unit = "nm/min"
-[nodes.model]
-module = "model"
-inputs.truth = "drift.Z"
-[outputs]
-predicted = "model"
-"#;
+fn shown() -> Graph {
+    Graph::named("shown")
+        .time("time_s")
+        .signal("position", "nm", "Z", "3min")
+        .section("modules.model", "from = 'model.toml'")
+        .slope("drift", "position", "30s", "nm/min")
+        .section("nodes.model", "module = 'model'; inputs.truth = 'drift.Z'")
+        .outputs("predicted = 'model'")
+}
 
 /// The module of a file of its own: the truth at the smallest lag, and nothing at all.
 fn module(shown: &str) -> String {
@@ -44,7 +31,7 @@ fn module(shown: &str) -> String {
 fn desk(test: &str) -> Scratch {
     let scratch = Scratch::new(&format!("swap-commands-{test}"));
     scratch.file("model.toml", module("same"));
-    scratch.file("graph.toml", GRAPH);
+    scratch.file("graph.toml", shown());
     let still = "schema = 1\nextends = \"graph.toml\"\nname = \"still\"\noutputs.predicted = \"model:still\"\n";
     scratch.file("still.toml", still);
     scratch.file("data.csv", format!("time_s,Z\n{}", rows(1000, 31)));
@@ -121,7 +108,7 @@ fn outputs_that_only_one_graph_has_are_empty_while_another_runs() {
 #[test]
 fn columns_keep_their_names_where_the_new_graph_gives_its_outputs_in_another_order() {
     let scratch = desk("order");
-    let graph = |outputs: [&str; 2]| GRAPH.replace("predicted = \"model\"\n", &outputs.concat());
+    let graph = |outputs: [&str; 2]| shown().replace("predicted = \"model\"\n", &outputs.concat());
     let (last, still) = ("last = \"model:same\"\n", "still = \"model:still\"\n");
     scratch.file("graph.toml", graph([last, still]));
     scratch.file("turned.toml", graph([still, last]));
@@ -134,7 +121,7 @@ fn columns_keep_their_names_where_the_new_graph_gives_its_outputs_in_another_ord
 #[test]
 fn a_graph_that_lacks_outputs_of_what_runs_is_told() {
     let scratch = desk("lacking");
-    let other = GRAPH.replace("predicted = \"model\"", "still = \"model:still\"");
+    let other = shown().replace("predicted = \"model\"", "still = \"model:still\"");
     scratch.file("other.toml", other);
     let finished = run(&scratch, &[&swap(&scratch, "1200", "other.toml")]).ended(0);
     finished
@@ -196,7 +183,7 @@ fn a_graph_of_another_machine_is_told_by_the_outputs_that_it_leaves_empty() {
     // What runs gives none either: that is how this machine is.
     scratch.file(
         "graph.toml",
-        GRAPH.replace(
+        shown().replace(
             "channels = [\"Z\"]",
             "channels = [\"Z\"]\noptional = [\"Z\"]\ncolumn = \"none\"",
         ),
@@ -328,7 +315,7 @@ fn a_graph_that_gives_a_column_in_another_unit_is_refused() {
     finished.tells(&["gives the output `predicted.Z` in um/min and what runs in nm/min"]);
     let mut live = Live::new(&scratch.path("graph.toml"));
     let before = live.revision();
-    let graph = GRAPH.replace("nm/min", "um/min");
+    let graph = shown().replace("nm/min", "um/min");
     scratch.file("graph.toml", graph.replace("\"shown\"", "\"other\""));
     live.stays(&before);
     assert!(live.told().contains("in um/min and what runs in nm/min: "));
@@ -351,7 +338,7 @@ fn a_watched_graph_is_taken_over_when_any_of_its_files_changes() {
     let mut live = Live::new(&own);
     let first = live.revision();
     // The file that it extends; then one from which that takes a module; then its own.
-    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"20s\"]");
+    let slower = shown().replace("windows = [\"30s\"]", "windows = [\"20s\"]");
     scratch.file("graph.toml", &slower);
     let second = live.until_swapped(&first);
     scratch.file("model.toml", module("still"));
@@ -383,7 +370,7 @@ fn what_took_over_in_a_run_goes_on_in_the_next() {
     let kept = ["--state", state.to_str().unwrap()];
     let mut live = Live::going_on(&graph, &kept, 0);
     let first = live.revision();
-    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"40s\"]");
+    let slower = shown().replace("windows = [\"30s\"]", "windows = [\"40s\"]");
     scratch.file("graph.toml", slower);
     let second = live.until_swapped(&first);
     let time = live.time;
@@ -418,7 +405,7 @@ fn what_took_over_goes_on_after_a_kill_though_its_file_is_broken_since() {
     let kept = ["--state", state.to_str().unwrap()];
     let mut live = Live::going_on(&graph, &kept, 0);
     let first = live.revision();
-    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"40s\"]");
+    let slower = shown().replace("windows = [\"30s\"]", "windows = [\"40s\"]");
     scratch.file("graph.toml", &slower);
     let second = live.until_swapped(&first);
     // What took over is kept after its first row has been put out.
@@ -449,7 +436,7 @@ fn what_took_over_goes_on_after_a_kill_though_its_file_is_broken_since() {
 fn the_output_of_a_graph_with_fewer_outputs_is_gone_on_with_in_the_columns_that_it_has() {
     let scratch = desk("fewer");
     let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
-    let more = GRAPH.to_owned() + "still = \"model:still\"\n";
+    let more = shown().to_string() + "still = \"model:still\"\n";
     let graph = scratch.file("graph.toml", &more);
     let arguments: [&dyn AsRef<std::ffi::OsStr>; 9] = [
         &"run", &graph, &"-i", &"-", &"-o", &out, &"--watch", &"--state", &state,
@@ -474,7 +461,7 @@ fn the_output_of_a_graph_with_fewer_outputs_is_gone_on_with_in_the_columns_that_
             .unwrap();
         std::thread::sleep(Duration::from_millis(20));
         if time == 100 {
-            scratch.file("graph.toml", GRAPH);
+            scratch.file("graph.toml", shown());
         }
     }
     drop(feed);

@@ -1,40 +1,27 @@
 //! What becomes of a watched file while a graph of it is in the shadow, cannot take over, or is not there. Decides nothing about what
 //! the engine makes of a graph.
 
-use crate::workbench::{Live, Scratch, athermal_fed};
+use crate::workbench::{Graph, Live, Scratch, athermal_fed};
 
 /// No drift at all, which is wrong of a position that moves evenly.
-const GRAPH: &str = r#"
-schema = 1
-name = "watched"
-[time]
-column = "time_s"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["30s"]
-unit = "nm/min"
-[nodes.model]
-type = "zero"
-inputs.truth = "drift.Z"
-ahead = "30s"
-[outputs]
-predicted = "model"
-"#;
+fn watched() -> Graph {
+    Graph::named("watched")
+        .time("time_s")
+        .signal("position", "nm", "Z", "3min")
+        .slope("drift", "position", "30s", "nm/min")
+        .model("model", "zero", "", "drift.Z", "30s")
+        .outputs("predicted = 'model'")
+}
 
 fn desk(test: &str) -> Scratch {
     let scratch = Scratch::new(&format!("watched-runs-{test}"));
-    scratch.file("graph.toml", GRAPH);
+    scratch.file("graph.toml", watched());
     scratch
 }
 
 /// The last drift over a window, which is right of it.
 fn over(window: &str) -> String {
-    let better = GRAPH.replace("\"zero\"", "\"persistence\"");
+    let better = watched().replace("\"zero\"", "\"persistence\"");
     better.replace("30s\"]", &format!("{window}\"]"))
 }
 
@@ -67,7 +54,7 @@ fn a_graph_that_is_put_back_while_its_change_is_in_the_shadow_goes_on() {
     let first = live.revision();
     scratch.file("graph.toml", over("30s"));
     live.stays(&first);
-    scratch.file("graph.toml", GRAPH);
+    scratch.file("graph.toml", watched());
     live.stays(&first);
     assert_eq!(past_the_shadow(&mut live), [first]);
     let told = live.told();
@@ -126,7 +113,7 @@ fn a_mistake_that_comes_into_the_file_takes_out_of_the_shadow_what_was_there() {
     let first = live.revision();
     scratch.file("graph.toml", over("30s"));
     live.stays(&first);
-    scratch.file("graph.toml", GRAPH.replace("[outputs]", "[outputs"));
+    scratch.file("graph.toml", watched().replace("[outputs]", "[outputs"));
     live.stays(&first);
     assert_eq!(past_the_shadow(&mut live), [first]);
     let refused = "graph.toml is not taken over; what runs goes on";
@@ -138,14 +125,14 @@ fn a_graph_that_cannot_take_over_is_named_with_the_way_to_run_it_to_people_and_p
     let scratch = desk("refused");
     let graph = scratch.path("graph.toml");
     let way = "what runs goes on; a run that begins with other files for `--output` and `--state` takes it";
-    let renamed = GRAPH.replace("max_age", "column = \"height\"\nmax_age");
-    let other_time = GRAPH.replace("\"time_s\"", "\"time_s\"\nunit = \"ms\"");
+    let renamed = watched().replace("max_age", "column = \"height\"\nmax_age");
+    let other_time = watched().replace("\"time_s\"", "\"time_s\"\nunit = \"ms\"");
     for (text, why) in [
         (renamed, "graph.toml: the new graph reads position.Z"),
         (other_time, "graph.toml: the new graph reads time from"),
     ] {
         for format in ["table", "json"] {
-            scratch.file("graph.toml", GRAPH);
+            scratch.file("graph.toml", watched());
             // The rows of programs are those of people here.
             let out = scratch.path(&format!("{format}.csv"));
             let mut arguments = vec!["--quiet", "--format", format];
@@ -163,10 +150,10 @@ fn a_graph_that_cannot_take_over_is_named_with_the_way_to_run_it_to_people_and_p
             assert_eq!(told.contains(event), format == "json", "{told}");
         }
     }
-    scratch.file("graph.toml", GRAPH);
+    scratch.file("graph.toml", watched());
     let mut live = Live::new(&graph);
     let first = live.revision();
-    scratch.file("graph.toml", GRAPH.to_owned() + "more = \"drift\"\n");
+    scratch.file("graph.toml", watched().to_string() + "more = \"drift\"\n");
     live.stays(&first);
     let lacks = "graph.toml has the output `more.Z`, for which there is no column; ";
     assert_told(&live.told(), &[&format!("{lacks}{way}")]);
@@ -213,7 +200,7 @@ fn a_restart_with_a_graph_for_other_columns_says_that_what_ran_last_lacks_them_a
         )
     };
     run(&state, "time_s,Z\n0,0\n10,10\n").ended(0);
-    let renamed = GRAPH.replace("max_age", "column = \"height\"\nmax_age");
+    let renamed = watched().replace("max_age", "column = \"height\"\nmax_age");
     scratch.file("graph.toml", renamed);
     let log = "time_s,height\n20,20\n30,30\n";
     let refused = run(&state, log).ended(2);

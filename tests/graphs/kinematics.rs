@@ -1,34 +1,24 @@
 //! What links do, carried to a point, and what that costs in light: the nodes `kinematics` and `optical_loss` side by side.
 
-use crate::workbench::{Bench, problems};
+use crate::workbench::{Bench, Graph, problems};
 
-const GRAPH: &str = r#"
-schema = 1
-signals.rate = { unit = "nm/min", channels = ["column", "arm"], max_age = "1min" }
-signals.tilt = { unit = "urad/min", channels = ["base"], max_age = "1min" }
-
-[nodes.tool]
-type = "kinematics"
-inputs.links = ["tilt.base", "rate.column", "rate.arm"]
-links = [
-  { length = "0 mm", along = [0, 0, 1], about = [0, 1, 0] },
-  { length = "400 mm", along = [0, 0, 1] },
-  { length = "250 mm", along = [1, 0, 0] },
-]
-
-[nodes.loss]
-type = "optical_loss"
-inputs.drift = "tool"
-preset = "mandelli"
-
-[outputs]
-tool = "tool"
-loss = "loss"
-"#;
+fn arm() -> Graph {
+    Graph::new()
+        .signal("rate", "nm/min", "column arm", "1min")
+        .signal("tilt", "urad/min", "base", "1min")
+        .section("nodes.tool", "type = 'kinematics'")
+        .with("inputs.links = ['tilt.base', 'rate.column', 'rate.arm']")
+        .with("links = [{ length = '0 mm', along = [0, 0, 1], about = [0, 1, 0] },")
+        .with("  { length = '400 mm', along = [0, 0, 1] },")
+        .with("  { length = '250 mm', along = [1, 0, 0] }]")
+        .section("nodes.loss", "type = 'optical_loss'")
+        .with("inputs.drift = 'tool'; preset = 'mandelli'")
+        .outputs("tool = 'tool'; loss = 'loss'")
+}
 
 #[test]
 fn the_drifts_of_links_cost_the_light_that_the_drift_of_their_point_costs() {
-    let mut bench = Bench::new(GRAPH, &[]);
+    let mut bench = Bench::new(&arm(), &[]);
     let samples = [
         ("rate.column", 20.0),
         ("rate.arm", -5.0),
@@ -55,7 +45,7 @@ fn the_drifts_of_links_cost_the_light_that_the_drift_of_their_point_costs() {
 
 #[test]
 fn the_displacement_of_what_grows_is_no_drift() {
-    let still = GRAPH.replace("nm/min", "nm").replace("urad/min", "urad");
+    let still = arm().replace("nm/min", "nm").replace("urad/min", "urad");
     let problems = problems(&still);
     assert!(
         problems.contains("is in nm, which is no drift"),

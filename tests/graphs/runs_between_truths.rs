@@ -1,6 +1,6 @@
 //! What a trainer is told that asks for the runs between truths: the same whether rows are kept or streamed.
 
-use crate::workbench::{plan, secs};
+use crate::workbench::{Graph, plan, secs};
 use athermal::core::node::{
     Estimator, InputPort, Predictor, Regressors, Runs, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
@@ -94,25 +94,14 @@ impl Predictor for Nothing {
 
 athermal::core::predictor!(Nothing, "test_diary");
 
-const GRAPH: &str = r#"
-schema = 1
-[signals.temperature]
-unit = "K"
-channels = ["T"]
-max_age = "5s"
-[signals.shift]
-unit = "nm"
-channels = ["Z"]
-max_age = "10s"
-[nodes.diary]
-type = "test_diary"
-inputs.features = "temperature"
-inputs.truth = "shift"
-ahead = "10s"
-train.abs_truth = { below = "100 nm" }
-[outputs]
-out = "diary"
-"#;
+fn diary() -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "T", "5s")
+        .signal("shift", "nm", "Z", "10s")
+        .model("diary", "test_diary", "temperature", "shift", "10s")
+        .with("train.abs_truth = { below = '100 nm' }")
+        .outputs("out = 'diary'")
+}
 
 /// A run every 5 s, which is told its instant, but for some; a truth every 10 s, but for some, and one too large.
 fn told(memory: usize) -> Vec<String> {
@@ -143,7 +132,7 @@ fn told(memory: usize) -> Vec<String> {
         memory,
         ..FitOptions::default()
     };
-    let (_, mut report) = fit(&plan(GRAPH), &table, &options, &mut |_| {}).unwrap();
+    let (_, mut report) = fit(&plan(&diary()), &table, &options, &mut |_| {}).unwrap();
     let found = report.estimators.remove(0);
     assert_eq!(found.streamed, memory == 0);
     let Outcome::Fitted(report) = found.outcome else {

@@ -3,32 +3,28 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::workbench::{Finished, Scratch, athermal, fitted, numbers, plan, regression, secs};
+use crate::workbench::{
+    Finished, Graph, Scratch, athermal, fitted, numbers, plan, regression, secs,
+};
 use athermal::core::node::Of;
 use athermal::run::recording::Table;
 use serde_json::Value;
 
-const SIGNALS: &str = r#"
-schema = 1
-[time]
-column = "row"
-step = "1min"
-[signals.temperature]
-unit = "Cel"
-channels = ["room", "column_beside_the_measuring_head"]
-max_age = "1 sample"
-[signals.heater]
-unit = "V"
-channels = ["voltage"]
-max_age = "1 sample"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "1 sample"
-"#;
+fn signals() -> Graph {
+    Graph::new()
+        .time("row")
+        .with("step = '1min'")
+        .signal(
+            "temperature",
+            "Cel",
+            "room column_beside_the_measuring_head",
+            "1 sample",
+        )
+        .signal("heater", "V", "voltage", "1 sample")
+        .signal("position", "nm", "Z", "1 sample")
+}
 
 /// Every kind whose prediction is a sum of terms, with its parameters, and one that has polynomials.
 const NODES: [(&str, &str); 15] = [
@@ -56,25 +52,18 @@ const NODES: [(&str, &str); 15] = [
     ("armax", "type = \"armax\"\nna = 2"),
 ];
 
-fn graph() -> String {
-    let mut text = SIGNALS.to_owned();
-    for (name, node) in NODES {
-        let inputs = match name {
-            "ar" | "last" => "",
-            "stack" => "inputs.voters = [\"ols\", \"ar\"]",
-            _ => "inputs.features = [\"temperature\", \"heater\"]",
+fn graph() -> Graph {
+    let graph = NODES.iter().fold(signals(), |graph, (name, node)| {
+        let graph = graph.section(&format!("nodes.{name}"), node);
+        let graph = match *name {
+            "ar" | "last" => graph,
+            "stack" => graph.with("inputs.voters = ['ols', 'ar']"),
+            _ => graph.with("inputs.features = ['temperature', 'heater']"),
         };
-        let truth = "inputs.truth = \"position.Z\"";
-        let _ = writeln!(
-            text,
-            "[nodes.{name}]\n{node}\n{inputs}\n{truth}\nahead = \"0s\""
-        );
-    }
-    text.push_str("[outputs]\n");
-    for (name, _) in NODES {
-        let _ = writeln!(text, "{name} = \"{name}\"");
-    }
-    text
+        graph.with("inputs.truth = 'position.Z'; ahead = '0s'")
+    });
+    let outputs = NODES.map(|(name, _)| format!("{name} = '{name}'"));
+    graph.outputs(&outputs.join("; "))
 }
 
 /// Temperatures, a voltage, and a position that follows from them and from its own past, with products and noise.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::workbench::{
-    coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs,
+    Graph, coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs,
 };
 use athermal::core::compile::Plan;
 use athermal::core::node::{Figure, Predictor, TrainingError, TrainingReport};
@@ -290,34 +290,16 @@ fn the_smallest_set_within_one_standard_error_is_kept() {
 
 /// Three sensors, each with three slopes; the truth follows two of them.
 fn by_sensor(most: usize) -> (Arc<dyn Predictor>, TrainingReport) {
-    let text = format!(
-        r#"
-schema = 1
-[time]
-column = "t"
-[signals.temperature]
-unit = "Cel"
-channels = ["near", "far", "idle"]
-max_age = "1s"
-[signals.drift]
-unit = "nm"
-channels = ["Z"]
-max_age = "1s"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["20s", "40s", "80s"]
-unit = "mK/s"
-[nodes.model]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z"
-ahead = "0s"
-selection = {{ method = "forward", by = "sensor", most = {most} }}
-[outputs]
-predicted = "model"
-"#
-    );
+    let text = Graph::new()
+        .time("t")
+        .signal("temperature", "Cel", "near far idle", "1s")
+        .signal("drift", "nm", "Z", "1s")
+        .slope("gradients", "temperature", "20s 40s 80s", "mK/s")
+        .model("model", "linear", "gradients", "drift.Z", "0s")
+        .with(&format!(
+            "selection = {{ method = 'forward', by = 'sensor', most = {most} }}"
+        ))
+        .outputs("predicted = 'model'");
     let plan = plan(&text);
     let mut table = Table::default();
     let wave = |t: f64, period: f64| (std::f64::consts::TAU * t / period).sin();

@@ -1,26 +1,17 @@
 //! That the error which a fit tells of its rows is the one with which they are predicted, as far ahead and from the same truths.
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 use serde_json::Value;
 
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "time_s"
-[signals.input]
-unit = "V"
-channels = ["a"]
-max_age = "10s"
-[signals.output]
-unit = "V"
-channels = ["y"]
-max_age = "10s"
-[nodes.model]
-inputs.truth = "output.y"
-NODE
-[outputs]
-model = "model"
-"#;
+fn graph(node: &str) -> Graph {
+    Graph::new()
+        .time("time_s")
+        .signal("input", "V", "a", "10s")
+        .signal("output", "V", "y", "10s")
+        .section("nodes.model", "inputs.truth = 'output.y'")
+        .with(node)
+        .outputs("model = 'model'")
+}
 
 /// A series that follows an input, every 10 s: so many rows from one on. One in so many is a spike, none where that is 0.
 fn csv(from: usize, rows: usize, spikes: usize) -> String {
@@ -53,7 +44,7 @@ fn of_model(all: &Value) -> Value {
 fn fitted_and_scored(scratch: &Scratch, node: &str, spikes: usize) -> (Value, Value) {
     let first = scratch.file("first.csv", csv(0, 250, spikes));
     let second = scratch.file("second.csv", csv(250, 150, spikes));
-    let graph = scratch.file("graph.toml", GRAPH.replace("NODE", node));
+    let graph = scratch.file("graph.toml", self::graph(node));
     let model = scratch.path("model.json");
     let fit = athermal(&[
         &"fit",

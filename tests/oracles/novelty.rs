@@ -2,24 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::workbench::{Bench, problems};
+use crate::workbench::{Bench, Graph, problems};
 use athermal::core::node::Predictor;
 
 /// Two sensors of which the length is half the sum.
-const GRAPH: &str = r#"
-schema = 1
-signals.temperature = { unit = "K", channels = ["one", "two"], max_age = "1s" }
-signals.length = { unit = "nm", channels = ["y"], max_age = "1s" }
-
-[nodes.growth]
-type = "linear"
-inputs = { features = "temperature", truth = "length.y" }
-ahead = "0s"
-
-[outputs]
-growth = "growth"
-novelty = "growth:novelty"
-"#;
+fn two_sensors() -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "one two", "1s")
+        .signal("length", "nm", "y", "1s")
+        .model("growth", "linear", "temperature", "length.y", "0s")
+        .outputs("growth = 'growth'; novelty = 'growth:novelty'")
+}
 
 /// `0.5 one + 0.5 two`, with 20 as the mean of both and a scale of 2; in the fit they went together.
 fn growth(is_known: bool) -> Arc<dyn Predictor> {
@@ -45,7 +38,7 @@ fn growth(is_known: bool) -> Arc<dyn Predictor> {
 /// The graph with `outside`, or more lines of the estimator, and more beside it.
 fn graph(outside: &str, more: &str) -> String {
     let estimator = format!("ahead = \"0s\"\n{outside}\n");
-    GRAPH.replace("ahead = \"0s\"\n", &estimator) + more
+    two_sensors().replace("ahead = \"0s\"\n", &estimator) + more
 }
 
 /// The novelty of two temperatures as [`growth`] has it: what lies across the direction that they took in the fit.
@@ -77,7 +70,7 @@ fn novelty_grows_with_what_lies_across_the_directions_of_the_fit() {
 
 #[test]
 fn a_model_that_knows_no_novelty_predicts_and_shows_none() {
-    let mut bench = Bench::new(GRAPH, &[("growth", growth(false))]);
+    let mut bench = Bench::new(&two_sensors(), &[("growth", growth(false))]);
     let samples = [("temperature.one", 30.0), ("temperature.two", 10.0)];
     let found = bench.tick(0.0, &samples);
     assert_eq!(found[0], 20.0);

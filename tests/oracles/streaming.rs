@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::workbench::plan;
+use crate::workbench::{Graph, plan};
 use athermal::Instant;
 use athermal::core::compile::Plan;
 use athermal::run::fit::{FitOptions, Outcome, fit};
@@ -63,32 +63,18 @@ impl Source for Wander {
     }
 }
 
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "t"
-[signals.temperature]
-unit = "Cel"
-channels = ["a", "b", "c", "d"]
-max_age = "1s"
-[signals.drift]
-unit = "nm"
-channels = ["Z"]
-max_age = "1s"
-[nodes.lagged]
-type = "first_order"
-inputs.signal = "temperature"
-time_constants = ["10s", "1min", "10min"]
-[nodes.model]
-type = "linear"
-inputs.features = ["temperature", "lagged"]
-inputs.truth = "drift.Z"
-ahead = "0s"
-selection = { method = "forward", folds = { type = "blocked", count = 5, gap_rows = 600 }, one_standard_error = true }
-solver = { type = "ridge", alpha = { by = "cross_validation", folds = 5 } }
-[outputs]
-predicted = "model"
-"#;
+fn lagged() -> Graph {
+    Graph::new()
+        .time("t")
+        .signal("temperature", "Cel", "a b c d", "1s")
+        .signal("drift", "nm", "Z", "1s")
+        .node("lagged", "first_order", "temperature")
+        .with("time_constants = ['10s', '1min', '10min']")
+        .model("model", "linear", "temperature lagged", "drift.Z", "0s")
+        .with("selection = { method = 'forward', folds = { type = 'blocked', count = 5, gap_rows = 600 }, one_standard_error = true }")
+        .with("solver = { type = 'ridge', alpha = { by = 'cross_validation', folds = 5 } }")
+        .outputs("predicted = 'model'")
+}
 
 /// The most memory that this process has had, in bytes.
 fn peak() -> Option<u64> {
@@ -101,7 +87,7 @@ fn peak() -> Option<u64> {
 }
 
 fn stream(rows: u64, memory: usize) {
-    let plan: Arc<Plan> = plan(GRAPH);
+    let plan: Arc<Plan> = plan(&lagged());
     let options = FitOptions {
         memory,
         ..FitOptions::default()

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::workbench::{Bench, Read, Scratch, athermal, data, plan, problems, secs, slot};
+use crate::workbench::{Bench, Graph, Read, Scratch, athermal, data, plan, problems, secs, slot};
 use athermal::core::compile::{Plan, Wanted};
 use athermal::core::node::Predictor;
 use athermal::files::{Dataset, Options};
@@ -26,41 +26,17 @@ fn telling(text: &str) -> Arc<Plan> {
 }
 
 /// A machine's virtual sensor, with followers of the level beside it and intervals about all.
-fn graph(extends: &str) -> String {
-    format!(
-        r#"
-        schema = 1
-        extends = "{extends}"
-
-        [nodes.level]
-        type = "kalman"
-        each = "axis"
-        inputs.features = "gradients"
-        inputs.truth = "drift.{{axis}}"
-        ahead = "0s"
-
-        [nodes.safe]
-        type = "conformal"
-        each = "axis"
-        inputs.prediction = "vote.{{axis}}"
-        inputs.truth = "drift.{{axis}}"
-        memory = "1d"
-
-        [nodes.safe_level]
-        type = "conformal"
-        each = "axis"
-        inputs.prediction = "level.{{axis}}"
-        inputs.truth = "drift.{{axis}}"
-        memory = "1d"
-        coverage = 0.8
-
-        [outputs]
-        predicted = "vote"
-        level = "level"
-        safe = "safe"
-        safe_level = "safe_level"
-        "#
-    )
+fn graph(extends: &str) -> Graph {
+    Graph::extending(extends)
+        .model("level", "kalman", "gradients", "drift.{axis}", "0s")
+        .with("each = 'axis'")
+        .section("nodes.safe", "type = 'conformal'")
+        .with("each = 'axis'; inputs.prediction = 'vote.{axis}'")
+        .with("inputs.truth = 'drift.{axis}'; memory = '1d'")
+        .section("nodes.safe_level", "type = 'conformal'; each = 'axis'")
+        .with("inputs.prediction = 'level.{axis}'; inputs.truth = 'drift.{axis}'")
+        .with("memory = '1d'; coverage = 0.8")
+        .outputs("predicted = 'vote'; level = 'level'; safe = 'safe'; safe_level = 'safe_level'")
 }
 
 fn scored(text: &str, folder: &Path) -> Vec<Score> {
@@ -108,17 +84,11 @@ fn conformal_intervals_cover_what_they_state_on_both_machines() {
     }
 }
 
-const ONE_AXIS: &str = r#"
-    schema = 1
-    [signals.temperature]
-    unit = "K"
-    channels = ["room", "chuck"]
-    max_age = "1min"
-    [signals.drift]
-    unit = "nm/min"
-    channels = ["Z1"]
-    max_age = "1min"
-"#;
+fn one_axis() -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "room chuck", "1min")
+        .signal("drift", "nm/min", "Z1", "1min")
+}
 
 fn linear(intercept: f64, noise: f64, root: f64) -> Arc<dyn Predictor> {
     let written = serde_json::json!({
@@ -132,33 +102,16 @@ fn linear(intercept: f64, noise: f64, root: f64) -> Arc<dyn Predictor> {
     Arc::from(read)
 }
 
-fn voting(vote: &str, of: &[&str]) -> String {
-    let outputs: String = of
-        .iter()
-        .enumerate()
-        .map(|(nth, of)| format!("out{nth} = \"{of}\"\n"))
+fn voting(vote: &str, of: &[&str]) -> Graph {
+    let outputs = of.iter().enumerate();
+    let outputs: Vec<_> = outputs
+        .map(|(nth, of)| format!("out{nth} = '{of}'"))
         .collect();
-    let estimator = |name: &str| {
-        format!(
-            r#"
-            [nodes.{name}]
-            type = "linear"
-            inputs.features = "temperature.room"
-            inputs.truth = "drift"
-            ahead = "0s"
-            "#
-        )
-    };
-    let (one, other) = (estimator("one"), estimator("other"));
-    format!(
-        r#"{ONE_AXIS} {one} {other}
-        [nodes.vote]
-        type = "{vote}"
-        inputs.voters = ["one", "other"]
-        [outputs]
-        {outputs}
-        "#
-    )
+    one_axis()
+        .model("one", "linear", "temperature.room", "drift", "0s")
+        .model("other", "linear", "temperature.room", "drift", "0s")
+        .vote("vote", vote, "one other", "")
+        .outputs(&outputs.join("; "))
 }
 
 #[test]
@@ -259,20 +212,12 @@ fn a_deviation_that_nobody_reads_is_not_computed() {
 }
 
 /// A level that is at 10 for half an hour and then at 50, told every 30 s with a span of none.
-fn following(noises: &str, more: &str) -> String {
-    format!(
-        r#"{ONE_AXIS}
-        [nodes.level]
-        type = "kalman"
-        inputs.truth = "drift"
-        ahead = "0s"
-        noises = {noises}
-        {more}
-        [outputs]
-        level = "level"
-        deviation = "level:std_dev"
-        "#
-    )
+fn following(noises: &str, more: &str) -> Graph {
+    one_axis()
+        .model("level", "kalman", "", "drift", "0s")
+        .with(&format!("noises = {noises}"))
+        .with(more)
+        .outputs("level = 'level'; deviation = 'level:std_dev'")
 }
 
 fn recorded(rows: usize, of: impl Fn(usize) -> f64) -> Table {
@@ -446,19 +391,11 @@ fn noises_and_intervals_out_of_range_are_reported_all_at_once() {
         r#"{ observation = "5 nm/min", level = "3 nm/min", trend = "1 nm/min", per = "1min" }"#;
     let told = problems(&following(trend, ""));
     assert!(told.contains("the level has no trend"), "{told}");
-    let safe = format!(
-        r#"{ONE_AXIS}
-        [nodes.safe]
-        type = "conformal"
-        inputs.prediction = "drift"
-        inputs.truth = "drift"
-        memory = "0s"
-        coverage = 1.0
-        gain = nan
-        [outputs]
-        out = "safe"
-        "#
-    );
+    let safe = one_axis()
+        .section("nodes.safe", "type = 'conformal'")
+        .with("inputs.prediction = 'drift'")
+        .with("inputs.truth = 'drift'; memory = '0s'; coverage = 1.0; gain = nan")
+        .outputs("out = 'safe'");
     let told = problems(&safe);
     for part in ["`memory` is 0s", "`coverage` is 1", "`gain` is NaN"] {
         assert!(told.contains(part), "{part} in {told}");
@@ -468,26 +405,13 @@ fn noises_and_intervals_out_of_range_are_reported_all_at_once() {
 #[test]
 fn evaluate_tells_how_often_intervals_hold() {
     let scratch = Scratch::new("intervals");
-    let text = format!(
-        r#"{ONE_AXIS}
-        [nodes.yesterday]
-        type = "persistence"
-        inputs.truth = "drift"
-        ahead = "0s"
-        [nodes.safe]
-        type = "conformal"
-        inputs.prediction = "yesterday"
-        inputs.truth = "drift"
-        memory = "1h"
-        coverage = 0.8
-        [outputs]
-        safe = "safe"
-        lower = "safe:lower"
-        upper = "safe:upper"
-        [time]
-        column = "time_s"
-        "#
-    );
+    let text = one_axis()
+        .model("yesterday", "persistence", "", "drift", "0s")
+        .section("nodes.safe", "type = 'conformal'")
+        .with("inputs.prediction = 'yesterday'")
+        .with("inputs.truth = 'drift'; memory = '1h'; coverage = 0.8")
+        .outputs("safe = 'safe'; lower = 'safe:lower'; upper = 'safe:upper'")
+        .time("time_s");
     let graph = scratch.file("graph.toml", text);
     let mut csv = String::from("time_s,room,chuck,Z1\n");
     let mut state = 1_u64;
@@ -526,28 +450,13 @@ fn evaluate_tells_how_often_intervals_hold() {
 #[test]
 fn intervals_know_only_of_truths_that_the_embargo_lets_through() {
     let graph = |span: &str| {
-        format!(
-            r#"{ONE_AXIS}
-            [nodes.trend]
-            type = "slope"
-            inputs.signal = "temperature.room"
-            windows = ["{span}"]
-            unit = "K/min"
-            [nodes.none]
-            type = "zero"
-            inputs.truth = "trend"
-            ahead = "0s"
-            [nodes.safe]
-            type = "conformal"
-            inputs.prediction = "none"
-            inputs.truth = "trend"
-            memory = "1h"
-            coverage = 0.5
-            gain = 0.0
-            [outputs]
-            out = "safe:upper"
-            "#
-        )
+        one_axis()
+            .slope("trend", "temperature.room", span, "K/min")
+            .model("none", "zero", "", "trend", "0s")
+            .section("nodes.safe", "type = 'conformal'")
+            .with("inputs.prediction = 'none'; inputs.truth = 'trend'")
+            .with("memory = '1h'; coverage = 0.5; gain = 0.0")
+            .outputs("out = 'safe:upper'")
     };
     let mut bench = Bench::new(&graph("5min"), &[]);
     let plan = Arc::clone(bench.engine.plan());

@@ -8,6 +8,7 @@ mod live;
 mod program;
 mod regression;
 mod simulated;
+mod text;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
 pub use live::Live;
@@ -16,6 +17,7 @@ pub use program::{
 };
 pub use regression::{coefficients, fitted, numbers, regression};
 pub use simulated::simulated;
+pub use text::Graph;
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Numbers of channels that do not suit a node, or its parameters, are told when a graph is checked, and only those.
 
 use super::mistakes::assert_told;
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 
 fn graph(sensors: usize, node: &str) -> String {
     let names: Vec<String> = (0..sensors).map(|nth| format!("\"t{nth}\"")).collect();
@@ -100,27 +100,16 @@ fn helped(name: &str, text: &str, wrong: &[(&str, &str, &str)]) {
 
 #[test]
 fn a_number_without_its_unit_is_reported_with_an_example() {
-    let text = r#"schema = 1
-[signals.rate]
-unit = "nm/min"
-channels = ["X"]
-max_age = "1min"
-range = ["-200 nm/min", "200 nm/min"]
-[nodes.move]
-type = "compensate"
-inputs.rate = "rate"
-range = "20 um"
-max_rate = "1000 nm/min"
-max_slew = "50 nm/s"
-stop = { below = "3 nm/min", above = "6 nm/min" }
-[nodes.radius]
-type = "optical_loss"
-inputs.drift = "rate"
-radii = ["2 um"]
-[outputs]
-move = { from = "move", blend = "5 nm/s" }
-loss = "radius"
-"#;
+    let text = Graph::new()
+        .signal("rate", "nm/min", "X", "1min")
+        .with("range = ['-200 nm/min', '200 nm/min']")
+        .section("nodes.move", "type = 'compensate'")
+        .with("inputs.rate = 'rate'; range = '20 um'")
+        .with("max_rate = '1000 nm/min'; max_slew = '50 nm/s'")
+        .with("stop = { below = '3 nm/min', above = '6 nm/min' }")
+        .section("nodes.radius", "type = 'optical_loss'")
+        .with("inputs.drift = 'rate'; radii = ['2 um']")
+        .outputs("move = { from = 'move', blend = '5 nm/s' }; loss = 'radius'");
     let wrong = [
         (
             "range = [\"-200 nm/min\"",
@@ -153,7 +142,7 @@ loss = "radius"
             "needs a unit, e.g. \"5 nm/s\"",
         ),
     ];
-    helped("command-line-bare", text, &wrong);
+    helped("command-line-bare", &text, &wrong);
 }
 
 #[test]

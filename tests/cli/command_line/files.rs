@@ -95,7 +95,7 @@ fn an_ending_that_names_no_format_is_refused_before_anything_is_written() {
 #[test]
 fn an_output_that_is_one_of_the_inputs_is_refused_and_all_stays_as_it_is() {
     let scratch = Scratch::new("command-line-same-file");
-    let graph = scratch.file("graph.toml", super::PLAIN);
+    let graph = scratch.file("graph.toml", super::plain());
     let log = scratch.file("log.csv", "time_s,room,Z\n0,20,1\n10,20.1,2\n");
     let link = scratch.path("link.csv");
     #[cfg(unix)]
@@ -322,9 +322,10 @@ fn a_model_and_the_results_of_tests_are_written_though_nobody_reads_what_is_told
 fn a_channel_whose_samples_are_mostly_out_of_range_makes_one_ask_for_its_unit() {
     let (scratch, plain, counted, _) = desk("all-out-of-range");
     let kelvins = std::fs::read_to_string(&plain).unwrap().replace(
-        "unit = \"Cel\"\nchannels = [\"room\"]\nrange = [\"-20 Cel\", \"200 Cel\"]",
-        "unit = \"K\"\nchannels = [\"room\"]\nrange = [\"250 K\", \"480 K\"]",
+        "range = [\"-20 Cel\", \"200 Cel\"]",
+        "range = [\"250 K\", \"480 K\"]",
     );
+    let kelvins = kelvins.replace("unit = \"Cel\"", "unit = \"K\"");
     let graph = scratch.file("kelvins.toml", kelvins);
     let told = athermal(&[&"evaluate", &graph, &"--data", &counted]).ended(0);
     told.tells(&[

@@ -1,7 +1,7 @@
 //! What a machine's own file says and `run` does not read yet is told, since whoever wrote it expects it to work; and what it removes
 //! of the file that it extends.
 
-use super::{PLAIN, desk};
+use super::{desk, plain};
 use crate::workbench::{Scratch, athermal};
 
 const TOLD: &str = "does not read";
@@ -52,7 +52,7 @@ fn a_sensor_that_the_simulated_machine_of_inherited_tests_lacks_is_one_mistake()
 #[test]
 fn what_refers_to_a_node_that_is_removed_is_told_so_and_how_to_remove_it_too() {
     let scratch = Scratch::new("command-line-removed");
-    scratch.file("base.toml", PLAIN);
+    scratch.file("base.toml", plain());
     let variant = |more: &str| {
         let text = format!("schema = 1\nextends = \"base.toml\"\nnodes.same = false\n{more}");
         scratch.file("variant.toml", text)

@@ -26,61 +26,30 @@ mod truths;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use crate::workbench::{Scratch, athermal, athermal_fed};
+use crate::workbench::{Graph, Scratch, athermal, athermal_fed};
 
 /// A graph in which nothing needs fitting.
-const PLAIN: &str = r#"
-schema = 1
-name = "plain"
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["room"]
-range = ["-20 Cel", "200 Cel"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["30s"]
-unit = "nm/min"
-[nodes.same]
-type = "persistence"
-inputs.truth = "drift.Z"
-ahead = "30s"
-[outputs]
-predicted = "same"
-now = "drift"
-room = "temperature"
-"#;
+fn plain() -> Graph {
+    Graph::named("plain")
+        .time("time_s")
+        .signal("temperature", "Cel", "room", "1min")
+        .with("range = ['-20 Cel', '200 Cel']")
+        .signal("position", "nm", "Z", "3min")
+        .slope("drift", "position", "30s", "nm/min")
+        .model("same", "persistence", "", "drift.Z", "30s")
+        .outputs("predicted = 'same'; now = 'drift'; room = 'temperature'")
+}
 
 /// A graph that needs a fit.
-const FITTED: &str = r#"
-schema = 1
-name = "fitted"
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["room"]
-range = ["-20 Cel", "200 Cel"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "position.Z"
-ahead = "0s"
-[outputs]
-predicted = "thermal"
-"#;
+fn linear() -> Graph {
+    Graph::named("fitted")
+        .time("time_s")
+        .signal("temperature", "Cel", "room", "1min")
+        .with("range = ['-20 Cel', '200 Cel']")
+        .signal("position", "nm", "Z", "3min")
+        .model("thermal", "linear", "temperature", "position.Z", "0s")
+        .outputs("predicted = 'thermal'")
+}
 
 /// Rows every ten seconds from an instant on: a room that warms by 0.1 K a row, and a position ten times as large.
 fn rows(from: u32, count: u32) -> Vec<String> {
@@ -102,8 +71,8 @@ fn csv(rows: &[String]) -> String {
 /// A scratch folder with both graphs, a recording, and a model fitted on it.
 fn desk(test: &str) -> (Scratch, PathBuf, PathBuf, PathBuf) {
     let scratch = Scratch::new(&format!("command-line-{test}"));
-    let plain = scratch.file("plain.toml", PLAIN);
-    scratch.file("fitted.toml", FITTED);
+    let plain = scratch.file("plain.toml", self::plain());
+    scratch.file("fitted.toml", linear());
     let data = scratch.file("data.csv", csv(&rows(0, 60)));
     let model = scratch.path("model.json");
     athermal(&[
@@ -129,7 +98,7 @@ fn a_graph_without_mistakes_is_fine_and_one_with_warnings_only_when_not_strict()
         "[nodes.unused]\ntype = \"slope\"\ninputs.signal = \"temperature\"\nwindows = [\"30s\"]\n";
     let warned = scratch.file(
         "warned.toml",
-        PLAIN.replace("[outputs]", &format!("{unused}[outputs]")),
+        self::plain().replace("[outputs]", &format!("{unused}[outputs]")),
     );
     athermal(&[&"check", &warned])
         .ended(0)
@@ -144,7 +113,7 @@ fn a_graph_without_mistakes_is_fine_and_one_with_warnings_only_when_not_strict()
 #[test]
 fn every_mistake_is_told_with_its_place_and_the_nearest_name() {
     let (scratch, ..) = desk("mistakes");
-    let text = PLAIN
+    let text = plain()
         .replace("type = \"slope\"", "type = \"slop\"")
         .replace("type = \"persistence\"", "type = \"persistance\"");
     let wrong = scratch.file("wrong.toml", text);
@@ -154,14 +123,14 @@ fn every_mistake_is_told_with_its_place_and_the_nearest_name() {
         "did you mean `slope`?",
         "`persistance`",
         "did you mean `persistence`?",
-        "wrong.toml:16:8",
+        "wrong.toml:19:8",
         "2 errors",
     ]);
     let json = athermal(&[&"check", &wrong, &"--format", &"json"])
         .ended(2)
         .json();
     let text = json.to_string();
-    for part in ["A040", "wrong.toml", "\"line\":16", "slope"] {
+    for part in ["A040", "wrong.toml", "\"line\":19", "slope"] {
         assert!(text.contains(part), "{part} in {text}");
     }
     athermal(&[&"nodes", &"linaer"])

@@ -1,28 +1,17 @@
 //! A recipe as one file of `time`, `value` and `applies_at`, with times as text: `run` knows it ahead.
 
-use crate::workbench::{Scratch, athermal, athermal_fed};
+use crate::workbench::{Graph, Scratch, athermal, athermal_fed};
 
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "time"
-unit = "rfc3339"
-
-[signals.set_point]
-unit = "Cel"
-channels = ["chuck"]
-column = "value"
-known_ahead = "10min"
-max_age = "1h"
-
-[nodes.recipe]
-type = "lag"
-inputs.signal = "set_point"
-lags = ["-5min", "0s"]
-
-[outputs]
-recipe = "recipe"
-"#;
+fn coming() -> Graph {
+    Graph::new()
+        .time("time")
+        .with("unit = 'rfc3339'")
+        .signal("set_point", "Cel", "chuck", "1h")
+        .with("column = 'value'; known_ahead = '10min'")
+        .node("recipe", "lag", "set_point")
+        .with("lags = ['-5min', '0s']")
+        .outputs("recipe = 'recipe'")
+}
 
 /// A row a minute: at first 20 °C, in the fourth minute 50 °C from the thirteenth on, in the 21st 30 °C without an instant.
 fn recipe() -> String {
@@ -52,7 +41,7 @@ fn cells(table: &str) -> Vec<[f64; 2]> {
 #[test]
 fn a_recipe_with_instants_as_text_is_known_ahead() {
     let scratch = Scratch::new("planned-rows");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", coming());
     let recipe = recipe();
     let input = scratch.file("recipe.csv", &recipe);
     let run = athermal(&[&"run", &graph, &"--input", &input]).ended(0);
@@ -73,7 +62,7 @@ fn a_recipe_with_instants_as_text_is_known_ahead() {
 #[test]
 fn an_instant_that_is_none_is_refused_with_its_place() {
     let scratch = Scratch::new("planned-rows-wrong");
-    let graph = scratch.file("graph.toml", GRAPH);
+    let graph = scratch.file("graph.toml", coming());
     let wrong = recipe().replace("2025-01-01T01:12:00+01:00", "soon");
     let input = scratch.file("recipe.csv", wrong);
     athermal(&[&"run", &graph, &"--input", &input])

@@ -6,42 +6,28 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::workbench::{Finished, Scratch, athermal, athermal_on};
+use crate::workbench::{Finished, Graph, Scratch, athermal, athermal_on};
 
 /// What reads past truths, what follows them, what reads none, and a vote of two.
-const MODES: &str = r#"
-schema = 1
-name = "modes"
-time.column = "s"
-signals.x = { unit = "K", channels = ["u"], column = "u", max_age = "2s" }
-signals.y = { unit = "nm", channels = ["y"], column = "y", max_age = "2s" }
-[nodes.own]
-type = "ar"
-lags = ["0s", "2s"]
-inputs.truth = "y.y"
-ahead = "2s"
-[nodes.level]
-type = "kalman"
-inputs.features = "x"
-inputs.truth = "y.y"
-ahead = "2s"
-[nodes.features]
-type = "linear"
-inputs.features = "x"
-inputs.truth = "y.y"
-ahead = "2s"
-[nodes.vote]
-type = "mean"
-inputs.voters = ["own", "features"]
-[outputs]
-vote = "vote"
-level = "level"
-"#;
+fn in_modes() -> Graph {
+    Graph::named("modes")
+        .time("s")
+        .signal("x", "K", "u", "2s")
+        .with("column = 'u'")
+        .signal("y", "nm", "y", "2s")
+        .with("column = 'y'")
+        .model("own", "ar", "", "y.y", "2s")
+        .with("lags = ['0s', '2s']")
+        .model("level", "kalman", "x", "y.y", "2s")
+        .model("features", "linear", "x", "y.y", "2s")
+        .vote("vote", "mean", "own features", "")
+        .outputs("vote = 'vote'; level = 'level'")
+}
 
 /// A scratch folder with the graph, a log, another, and a model fitted on the first.
 fn modes(test: &str) -> (Scratch, PathBuf, [PathBuf; 2], PathBuf) {
     let scratch = Scratch::new(&format!("command-line-{test}"));
-    let graph = scratch.file("modes.toml", MODES);
+    let graph = scratch.file("modes.toml", in_modes());
     let log = |name: &str, from: u32| {
         let (mut text, mut y) = ("s,u,y\n".to_owned(), 0.0);
         for nth in from..from + 400 {

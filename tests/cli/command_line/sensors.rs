@@ -130,7 +130,7 @@ fn samples_out_of_range_are_told_again_after_an_hour_in_order() {
 #[test]
 fn sensors_are_watched_by_the_graph_that_has_taken_over() {
     let (scratch, plain, _, _) = desk("followed");
-    let other = super::PLAIN.replace("\"room\"", "\"hall\"");
+    let other = super::plain().replace("\"room\"", "\"hall\"");
     let other = scratch.file("other.toml", other);
     // The room is not measured once nothing needs it, and the hall fails long after it began to count.
     let all = rows(0, 1500).into_iter().enumerate().map(|(nth, row)| {

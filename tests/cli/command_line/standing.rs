@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 
-use super::{FITTED, csv, desk, rows};
+use super::{csv, desk, linear, rows};
 use crate::workbench::{athermal, athermal_on};
 
 #[cfg(unix)]
@@ -30,7 +30,7 @@ fn a_log_that_a_shell_opens_as_standard_input_is_not_written_over() {
 #[test]
 fn results_of_tests_do_not_take_the_place_of_their_data() {
     let (scratch, _, data, _) = desk("junit-data");
-    let graph = FITTED.replace(
+    let graph = linear().replace(
         "[outputs]",
         "[[tests]]\nname = \"own\"\nfit = \"data.csv\"\non = \"data.csv\"\n\
          expect = [{ of = \"thermal\", valid_above = 0 }]\n[outputs]",
@@ -68,7 +68,7 @@ fn nodes_of_a_model_that_have_no_fit_are_told_when_it_is_run() {
     let more = "[signals.other]\nunit = \"Cel\"\nchannels = [\"hall\"]\nmax_age = \"1min\"\n\
                 [nodes.second]\ntype = \"linear\"\ninputs.features = \"other\"\n\
                 inputs.truth = \"position.Z\"\nahead = \"0s\"\n";
-    let graph = scratch.file("two.toml", format!("{FITTED}{more}"));
+    let graph = scratch.file("two.toml", format!("{}{more}", linear()));
     let log = csv(&rows(0, 60)).replace('\n', ",\n");
     let log = scratch.file("log.csv", log.replacen("Z,", "Z,hall", 1));
     let model = scratch.path("two.json");

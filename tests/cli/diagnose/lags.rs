@@ -4,12 +4,12 @@ use athermal::core::prng::Prng;
 use athermal::diagnosis::{lag, observe};
 use athermal::run::recording::Table;
 
-use super::{TWO_SENSORS, linear, model, secs, wandering};
+use super::{linear, model, secs, two_sensors, wandering};
 
 #[test]
 fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_there() {
     let terms = [("gradients.b@150s", 0.1)];
-    let model = model("lags", TWO_SENSORS, &[("thermal", linear(&terms, 0.0))]);
+    let model = model("lags", &two_sensors(), &[("thermal", linear(&terms, 0.0))]);
     let table = wandering(6000, |course, row| {
         1000.0 * course[row.saturating_sub(60)][0]
     });
@@ -74,7 +74,7 @@ fn of_many_features_that_have_nothing_to_do_with_a_truth_hardly_ever_one_seems_t
 #[test]
 fn no_feature_is_set_against_a_truth_of_before_its_time() {
     let terms = [("temperature.a", 0.0)];
-    let text = TWO_SENSORS
+    let text = two_sensors()
         .replace("\"gradients\"", "\"temperature\"")
         .replace("\"drift.z\"", "\"position.z\"")
         .replace("ahead = \"0s\"", "ahead = \"150s\"");
@@ -107,7 +107,7 @@ fn no_feature_is_set_against_a_truth_of_before_its_time() {
 #[test]
 fn missing_truths_leave_the_lag_of_a_feature_where_it_is() {
     let terms = [("temperature.a", 1000.0)];
-    let text = TWO_SENSORS
+    let text = two_sensors()
         .replace("\"gradients\"", "\"temperature\"")
         .replace("\"drift.z\"", "\"position.z\"")
         .replace("\"1min\"", "\"10s\"");

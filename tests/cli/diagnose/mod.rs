@@ -7,7 +7,7 @@ mod program;
 mod reach;
 use std::sync::Arc;
 
-use crate::workbench::{Scratch, graph, linear, secs, simulated};
+use crate::workbench::{Graph, Scratch, graph, linear, secs, simulated};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
 use athermal::diagnosis::{
@@ -20,37 +20,16 @@ use athermal::run::score::trace;
 use athermal::{Duration, Instant, Model};
 
 /// Two temperatures and a position, every 10 s, and an estimator whose coefficients the test gives.
-const TWO_SENSORS: &str = r#"
-schema = 1
-name = "two-sensors"
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["a", "b"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["z"]
-max_age = "1min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["150s", "10min"]
-unit = "mK/min"
-[nodes.thermal]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.z"
-ahead = "0s"
-[outputs]
-predicted = "thermal"
-"#;
+fn two_sensors() -> Graph {
+    Graph::named("two-sensors")
+        .time("time_s")
+        .signal("temperature", "Cel", "a b", "1min")
+        .signal("position", "nm", "z", "1min")
+        .slope("drift", "position", "5min", "nm/min")
+        .slope("gradients", "temperature", "150s 10min", "mK/min")
+        .model("thermal", "linear", "gradients", "drift.z", "0s")
+        .outputs("predicted = 'thermal'")
+}
 
 fn model(test: &str, text: &str, fitted: &[(&str, Arc<dyn Predictor>)]) -> Model {
     let scratch = Scratch::new(test);
@@ -100,7 +79,11 @@ fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
         ("gradients.a@600s", -0.1),
         ("gradients.b@600s", 0.7),
     ];
-    let model = model("impulse", TWO_SENSORS, &[("thermal", linear(&terms, 5.0))]);
+    let model = model(
+        "impulse",
+        &two_sensors(),
+        &[("thermal", linear(&terms, 5.0))],
+    );
     let table = wandering(600, |course, row| 1000.0 * course[row][0]);
     let observation = observe(&model, &table).unwrap();
     let found = response::responses(&model, &observation).unwrap();
@@ -140,7 +123,7 @@ fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
 
 #[test]
 fn an_answer_that_lasts_has_a_gain_and_no_sum() {
-    let text = TWO_SENSORS.replace(
+    let text = two_sensors().replace(
         "inputs.features = \"gradients\"",
         "inputs.features = \"temperature\"",
     );
@@ -159,7 +142,7 @@ fn an_answer_that_lasts_has_a_gain_and_no_sum() {
 
 #[test]
 fn what_a_level_leaves_for_good_is_told_beside_slopes_that_answer_far_more() {
-    let text = TWO_SENSORS.replace(
+    let text = two_sensors().replace(
         "inputs.features = \"gradients\"",
         "inputs.features = [\"gradients\", \"temperature\"]",
     );
@@ -178,7 +161,7 @@ fn what_a_level_leaves_for_good_is_told_beside_slopes_that_answer_far_more() {
 
 #[test]
 fn an_estimator_that_reads_past_truths_answers_as_its_transfer_function() {
-    let text = TWO_SENSORS
+    let text = two_sensors()
         .replace("type = \"linear\"", "type = \"arx\"\nlags = [\"10s\"]")
         .replace("\"drift.z\"", "\"position.z\"")
         .replace("\"gradients\"", "\"temperature\"");
@@ -204,29 +187,19 @@ fn an_estimator_that_reads_past_truths_answers_as_its_transfer_function() {
 }
 
 /// Two series that nothing predicts: each truth is all residual.
-const NOISE: &str = r#"
-schema = 1
-name = "noise"
-[time]
-column = "time_s"
-[signals.y]
-unit = "1"
-channels = ["white", "smooth"]
-max_age = "1s"
-[nodes.nothing]
-type = "zero"
-each = ["channel"]
-inputs.truth = "y.{channel}"
-ahead = "0s"
-[sets]
-channel = ["white", "smooth"]
-[outputs]
-predicted = "nothing"
-"#;
+fn noise() -> Graph {
+    Graph::named("noise")
+        .time("time_s")
+        .signal("y", "1", "white smooth", "1s")
+        .model("nothing", "zero", "", "y.{channel}", "0s")
+        .with("each = ['channel']")
+        .section("sets", "channel = ['white', 'smooth']")
+        .outputs("predicted = 'nothing'")
+}
 
 #[test]
 fn white_residuals_are_told_from_others() {
-    let model = model("white", NOISE, &[]);
+    let model = model("white", &noise(), &[]);
     let mut random = Prng::stream(1, "noise");
     let (mut table, mut smooth) = (Table::default(), 0.0);
     for row in 0..2000 {
@@ -243,7 +216,7 @@ fn white_residuals_are_told_from_others() {
 
 #[test]
 fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
-    let model = model("paused", NOISE, &[]);
+    let model = model("paused", &noise(), &[]);
     let found = |pause: f64, missing: bool| {
         let mut random = Prng::stream(1, "noise");
         let (mut table, mut smooth) = (Table::default(), 0.0);
@@ -278,7 +251,7 @@ fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
 
 #[test]
 fn a_single_truth_long_after_the_first_row_is_one_residual() {
-    let model = model("single", NOISE, &[]);
+    let model = model("single", &noise(), &[]);
     let mut table = Table::default();
     table.push(secs(0.0), &[f64::NAN; 2]);
     table.push(secs(36_000.0), &[1.0, f64::NAN]);
@@ -292,7 +265,7 @@ fn a_single_truth_long_after_the_first_row_is_one_residual() {
 fn residuals_are_taken_one_per_window_and_never_across_segments() {
     let model = model(
         "spacing",
-        TWO_SENSORS,
+        &two_sensors(),
         &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
     );
     let whole = wandering(1200, |course, row| 1000.0 * course[row][0]);
@@ -316,7 +289,7 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
     let terms = [("gradients.a@150s", 2.0), ("gradients.b@150s", 0.5)];
     let model = model(
         "contribution",
-        TWO_SENSORS,
+        &two_sensors(),
         &[("thermal", linear(&terms, 0.0))],
     );
     let table = wandering(3000, |course, row| {
@@ -349,7 +322,7 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
 fn a_sensor_that_is_watched_is_tried_like_any_other() {
     let terms = [("gradients.a@150s", 2.0), ("gradients.b@150s", 0.5)];
     let facts = |watch: &str| {
-        let text = TWO_SENSORS.replace(
+        let text = two_sensors().replace(
             "[nodes.gradients]\ntype = \"slope\"\ninputs.signal = \"temperature\"",
             &format!(
                 "[nodes.sound]\ntype = \"health\"\ninputs.signal = \"temperature\"\n{watch}\n\
@@ -459,7 +432,7 @@ fn a_day_left_out_is_scored_by_a_fit_that_has_not_seen_it() {
 
 #[test]
 fn a_graph_is_tried_with_its_own_window_though_what_is_measured_has_a_span_too() {
-    let text = TWO_SENSORS.replace("inputs.signal = \"position\"", "inputs.signal = \"means\"")
+    let text = two_sensors().replace("inputs.signal = \"position\"", "inputs.signal = \"means\"")
         + "[nodes.means]\ntype = \"resample\"\ninputs.signal = \"position\"\nevery = \"1min\"\n";
     let thermal = linear(&[("gradients.a@150s", 1.0)], 0.0);
     let model = model("own-window", &text, &[("thermal", thermal)]);
@@ -471,7 +444,7 @@ fn a_graph_is_tried_with_its_own_window_though_what_is_measured_has_a_span_too()
 
 #[test]
 fn fits_on_a_few_days_are_set_against_those_on_all_others_where_both_predict() {
-    let text = TWO_SENSORS
+    let text = two_sensors()
         .replace("\"drift.z\"", "\"position.z\"")
         .replace("\"gradients\"", "\"temperature\"")
         .replace("max_age = \"1min\"", "max_age = \"5s\"");
@@ -507,7 +480,7 @@ fn fits_on_a_few_days_are_set_against_those_on_all_others_where_both_predict() {
 fn a_wider_window_lifts_a_drift_above_its_noise() {
     let model = model(
         "window",
-        TWO_SENSORS,
+        &two_sensors(),
         &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
     );
     let mut random = Prng::stream(8, "noise");
@@ -545,7 +518,7 @@ fn a_wider_window_lifts_a_drift_above_its_noise() {
 fn a_recording_without_a_truth_is_no_reason_to_stop() {
     let model = model(
         "empty",
-        TWO_SENSORS,
+        &two_sensors(),
         &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
     );
     let options = Options {

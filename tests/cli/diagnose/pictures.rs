@@ -2,36 +2,21 @@
 
 use std::fmt::Write as _;
 
-use super::TWO_SENSORS;
-use crate::workbench::{Scratch, athermal_on};
+use super::two_sensors;
+use crate::workbench::{Graph, Scratch, athermal_on};
 
 #[test]
 fn answers_to_sensors_of_different_units_are_drawn_apart() {
     let scratch = Scratch::new("diagnose-units");
     let graph = scratch.file(
         "graph.toml",
-        r#"schema = 1
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["bed"]
-max_age = "1min"
-[signals.load]
-unit = "%"
-channels = ["spindle"]
-max_age = "1min"
-[signals.position]
-unit = "um"
-channels = ["Z"]
-max_age = "1min"
-[nodes.model]
-type = "linear"
-inputs = { features = ["temperature", "load"], truth = "position.Z" }
-ahead = "0s"
-[outputs]
-predicted = "model"
-"#,
+        Graph::new()
+            .time("time_s")
+            .signal("temperature", "Cel", "bed", "1min")
+            .signal("load", "%", "spindle", "1min")
+            .signal("position", "um", "Z", "1min")
+            .model("model", "linear", "temperature load", "position.Z", "0s")
+            .outputs("predicted = 'model'"),
     );
     let mut rows = String::from("time_s,bed,spindle,Z\n");
     for row in 0..200 {
@@ -61,7 +46,7 @@ predicted = "model"
 fn a_legend_keeps_channels_of_one_name_apart() {
     let scratch = Scratch::new("diagnose-legend");
     let both = "inputs.features = [\"gradients\", \"temperature\"]";
-    let text = TWO_SENSORS
+    let text = two_sensors()
         .replace("inputs.features = \"gradients\"", both)
         .replace("\"150s\", \"10min\"", "\"150s\"");
     let (model, log) = fitted(&scratch, &text);
@@ -75,7 +60,8 @@ fn a_legend_keeps_channels_of_one_name_apart() {
 #[test]
 fn every_prediction_that_is_asked_for_is_drawn() {
     let scratch = Scratch::new("diagnose-asked");
-    let (before, thermal) = TWO_SENSORS.split_once("[nodes.thermal]").unwrap();
+    let graph = two_sensors();
+    let (before, thermal) = graph.split_once("[nodes.thermal]").unwrap();
     let (thermal, outputs) = thermal.split_once("[outputs]").unwrap();
     let text = format!(
         "{before}[nodes.thermal]{thermal}[nodes.other]{thermal}[outputs]{outputs}other = \"other\"\n"
@@ -102,7 +88,7 @@ fn every_prediction_that_is_asked_for_is_drawn() {
 #[test]
 fn an_answer_is_drawn_from_the_step_on_though_nothing_is_predicted_so_near() {
     let scratch = Scratch::new("diagnose-from-the-step");
-    let text = TWO_SENSORS.replace("ahead = \"0s\"", "ahead = \"10min\"");
+    let text = two_sensors().replace("ahead = \"0s\"", "ahead = \"10min\"");
     let (model, log) = fitted(&scratch, &text);
     let plots = scratch.path("plots");
     athermal_on("diagnose", &model, &log, &[&"--no-fit", &"--plots", &plots]).ended(0);

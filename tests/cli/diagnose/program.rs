@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::{NOISE, TWO_SENSORS, wandering};
-use crate::workbench::{Scratch, athermal, athermal_on, graph, one_axis, simulated};
+use super::{noise, two_sensors, wandering};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on, graph, one_axis, simulated};
 
 #[test]
 fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
@@ -137,7 +137,7 @@ fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
         let rows: String = rows.collect();
         scratch.file(name, format!("time_s,white,smooth\n{rows}"))
     };
-    let graph = scratch.file("noise.toml", NOISE);
+    let graph = scratch.file("noise.toml", noise());
     let empty = log("empty.csv", |_| String::new());
     let told = athermal_on("diagnose", &graph, &empty, &[&"--no-fit", &"--window"]);
     let told = told.ended(0);
@@ -177,27 +177,14 @@ fn a_truth_that_never_changes_is_called_so_and_no_number_of_days_enough_for_it()
         .map(|row| format!("{row},{},7\n", row % 5))
         .collect();
     let data = scratch.file("still.csv", format!("s,u,y\n{rows}"));
-    let text = r#"schema = 1
-[time]
-column = "s"
-[signals.in]
-unit = "V"
-channels = ["u"]
-column = "{channel}"
-max_age = "1s"
-[signals.out]
-unit = "nm"
-channels = ["y"]
-column = "{channel}"
-max_age = "1s"
-[nodes.m]
-type = "linear"
-inputs.features = "in"
-inputs.truth = "out.y"
-ahead = "0s"
-[outputs]
-p = "m"
-"#;
+    let text = Graph::new()
+        .time("s")
+        .signal("in", "V", "u", "1s")
+        .with("column = '{channel}'")
+        .signal("out", "nm", "y", "1s")
+        .with("column = '{channel}'")
+        .model("m", "linear", "in", "out.y", "0s")
+        .outputs("p = 'm'");
     let (graph, model) = (scratch.file("graph.toml", text), scratch.path("model.json"));
     athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
     let told = athermal_on("diagnose", &model, &data, &[&"--day", &"100s"]).ended(0);
@@ -244,7 +231,7 @@ outputs.predicted = "model"
 #[test]
 fn the_coefficients_it_points_to_are_there_for_a_node_without_each_too() {
     let scratch = Scratch::new("diagnose-without-each");
-    let graph = scratch.file("graph.toml", TWO_SENSORS);
+    let graph = scratch.file("graph.toml", two_sensors());
     // The position answers a temperature ten minutes late, so that what is left goes with a feature that is used.
     let table = wandering(6000, |course, row| {
         1000.0 * course[row.saturating_sub(60)][0]
@@ -370,7 +357,8 @@ fn the_rows_that_tell_how_well_data_determine_a_model_are_those_of_its_fit() {
 #[test]
 fn answers_of_instances_that_predict_the_same_are_told_by_the_instances() {
     let scratch = Scratch::new("diagnose-same-truth");
-    let (head, rest) = TWO_SENSORS.split_once("[nodes.thermal]").unwrap();
+    let sensors = two_sensors();
+    let (head, rest) = sensors.split_once("[nodes.thermal]").unwrap();
     let rest = rest.replace("\"gradients\"", "\"gradients.{sensor}@*\"");
     let text =
         format!("{head}[sets]\nsensor = [\"a\", \"b\"]\n[nodes.thermal]\neach = \"sensor\"{rest}");

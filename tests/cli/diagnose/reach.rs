@@ -2,7 +2,7 @@
 
 use athermal::diagnosis::{lag, observe, response};
 
-use super::{TWO_SENSORS, linear, model, wandering};
+use super::{linear, model, two_sensors, wandering};
 
 /// Intervals about the prediction that remember errors for longer than anything else reaches back.
 const INTERVAL: &str = r#"
@@ -17,24 +17,25 @@ predicted = "interval"
 
 #[test]
 fn what_intervals_remember_changes_neither_answers_nor_lags() {
-    let with = TWO_SENSORS.replace("[outputs]\npredicted = \"thermal\"\n", INTERVAL);
+    let with = two_sensors().replace("\n[outputs]\npredicted = \"thermal\"\n", INTERVAL);
     let table = wandering(1200, |course, row| 1000.0 * course[row][0]);
     let terms = [("gradients.a@150s", 0.4), ("gradients.b@600s", 0.7)];
-    let [without, with] = [("alone", TWO_SENSORS), ("remembering", &with)].map(|(name, text)| {
-        let model = model(name, text, &[("thermal", linear(&terms, 5.0))]);
-        let observation = observe(&model, &table).unwrap();
-        let answers = response::responses(&model, &observation).unwrap();
-        let of = ["thermal".to_owned()];
-        let lags = lag::lags(&model, &table, &observation, &of).unwrap();
-        (answers, lags)
-    });
+    let [without, with] =
+        [("alone", &*two_sensors()), ("remembering", &with)].map(|(name, text)| {
+            let model = model(name, text, &[("thermal", linear(&terms, 5.0))]);
+            let observation = observe(&model, &table).unwrap();
+            let answers = response::responses(&model, &observation).unwrap();
+            let of = ["thermal".to_owned()];
+            let lags = lag::lags(&model, &table, &observation, &of).unwrap();
+            (answers, lags)
+        });
     assert_eq!(without.0[0].sensors.len(), 2);
     assert!(without == with, "{:?}", with.1[0].lag_s);
 }
 
 #[test]
 fn answers_reach_as_far_back_as_there_is_time() {
-    let slow = TWO_SENSORS.replace("\"10min\"", "\"100000d\"");
+    let slow = two_sensors().replace("\"10min\"", "\"100000d\"");
     let terms = [("gradients.a@8640000000s", 0.4)];
     let model = model("long", &slow, &[("thermal", linear(&terms, 5.0))]);
     let table = wandering(1200, |course, row| 1000.0 * course[row][0]);
@@ -49,7 +50,7 @@ fn answers_reach_as_far_back_as_there_is_time() {
 
 #[test]
 fn lags_reach_no_further_than_a_quarter_of_the_recording() {
-    let slow = TWO_SENSORS.replace("\"10min\"", "\"2d\"");
+    let slow = two_sensors().replace("\"10min\"", "\"2d\"");
     let model = model("short", &slow, &[("thermal", linear(&[], 0.0))]);
     let table = wandering(3600, |course, row| 1000.0 * course[row][0]);
     let observation = observe(&model, &table).unwrap();
@@ -62,14 +63,8 @@ fn lags_reach_no_further_than_a_quarter_of_the_recording() {
 
 #[test]
 fn a_prediction_is_no_feature_of_what_it_predicts() {
-    let stack = r#"
-[nodes.stack]
-type = "stack"
-inputs.voters = "thermal"
-inputs.truth = "drift.z"
-ahead = "0s"
-"#;
-    let text = format!("{TWO_SENSORS}{stack}");
+    let text = two_sensors().vote("stack", "stack", "thermal", "drift.z");
+    let text = text.with("ahead = '0s'");
     let terms = [("gradients.a@150s", 0.4)];
     let model = model("stacked", &text, &[("thermal", linear(&terms, 5.0))]);
     let table = wandering(1200, |course, row| 1000.0 * course[row][0]);

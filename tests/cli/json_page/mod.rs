@@ -7,7 +7,7 @@ use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::workbench::{Scratch, athermal, athermal_on, graph};
+use crate::workbench::{Graph, Scratch, athermal, athermal_on, graph};
 use athermal::Duration;
 use athermal::serve::connector::{ConnectorError, Seen};
 use athermal::serve::deployment::Found;
@@ -157,31 +157,20 @@ fn recordings(scratch: &Scratch) -> (PathBuf, [PathBuf; 2]) {
 
 /// A graph whose combiner goes by more truths than there are, and one that is seldom there; and its log.
 fn scarce(scratch: &Scratch) -> (PathBuf, PathBuf) {
-    let text = r#"schema = 1
-name = "scarce"
-time.column = "s"
-signals.out = { unit = "V", channels = ["y"], column = "{channel}", max_age = "20s" }
-[nodes.often]
-type = "ar"
-inputs.truth = "out.y"
-ahead = "10s"
-lags = ["0s"]
-[nodes.seldom]
-type = "ar"
-inputs.truth = "out.y"
-ahead = "10s"
-lags = ["700s"]
-[nodes.bounds]
-type = "conformal"
-inputs.prediction = "often"
-inputs.truth = "out.y"
-coverage = 0.999
-memory = "1h"
-[outputs]
-often = "often"
-seldom = "seldom"
-bounds = "bounds"
-"#;
+    let text = Graph::named("scarce")
+        .time("s")
+        .signal("out", "V", "y", "20s")
+        .with("column = '{channel}'")
+        .model("often", "ar", "", "out.y", "10s")
+        .with("lags = ['0s']")
+        .model("seldom", "ar", "", "out.y", "10s")
+        .with("lags = ['700s']")
+        .section(
+            "nodes.bounds",
+            "type = 'conformal'; inputs.prediction = 'often'",
+        )
+        .with("inputs.truth = 'out.y'; coverage = 0.999; memory = '1h'")
+        .outputs("often = 'often'; seldom = 'seldom'; bounds = 'bounds'");
     let rows = (0..100).map(|nth| {
         let size = if nth < 75 { 5.0 } else { 0.1 };
         format!("{},{:.4}\n", 10 * nth, size * (0.8 * f64::from(nth)).sin())

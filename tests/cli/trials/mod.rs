@@ -3,47 +3,24 @@
 
 mod looked_at;
 
-use crate::workbench::{Scratch, athermal};
+use crate::workbench::{Graph, Scratch, athermal};
 
 /// Two channels of which the slopes are known by hand, and one that is never measured.
-const GRAPH: &str = r#"
-schema = 1
-name = "plain"
-[signals.temperature]
-unit = "Cel"
-channels = ["room", "plate"]
-range = ["-20 Cel", "200 Cel"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["30s"]
-unit = "nm/min"
-[nodes.slopes]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["30s"]
-unit = "mK/min"
-[nodes.zero]
-type = "zero"
-inputs.truth = "drift.Z"
-ahead = "30s"
-[nodes.same]
-type = "persistence"
-inputs.truth = "drift.Z"
-ahead = "30s"
-[outputs]
-predicted = ["zero", "same"]
-slopes = "slopes"
-"#;
+fn plain() -> Graph {
+    Graph::named("plain")
+        .signal("temperature", "Cel", "room plate", "1min")
+        .with("range = ['-20 Cel', '200 Cel']")
+        .signal("position", "nm", "Z", "3min")
+        .slope("drift", "position", "30s", "nm/min")
+        .slope("slopes", "temperature", "30s", "mK/min")
+        .model("zero", "zero", "", "drift.Z", "30s")
+        .model("same", "persistence", "", "drift.Z", "30s")
+        .outputs("predicted = ['zero', 'same']; slopes = 'slopes'")
+}
 
 /// The graph with these tests, without the output columns' clash.
 fn graph(tests: &str) -> String {
-    let graph = GRAPH.replace(
+    let graph = plain().replace(
         "predicted = [\"zero\", \"same\"]",
         "zero = \"zero\"\nsame = \"same\"",
     );

@@ -1,29 +1,15 @@
 //! How long a held value counts: by its stamp, which is the oldest among what it was made of.
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{Bench, Read, linear, problems};
+use super::{samples, slopes};
+use crate::workbench::{Bench, Graph, Read, linear, problems};
 
 /// An estimator on both temperatures, held, and a vote that holds its answer.
-fn held(vote: &str) -> String {
-    format!(
-        r#"{SAMPLES}
-[nodes.warm]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "position.Z"
-ahead = "0s"
-[nodes.still]
-type = "zero"
-inputs.truth = "position.Z"
-ahead = "0s"
-[nodes.vote]
-type = "mean"
-inputs.voters = {vote}
-[outputs]
-out = "vote"
-still = "still"
-"#
-    )
+fn held(vote: &str) -> Graph {
+    samples()
+        .model("warm", "linear", "temperature", "position.Z", "0s")
+        .model("still", "zero", "", "position.Z", "0s")
+        .vote("vote", "mean", vote, "")
+        .outputs("out = 'vote'; still = 'still'")
 }
 
 fn sum() -> [(
@@ -62,17 +48,9 @@ fn a_held_input_counts_up_to_its_maximum_age_and_its_stamp_is_handed_on() {
 
 #[test]
 fn by_default_a_sample_counts_as_long_as_its_signal_says_and_a_slope_for_its_window() {
-    let text = format!(
-        r#"{SAMPLES}{SLOPES}
-[nodes.warm]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z"
-ahead = "0s"
-[outputs]
-out = "warm"
-"#
-    );
+    let text = slopes()
+        .model("warm", "linear", "gradients", "drift.Z", "0s")
+        .outputs("out = 'warm'");
     let fit = linear(&[("gradients.room", 1.0), ("gradients.chuck", 1.0)], 0.0);
     let mut bench = Bench::new(&text, &[("warm", fit)]);
     let mut answers = Vec::new();
@@ -134,35 +112,14 @@ fn truth_alone_makes_nothing_run_but_what_changes_with_time() {
 
 #[test]
 fn at_a_tick_without_any_sample_only_what_changes_with_time_runs() {
-    let text = format!(
-        r#"{SAMPLES}{SLOPES}
-[nodes.motion]
-type = "ar"
-inputs.truth = "drift.Z"
-ahead = "5min"
-lags = ["0s"]
-[nodes.both]
-type = "arx"
-inputs.features = "gradients"
-inputs.truth = "drift.Z"
-ahead = "5min"
-lags = ["0s"]
-[nodes.same]
-type = "persistence"
-inputs.truth = "drift.Z"
-ahead = "5min"
-[nodes.warm]
-type = "linear"
-inputs.features = "gradients"
-inputs.truth = "drift.Z"
-ahead = "5min"
-[outputs]
-out = ["motion"]
-both = "both"
-same = "same"
-warm = "warm"
-"#
-    );
+    let text = slopes()
+        .model("motion", "ar", "", "drift.Z", "5min")
+        .with("lags = ['0s']")
+        .model("both", "arx", "gradients", "drift.Z", "5min")
+        .with("lags = ['0s']")
+        .model("same", "persistence", "", "drift.Z", "5min")
+        .model("warm", "linear", "gradients", "drift.Z", "5min")
+        .outputs("out = ['motion']; both = 'both'; same = 'same'; warm = 'warm'");
     let fits = [
         ("motion", linear(&[("drift.Z lag 0s", 1.0)], 0.0)),
         (
@@ -199,7 +156,7 @@ warm = "warm"
 
 #[test]
 fn a_held_sample_that_nothing_bounds_is_a_mistake() {
-    let told = problems(&held("\"warm\"").replace("max_age = \"1min\"", ""));
+    let told = problems(&held("warm").replace("max_age = \"1min\"", ""));
     assert!(
         told.contains("nothing defines how long a value of `temperature.room` counts"),
         "{told}"
@@ -211,22 +168,11 @@ fn a_held_sample_that_nothing_bounds_is_a_mistake() {
 #[test]
 fn a_value_of_a_regular_clock_counts_until_the_next_is_due() {
     for method in ["mean", "last"] {
-        let text = format!(
-            r#"{SAMPLES}
-[nodes.clock]
-type = "resample"
-inputs.signal = "temperature"
-every = "1min"
-method = "{method}"
-[nodes.warm]
-type = "linear"
-inputs.features = "clock"
-inputs.truth = "position.Z"
-ahead = "0s"
-[outputs]
-out = "warm"
-"#
-        );
+        let text = samples()
+            .node("clock", "resample", "temperature")
+            .with(&format!("every = '1min'; method = '{method}'"))
+            .model("warm", "linear", "clock", "position.Z", "0s")
+            .outputs("out = 'warm'");
         let fit = linear(&[("clock.room", 1.0), ("clock.chuck", 1.0)], 0.0);
         let mut bench = Bench::new(&text, &[("warm", fit)]);
         for tick in 1..=100 {
@@ -243,20 +189,17 @@ out = "warm"
 
 #[test]
 fn an_age_at_a_port_that_holds_nothing_is_doubted_with_the_reason() {
-    let read = Read::new(&format!(
-        r#"{SAMPLES}
-[nodes.drift]
-type = "slope"
-inputs.signal = {{ from = "position", max_age = "1min" }}
-windows = ["5min"]
-[nodes.all]
-type = "sum"
-inputs.signal = {{ from = "position", max_age = "1min" }}
-[outputs]
-out = "drift"
-all = "all"
-"#
-    ));
+    let read = Read::new(
+        &samples()
+            .slope(
+                "drift",
+                "{ from = 'position', max_age = '1min' }",
+                "5min",
+                "",
+            )
+            .node("all", "sum", "{ from = 'position', max_age = '1min' }")
+            .outputs("out = 'drift'; all = 'all'"),
+    );
     let told = read.told();
     assert!(read.plan.is_some(), "{told}");
     let doubt = "warning[A065]: `max_age` does nothing here: `inputs.signal` takes new values only";
@@ -267,21 +210,11 @@ all = "all"
 
 #[test]
 fn a_feature_that_holds_a_value_which_has_ended_has_none_either() {
-    let text = format!(
-        r#"{SAMPLES}
-[nodes.sound]
-type = "hampel"
-inputs.signal = "temperature.room"
-window = "2min"
-replace = "absent"
-min_samples = 3
-[nodes.total]
-type = "sum"
-inputs.signal = ["sound"]
-[outputs]
-out = "total"
-"#
-    );
+    let text = samples()
+        .node("sound", "hampel", "temperature.room")
+        .with("window = '2min'; replace = 'absent'; min_samples = 3")
+        .node("total", "sum", "['sound']")
+        .outputs("out = 'total'");
     let mut bench = Bench::new(&text, &[]);
     for (now, room) in [(0.0, 20.0), (10.0, 20.1), (20.0, 20.2), (30.0, 20.1)] {
         bench.tick(now, &[("temperature.room", room)]);

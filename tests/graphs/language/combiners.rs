@@ -1,41 +1,22 @@
 //! Combiners that go by a state or give reasons, in a running graph.
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{Bench, plan, problems};
+use super::slopes;
+use crate::workbench::{Bench, Graph, plan, problems};
 
 fn bench() -> Bench {
-    let text = format!(
-        "{SAMPLES}{SLOPES}
-[nodes.state]
-type = \"stability\"
-inputs.drift = \"drift.Z\"
-stable_below = \"30 nm/min\"
-transient_above = \"80 nm/min\"
-[nodes.still]
-type = \"zero\"
-inputs.truth = \"drift.Z\"
-ahead = \"5min\"
-[nodes.same]
-type = \"persistence\"
-inputs.truth = \"drift.Z\"
-ahead = \"5min\"
-[nodes.gate]
-type = \"state_gate\"
-inputs.voters = [\"still\", \"same\"]
-inputs.state = \"state\"
-[nodes.guard]
-type = \"guard\"
-inputs.voters = \"same\"
-inputs.truth = \"drift.Z\"
-memory = {{ truths = 4 }}
-min_truths = 2
-[outputs]
-gate = [\"gate\", \"gate:weights\"]
-why = \"gate:reason\"
-guard = [\"guard\", \"guard:weights\"]
-held = \"guard:reason\"
-"
-    );
+    let text = slopes()
+        .section("nodes.state", "type = 'stability'")
+        .with("inputs.drift = 'drift.Z'")
+        .with("stable_below = '30 nm/min'; transient_above = '80 nm/min'")
+        .model("still", "zero", "", "drift.Z", "5min")
+        .model("same", "persistence", "", "drift.Z", "5min")
+        .section("nodes.gate", "type = 'state_gate'")
+        .with("inputs.voters = ['still', 'same']")
+        .with("inputs.state = 'state'")
+        .vote("guard", "guard", "same", "drift.Z")
+        .with("memory = { truths = 4 }; min_truths = 2")
+        .outputs("gate = ['gate', 'gate:weights']; why = 'gate:reason'")
+        .with("guard = ['guard', 'guard:weights']; held = 'guard:reason'");
     Bench::new(&text, &[])
 }
 
@@ -97,27 +78,18 @@ fn a_guard_says_why_it_holds_a_prediction_back() {
 #[test]
 fn predictions_of_one_axis_are_not_put_together_with_those_of_another() {
     let text = |still: &str, judge: &str| {
-        let samples = SAMPLES.replace("[\"Z\"]", "[\"X\", \"Z\"]");
-        format!(
-            "{samples}{SLOPES}
-[nodes.still]
-type = \"zero\"
-inputs.truth = \"drift.{still}\"
-ahead = \"5min\"
-[nodes.same]
-type = \"persistence\"
-inputs.truth = \"drift.Z\"
-ahead = \"5min\"
-[nodes.vote]
-type = \"auto_weighted\"
-inputs.voters = [\"same\", \"still\"]
-inputs.truth = \"drift.{judge}\"
-memory = \"15min\"
-[outputs]
-out = \"vote\"
-also = \"drift\"
-"
-        )
+        slopes()
+            .model("still", "zero", "", &format!("drift.{still}"), "5min")
+            .model("same", "persistence", "", "drift.Z", "5min")
+            .vote(
+                "vote",
+                "auto_weighted",
+                "same still",
+                &format!("drift.{judge}"),
+            )
+            .with("memory = '15min'")
+            .outputs("out = 'vote'; also = 'drift'")
+            .replace("[\"Z\"]", "[\"X\", \"Z\"]")
     };
     let told = problems(&text("X", "Z"));
     assert!(told.contains("A066"), "{told}");
@@ -130,38 +102,18 @@ also = \"drift\"
 }
 
 /// A graph with two predictions of one drift, and this node that votes.
-fn voting(vote: &str) -> String {
-    format!(
-        "{SAMPLES}{SLOPES}
-[nodes.thermal]
-type = \"rls\"
-inputs.features = \"gradients\"
-inputs.truth = \"drift.Z\"
-ahead = \"5min\"
-[nodes.same]
-type = \"persistence\"
-inputs.truth = \"drift.Z\"
-ahead = \"5min\"
-[nodes.sure]
-type = \"conformal\"
-inputs.prediction = \"same\"
-inputs.truth = \"drift.Z\"
-memory = \"1d\"
-[nodes.first]
-type = \"mean\"
-inputs.voters = [\"thermal\", \"same\"]
-[nodes.half]
-type = \"scale\"
-inputs.signal = \"thermal\"
-factor = 0.5
-{vote}
-[outputs]
-out = \"vote\"
-first = \"first\"
-sure = \"sure\"
-half = \"half\"
-"
-    )
+fn voting(vote: &str) -> Graph {
+    slopes()
+        .model("thermal", "rls", "gradients", "drift.Z", "5min")
+        .model("same", "persistence", "", "drift.Z", "5min")
+        .section("nodes.sure", "type = 'conformal'")
+        .with("inputs.prediction = 'same'")
+        .with("inputs.truth = 'drift.Z'; memory = '1d'")
+        .vote("first", "mean", "thermal same", "")
+        .node("half", "scale", "thermal")
+        .with("factor = 0.5")
+        .with(vote)
+        .outputs("out = 'vote'; first = 'first'; sure = 'sure'; half = 'half'")
 }
 
 #[test]

@@ -1,19 +1,17 @@
 //! Delay and pick: values later, and under another name, with their stamps.
 
-use super::SAMPLES;
-use crate::workbench::{Bench, problems};
+use super::samples;
+use crate::workbench::{Bench, Graph, problems};
 
-fn graph(nodes: &str, output: &str) -> String {
-    format!(
-        "{SAMPLES}{nodes}\n[outputs]\nout = \"{output}\"\nalso = [\"temperature\", \"position\"]\n"
-    )
+fn graph(nodes: Graph, output: &str) -> Graph {
+    nodes.outputs(&format!(
+        "out = '{output}'; also = ['temperature', 'position']"
+    ))
 }
 
-fn late(delay: &str) -> String {
-    let node = format!(
-        "[nodes.late]\ntype = \"delay\"\ninputs.signal = \"position\"\ndelay = \"{delay}\""
-    );
-    graph(&node, "late")
+fn late(delay: &str) -> Graph {
+    let late = samples().node("late", "delay", "position");
+    graph(late.with(&format!("delay = '{delay}'")), "late")
 }
 
 #[test]
@@ -54,17 +52,11 @@ fn a_delay_of_a_duration_gives_the_value_at_the_first_tick_at_or_after() {
 #[test]
 fn feedback_goes_through_a_delay() {
     // `now` carries the position and what `before` gives; `before` is `now` one tick later.
-    let nodes = r#"
-[nodes.now]
-type = "pick"
-inputs.signal = ["position.Z", "before"]
-names = ["Z", "last"]
-[nodes.before]
-type = "delay"
-inputs.signal = "now.Z"
-delay = "1 tick"
-unit = "nm"
-"#;
+    let nodes = samples()
+        .node("now", "pick", "position.Z before")
+        .with("names = ['Z', 'last']")
+        .node("before", "delay", "now.Z")
+        .with("delay = '1 tick'; unit = 'nm'");
     let mut bench = Bench::new(&graph(nodes, "now"), &[]);
     assert!(bench.tick(0.0, &[("position.Z", 1.0)])[1].is_nan());
     assert_eq!(bench.tick(1.0, &[("position.Z", 2.0)])[..2], [2.0, 1.0]);
@@ -73,14 +65,9 @@ unit = "nm"
 
 #[test]
 fn nothing_else_closes_a_loop() {
-    let nodes = r#"
-[nodes.one]
-type = "pick"
-inputs.signal = ["position.Z", "two.Z"]
-[nodes.two]
-type = "pick"
-inputs.signal = "one"
-"#;
+    let nodes = samples()
+        .node("one", "pick", "position.Z two.Z")
+        .node("two", "pick", "one");
     let told = problems(&graph(nodes, "one"));
     assert!(
         told.contains("one → two → one") || told.contains("two → one → two"),
@@ -91,15 +78,10 @@ inputs.signal = "one"
 
 #[test]
 fn pick_passes_values_stamps_and_absence() {
-    let nodes = r#"
-[nodes.some]
-type = "pick"
-inputs.signal = ["late.Z", "temperature.chuck"]
-[nodes.late]
-type = "delay"
-inputs.signal = "position"
-delay = "10s"
-"#;
+    let nodes = samples()
+        .node("some", "pick", "late.Z temperature.chuck")
+        .node("late", "delay", "position")
+        .with("delay = '10s'");
     let mut bench = Bench::new(&graph(nodes, "some"), &[]);
     let given = bench.tick(0.0, &[("position.Z", 5.0), ("temperature.chuck", 30.0)]);
     assert!(given[0].is_nan());
@@ -115,22 +97,14 @@ delay = "10s"
 
 #[test]
 fn what_closes_a_loop_is_given_an_age_where_it_is_read_since_its_signal_cannot_say_one() {
-    let nodes = r#"
-[nodes.now]
-type = "sum"
-inputs.signal = ["position.Z", "before"]
-[nodes.before]
-type = "delay"
-inputs.signal = "now"
-delay = "1 tick"
-unit = "nm"
-"#;
-    let told = problems(&graph(nodes, "now"));
+    let looped = |read: &str| {
+        let nodes = samples().node("now", "sum", read);
+        let nodes = nodes.node("before", "delay", "now");
+        graph(nodes.with("delay = '1 tick'; unit = 'nm'"), "now")
+    };
+    let told = problems(&looped("position.Z before"));
     let advice = "set it where it is read: `inputs.signal = { from = \"…\", max_age = \"1min\" }`";
     assert!(told.contains(advice), "{told}");
-    let heeded = nodes.replace(
-        "inputs.signal = [\"position.Z\", \"before\"]",
-        "inputs.signal = { from = [\"position.Z\", \"before\"], max_age = \"1min\" }",
-    );
-    Bench::new(&graph(&heeded, "now"), &[]);
+    let heeded = "{ from = ['position.Z', 'before'], max_age = '1min' }";
+    Bench::new(&looped(heeded), &[]);
 }

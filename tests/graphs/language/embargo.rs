@@ -9,37 +9,18 @@ use athermal::run::recording::{Event, Recording, Samples, Table};
 use athermal::run::score::{ScoreOptions, score};
 use athermal::{Engine, Instant};
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{Bench, data, linear, plan, slot};
+use super::slopes;
+use crate::workbench::{Bench, Graph, data, linear, plan, slot};
 
 /// A combiner over a voter that always answers, so that whatever it is told can be seen.
-fn watched(ahead: &str, truth: &str, kind: &str) -> String {
-    format!(
-        r#"{SAMPLES}{SLOPES}
-[nodes.still]
-type = "zero"
-inputs.truth = "{truth}"
-ahead = "{ahead}"
-[nodes.warm]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "{truth}"
-ahead = "{ahead}"
-[nodes.vote]
-type = "{kind}"
-inputs.voters = ["still", "warm"]
-inputs.truth = "{truth}"
-{parameters}
-[outputs]
-out = "vote"
-also = "gradients"
-"#,
-        parameters = if kind == "auto_weighted" {
-            "memory = \"15min\""
-        } else {
-            ""
-        }
-    )
+fn watched(ahead: &str, truth: &str, kind: &str) -> Graph {
+    let memory = ["", "memory = '15min'"][usize::from(kind == "auto_weighted")];
+    slopes()
+        .model("still", "zero", "", truth, ahead)
+        .model("warm", "linear", "temperature", truth, ahead)
+        .vote("vote", kind, "still warm", truth)
+        .with(memory)
+        .outputs("out = 'vote'; also = 'gradients'")
 }
 
 #[test]
@@ -228,18 +209,11 @@ fn pairs_at_the_same_tick(
 #[test]
 fn a_truth_belongs_to_the_last_run_at_or_before_its_horizon_and_to_none_long_before() {
     // Temperatures stop at 600 s for 20 min; drift goes on. A run at τ − ahead or up to one span before it counts.
-    let plan = plan(&format!(
-        "{SAMPLES}{SLOPES}
-[nodes.warm]
-type = \"linear\"
-inputs.features = \"temperature\"
-inputs.truth = \"drift.Z\"
-ahead = \"0s\"
-[outputs]
-out = \"warm\"
-also = \"gradients\"
-"
-    ));
+    let plan = plan(
+        &slopes()
+            .model("warm", "linear", "temperature", "drift.Z", "0s")
+            .outputs("out = 'warm'; also = 'gradients'"),
+    );
     let mut table = Table::default();
     let mut paired = 0;
     let mut unpaired = 0;

@@ -20,9 +20,8 @@ use athermal::{Engine, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SAMPLES;
 use super::fitting::recording;
-use crate::workbench::{compiled, plan, problems, slot};
+use crate::workbench::{Graph, compiled, plan, problems, slot};
 
 /// The rows that a fit was given, and when their truths were measured.
 type Seen = Vec<(Instant, Vec<f64>, f64)>;
@@ -203,25 +202,13 @@ impl Estimator for Weighing {
 athermal::core::register!(Weighing, Estimator, "test_weighing");
 
 /// An encoder of the temperatures, and an estimator of what it gives.
-fn nodes(label: &str, more: &str) -> String {
-    format!(
-        "{SAMPLES}
-[nodes.code]
-type = \"test_along\"
-inputs.features = \"temperature\"
-inputs.truth = \"position.Z\"
-ahead = \"30s\"
-label = \"{label}\"
-lags = [\"0s\", \"20s\"]
-{more}
-[nodes.plain]
-type = \"linear\"
-inputs.features = \"code\"
-inputs.truth = \"position.Z\"
-ahead = \"30s\"
-outside = \"pass\"
-"
-    )
+fn nodes(label: &str, more: &str) -> Graph {
+    super::samples()
+        .model("code", "test_along", "temperature", "position.Z", "30s")
+        .with(&format!("label = '{label}'; lags = ['0s', '20s']"))
+        .with(more)
+        .model("plain", "linear", "code", "position.Z", "30s")
+        .with("outside = 'pass'")
 }
 
 fn with_output(text: &str, output: &str) -> String {

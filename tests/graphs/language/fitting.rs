@@ -7,8 +7,8 @@ use athermal::run::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{plan, problems, slot};
+use super::{samples, slopes};
+use crate::workbench::{Graph, plan, problems, slot};
 
 /// A number between −1 and 1 that looks random.
 fn noise(seed: u32) -> f64 {
@@ -40,18 +40,12 @@ fn fitted(plan: &Arc<Plan>, table: &Table) -> EstimatorFit {
 }
 
 fn thermal() -> Arc<Plan> {
-    plan(&format!(
-        "{SAMPLES}{SLOPES}
-[nodes.thermal]
-type = \"linear\"
-inputs.features = \"gradients\"
-inputs.truth = \"drift.Z\"
-ahead = \"0s\"
-train.abs_truth = {{ below = \"1 m/min\", above = \"0.5 nm/min\" }}
-[outputs]
-out = \"thermal\"
-"
-    ))
+    plan(
+        &slopes()
+            .model("thermal", "linear", "gradients", "drift.Z", "0s")
+            .with("train.abs_truth = { below = '1 m/min', above = '0.5 nm/min' }")
+            .outputs("out = 'thermal'"),
+    )
 }
 
 #[test]
@@ -117,18 +111,10 @@ fn a_candidate_there_in_nine_of_ten_rows_stays_and_costs_the_tenth() {
 #[test]
 fn a_window_that_is_still_cold_does_not_speak_against_its_candidate() {
     // Windows of 150 s and of an hour: a fifth of the rows comes before the long one is warm.
-    let text = format!(
-        "{SAMPLES}{}
-[nodes.thermal]
-type = \"linear\"
-inputs.features = \"gradients\"
-inputs.truth = \"drift.Z\"
-ahead = \"0s\"
-[outputs]
-out = \"thermal\"
-",
-        SLOPES.replace("[\"150s\"]", "[\"150s\", \"1h\"]")
-    );
+    let text = slopes()
+        .model("thermal", "linear", "gradients", "drift.Z", "0s")
+        .outputs("out = 'thermal'")
+        .replace("[\"150s\"]", "[\"150s\", \"1h\"]");
     let fit = fitted(&plan(&text), &recording());
     assert!(fit.dropped_candidates.is_empty(), "{fit:?}");
     // Drift exists from 300 s, the long slopes from 3,600 s.
@@ -139,18 +125,10 @@ out = \"thermal\"
 #[test]
 fn only_truths_within_the_limits_are_fitted_on() {
     let text = |limits: &str| {
-        format!(
-            "{SAMPLES}{SLOPES}
-[nodes.thermal]
-type = \"linear\"
-inputs.features = \"gradients\"
-inputs.truth = \"drift.Z\"
-ahead = \"0s\"
-train.abs_truth = {limits}
-[outputs]
-out = \"thermal\"
-"
-        )
+        slopes()
+            .model("thermal", "linear", "gradients", "drift.Z", "0s")
+            .with(&format!("train.abs_truth = {limits}"))
+            .outputs("out = 'thermal'")
     };
     let all = fitted(&plan(&text("{}")), &recording());
     let below = fitted(&plan(&text("{ below = \"0.005 um/min\" }")), &recording());
@@ -171,26 +149,14 @@ out = \"thermal\"
 
 #[test]
 fn an_estimator_fed_by_another_learns_from_predictions_of_rows_that_the_other_has_not_seen() {
-    let first = r#"
-[nodes.first]
-type = "linear"
-inputs.features = "temperature"
-inputs.truth = "position.Z"
-ahead = "0s"
-solver = { type = "ols" }
-"#;
-    let second = r#"
-[nodes.second]
-type = "linear"
-inputs.features = "first"
-inputs.truth = "position.Z"
-ahead = "0s"
-solver = { type = "ols" }
-"#;
-    let both = plan(&format!(
-        "{SAMPLES}{first}{second}[outputs]\nout = \"second\"\n"
-    ));
-    let alone = plan(&format!("{SAMPLES}{first}[outputs]\nout = \"first\"\n"));
+    let of = |graph: Graph, name: &str, features: &str| {
+        let model = graph.model(name, "linear", features, "position.Z", "0s");
+        model.with("solver = { type = 'ols' }")
+    };
+    let first = of(samples(), "first", "temperature");
+    let second = of(first.clone(), "second", "first");
+    let both = plan(&second.outputs("out = 'second'"));
+    let alone = plan(&first.outputs("out = 'first'"));
     // Few rows and steps between the folds, so that it matters whose rows the first has seen.
     let mut table = Table::default();
     for (tick, (event, values)) in recording().events()[..60].iter().enumerate() {
@@ -253,21 +219,17 @@ solver = { type = "ols" }
 
 #[test]
 fn any_number_of_threads_gives_the_same_fit_even_when_rows_hardly_fit_in_memory() {
-    let text = format!(
-        "{SAMPLES}{SLOPES}
-[sets]
-alpha = [\"1\", \"2\", \"3\", \"5\", \"8\", \"13\"]
-[nodes.thermal]
-type = \"linear\"
-each = \"alpha\"
-inputs.features = [\"gradients\", \"temperature\"]
-inputs.truth = \"drift.Z\"
-ahead = \"0s\"
-selection = {{ method = \"forward\", folds = 3, tolerance = 1e-9 }}
-[outputs]
-out = \"thermal\"
-"
-    );
+    let text = slopes()
+        .section("sets", "alpha = ['1', '2', '3', '5', '8', '13']")
+        .model(
+            "thermal",
+            "linear",
+            "gradients temperature",
+            "drift.Z",
+            "0s",
+        )
+        .with("each = 'alpha'; selection = { method = 'forward', folds = 3, tolerance = 1e-9 }")
+        .outputs("out = 'thermal'");
     let plan = plan(&text);
     let table = recording();
     let fits = |threads: usize, memory: usize| {
@@ -295,7 +257,7 @@ fn a_misspelt_key_that_the_framework_reads_is_put_right_too() {
         ("eech = \"axis\"", "each"),
     ] {
         let outputs = "[outputs]\nmodel = \"model\"\n";
-        let told = problems(&format!("{SAMPLES}{SLOPES}{node}{wrong}\n{outputs}"));
+        let told = problems(&format!("{}{node}{wrong}\n{outputs}", slopes()));
         let help = format!("did you mean \"{right}\"?");
         assert!(told.contains(&help), "{told}");
     }

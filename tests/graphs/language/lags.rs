@@ -1,26 +1,14 @@
 //! Lags count back from the instant of the run; the value is the last one at or before.
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{Bench, linear};
+use super::{samples, slopes};
+use crate::workbench::{Bench, Graph, linear};
 
-fn endogenous(truth: &str, ahead: &str, lag: &str) -> String {
-    format!(
-        r#"{SAMPLES}{SLOPES}
-[nodes.motion]
-type = "ar"
-inputs.truth = "{truth}"
-ahead = "{ahead}"
-lags = ["{lag}"]
-[nodes.same]
-type = "persistence"
-inputs.truth = "{truth}"
-ahead = "{ahead}"
-[outputs]
-out = ["motion"]
-same = "same"
-also = "gradients"
-"#
-    )
+fn endogenous(truth: &str, ahead: &str, lag: &str) -> Graph {
+    slopes()
+        .model("motion", "ar", "", truth, ahead)
+        .with(&format!("lags = ['{lag}']"))
+        .model("same", "persistence", "", truth, ahead)
+        .outputs("out = ['motion']; same = 'same'; also = 'gradients'")
 }
 
 /// Instants of positions: irregular, from 40 s to 230 s apart, none on a whole ten seconds after the first.
@@ -136,45 +124,22 @@ fn persistence_of_a_slope_is_the_one_at_the_smallest_lag_that_shares_nothing() {
 /// A spike filter gives nothing at 40 s for the room. Nodes behind it hear of it, whether the chuck has a sample there or not.
 #[test]
 fn what_becomes_of_a_channel_does_not_depend_on_whether_another_is_fresh() {
-    let text = format!(
-        r#"{SAMPLES}
-[nodes.calm]
-type = "hampel"
-inputs.signal = "temperature"
-window = "2min"
-floor = "100 mK"
-[nodes.past]
-type = "lag"
-inputs.signal = "calm"
-lags = ["10s"]
-[nodes.step]
-type = "difference"
-inputs.signal = "calm"
-[nodes.over]
-type = "difference"
-inputs.signal = "calm"
-over = "10s"
-[nodes.scaled]
-type = "scale"
-inputs.signal = "calm"
-factor = 2.0
-[nodes.kept]
-type = "minimum_difference"
-inputs.signal = "calm"
-difference = "1 nK"
-[nodes.again]
-type = "hampel"
-inputs.signal = "calm"
-window = "2min"
-[outputs]
-past = "past"
-step = "step"
-over = "over"
-scaled = "scaled"
-kept = "kept"
-again = "again"
-"#
-    );
+    let text = samples()
+        .node("calm", "hampel", "temperature")
+        .with("window = '2min'; floor = '100 mK'")
+        .node("past", "lag", "calm")
+        .with("lags = ['10s']")
+        .node("step", "difference", "calm")
+        .node("over", "difference", "calm")
+        .with("over = '10s'")
+        .node("scaled", "scale", "calm")
+        .with("factor = 2.0")
+        .node("kept", "minimum_difference", "calm")
+        .with("difference = '1 nK'")
+        .node("again", "hampel", "calm")
+        .with("window = '2min'")
+        .outputs("past = 'past'; step = 'step'; over = 'over'; scaled = 'scaled'; kept = 'kept'")
+        .with("again = 'again'");
     for beside in [false, true] {
         let mut bench = Bench::new(&text, &[]);
         for tick in 0..=6 {

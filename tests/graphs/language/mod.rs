@@ -16,32 +16,20 @@ mod segments;
 mod stacking;
 mod windows;
 
-/// The beginning of a graph of one position and two temperatures, as samples; nodes and outputs follow.
-const SAMPLES: &str = r#"
-schema = 1
-[time]
-column = "t"
-[signals.temperature]
-unit = "Cel"
-channels = ["room", "chuck"]
-range = ["-20 Cel", "200 Cel"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-"#;
+use crate::workbench::Graph;
 
-/// The slopes of both signals, as the shipped graphs have them, for after [`SAMPLES`].
-const SLOPES: &str = r#"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.gradients]
-type = "slope"
-inputs.signal = "temperature"
-windows = ["150s"]
-unit = "mK/min"
-"#;
+/// The beginning of a graph of one position and two temperatures, as samples; nodes and outputs follow.
+fn samples() -> Graph {
+    Graph::new()
+        .time("t")
+        .signal("temperature", "Cel", "room chuck", "1min")
+        .with("range = ['-20 Cel', '200 Cel']")
+        .signal("position", "nm", "Z", "3min")
+}
+
+/// The same with the slopes of both signals, as the shipped graphs have them.
+fn slopes() -> Graph {
+    samples()
+        .slope("drift", "position", "5min", "nm/min")
+        .slope("gradients", "temperature", "150s", "mK/min")
+}

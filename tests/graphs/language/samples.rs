@@ -3,11 +3,11 @@
 use athermal::files::{Dataset, Options};
 use athermal::run::recording::Table;
 
-use super::SAMPLES;
-use crate::workbench::{Bench, Scratch, plan};
+use super::samples;
+use crate::workbench::{Bench, Graph, Scratch, plan};
 
-fn graph() -> String {
-    format!("{SAMPLES}[outputs]\nout = [\"temperature\", \"position\"]\n")
+fn graph() -> Graph {
+    samples().outputs("out = ['temperature', 'position']")
 }
 
 #[test]

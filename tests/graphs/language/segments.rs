@@ -6,42 +6,20 @@ use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::Table;
 use athermal::run::score::{ScoreOptions, score};
 
-use super::{SAMPLES, SLOPES};
-use crate::workbench::{Bench, linear, plan, secs};
+use super::{samples, slopes};
+use crate::workbench::{Bench, Graph, linear, plan, secs};
 
-fn graph() -> String {
-    format!(
-        r#"{SAMPLES}{SLOPES}
-[nodes.ten]
-type = "linear"
-inputs.features = "temperature.room"
-inputs.truth = "drift.Z"
-ahead = "5min"
-[nodes.still]
-type = "zero"
-inputs.truth = "drift.Z"
-ahead = "5min"
-[nodes.motion]
-type = "ar"
-inputs.truth = "drift.Z"
-ahead = "5min"
-lags = ["1min"]
-[nodes.vote]
-type = "auto_weighted"
-inputs.voters = ["ten", "still"]
-inputs.truth = "drift.Z"
-memory = "15min"
-[nodes.late]
-type = "delay"
-inputs.signal = "position"
-delay = "60s"
-[outputs]
-out = "vote"
-motion = "motion"
-late = "late"
-also = "gradients"
-"#
-    )
+fn graph() -> Graph {
+    slopes()
+        .model("ten", "linear", "temperature.room", "drift.Z", "5min")
+        .model("still", "zero", "", "drift.Z", "5min")
+        .model("motion", "ar", "", "drift.Z", "5min")
+        .with("lags = ['1min']")
+        .vote("vote", "auto_weighted", "ten still", "drift.Z")
+        .with("memory = '15min'")
+        .node("late", "delay", "position")
+        .with("delay = '60s'")
+        .outputs("out = 'vote'; motion = 'motion'; late = 'late'; also = 'gradients'")
 }
 
 fn fits() -> [(
@@ -144,22 +122,11 @@ fn a_truth_never_belongs_to_a_run_of_another_segment() {
 
 /// A prediction of a position a minute ahead, and a vote that tells the newest truth it was told of. No window has to warm
 /// up, so that nothing but the break keeps a truth from a run before it.
-fn a_minute_ahead() -> String {
-    format!(
-        r#"{SAMPLES}
-[nodes.warm]
-type = "linear"
-inputs.features = "temperature.room"
-inputs.truth = "position.Z"
-ahead = "60s"
-[nodes.vote]
-type = "test_newest_arrival"
-inputs.voters = "warm"
-inputs.truth = "position.Z"
-[outputs]
-out = "vote"
-"#
-    )
+fn a_minute_ahead() -> Graph {
+    samples()
+        .model("warm", "linear", "temperature.room", "position.Z", "60s")
+        .vote("vote", "test_newest_arrival", "warm", "position.Z")
+        .outputs("out = 'vote'")
 }
 
 /// Two segments of twenty ticks, the second of which goes on by the clock where the first ends.

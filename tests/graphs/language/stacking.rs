@@ -7,42 +7,21 @@ use athermal::run::fit::{FitOptions, FitProgress, Outcome, fit};
 use athermal::run::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
-use super::SAMPLES;
-use crate::workbench::{numbers, plan, problems, slot};
+use super::samples;
+use crate::workbench::{Graph, numbers, plan, problems, slot};
 
 /// A voter with two regressors, and one with so many that it fits its rows far too well.
-fn nodes(stacked: &str) -> String {
-    let lags: Vec<String> = (0..5).map(|lag| format!("\"{}s\"", 10 * lag)).collect();
-    format!(
-        "{SAMPLES}
-[nodes.past]
-type = \"lag\"
-inputs.signal = \"temperature\"
-lags = [{}]
-[nodes.plain]
-type = \"linear\"
-inputs.features = \"temperature\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-solver = {{ type = \"ols\" }}
-outside = \"pass\"
-[nodes.rich]
-type = \"linear\"
-inputs.features = \"past\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-solver = {{ type = \"ols\" }}
-outside = \"pass\"
-[nodes.stack]
-type = \"stack\"
-inputs.voters = [\"plain\", \"rich\"]
-inputs.truth = \"position.Z\"
-{stacked}
-[outputs]
-out = \"stack\"
-",
-        lags.join(", ")
-    )
+fn nodes(stacked: &str) -> Graph {
+    let linear = |graph: Graph, name: &str, features: &str| {
+        let model = graph.model(name, "linear", features, "position.Z", "0s");
+        model.with("solver = { type = 'ols' }; outside = 'pass'")
+    };
+    let past = samples().node("past", "lag", "temperature");
+    let past = past.with("lags = ['0s', '10s', '20s', '30s', '40s']");
+    linear(linear(past, "plain", "temperature"), "rich", "past")
+        .vote("stack", "stack", "plain rich", "position.Z")
+        .with(stacked)
+        .outputs("out = 'stack'")
 }
 
 /// Few rows, ten seconds apart: two wandering temperatures, and a position that follows them.
@@ -216,22 +195,19 @@ fn parts() -> Table {
 
 #[test]
 fn a_stack_of_stacks_of_stacks_trusts_the_one_that_knows_most() {
-    let mut text = format!("{SAMPLES}\n");
+    let mut text = samples();
     for (name, of) in [("one", "temperature.room"), ("other", "temperature.chuck")] {
-        text += &format!(
-            "[nodes.{name}]\ntype = \"linear\"\ninputs.features = \"{of}\"\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n"
-        );
+        text = text.model(name, "linear", of, "position.Z", "0s");
     }
     for (name, voters) in [
         ("first", ["one", "other"]),
         ("second", ["one", "first"]),
         ("third", ["one", "second"]),
     ] {
-        text += &format!(
-            "[nodes.{name}]\ntype = \"stack\"\ninputs.voters = {voters:?}\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n"
-        );
+        let stack = text.vote(name, "stack", &voters.join(" "), "position.Z");
+        text = stack.with("ahead = '0s'");
     }
-    let plan = plan(&(text + "[outputs]\nout = \"third\"\n"));
+    let plan = plan(&text.outputs("out = 'third'"));
     let (_, report) = fit(&plan, &parts(), &FitOptions::default(), &mut |_| {}).unwrap();
     let error = |node: &str| {
         let fit = report.estimators.iter().find(|fit| fit.node == node);
@@ -249,54 +225,22 @@ fn a_stack_of_stacks_of_stacks_trusts_the_one_that_knows_most() {
 
 /// What a stack finds over a voter that goes on learning, frozen by what is given.
 fn stacked_over(learning: &str) -> (f64, Vec<f64>) {
-    let graph = format!(
-        "{SAMPLES}
-[nodes.alone]
-type = \"linear\"
-inputs.features = \"temperature.chuck\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-[nodes.level]
-type = \"linear\"
-inputs.features = \"temperature.chuck\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-[nodes.higher]
-type = \"stack\"
-inputs.voters = [\"level\"]
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-[nodes.never]
-type = \"scale\"
-inputs.signal = \"alone\"
-factor = 0.0
-[nodes.never_higher]
-type = \"scale\"
-inputs.signal = \"higher\"
-factor = 0.0
-[nodes.learns]
-type = \"rls\"
-inputs.features = \"temperature.room\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-forgetting = {{ type = \"constant\", factor = 0.9 }}
-{learning}
-[nodes.stays]
-type = \"linear\"
-inputs.features = \"temperature.room\"
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-[nodes.stack]
-type = \"stack\"
-inputs.voters = [\"learns\", \"stays\"]
-inputs.truth = \"position.Z\"
-ahead = \"0s\"
-[outputs]
-out = \"stack\"
-level = \"never\"
-higher = \"never_higher\"
-"
-    );
+    let graph = samples()
+        .model("alone", "linear", "temperature.chuck", "position.Z", "0s")
+        .model("level", "linear", "temperature.chuck", "position.Z", "0s")
+        .vote("higher", "stack", "['level']", "position.Z")
+        .with("ahead = '0s'")
+        .node("never", "scale", "alone")
+        .with("factor = 0.0")
+        .node("never_higher", "scale", "higher")
+        .with("factor = 0.0")
+        .model("learns", "rls", "temperature.room", "position.Z", "0s")
+        .with("forgetting = { type = 'constant', factor = 0.9 }")
+        .with(learning)
+        .model("stays", "linear", "temperature.room", "position.Z", "0s")
+        .vote("stack", "stack", "learns stays", "position.Z")
+        .with("ahead = '0s'")
+        .outputs("out = 'stack'; level = 'never'; higher = 'never_higher'");
     let mut table = Table::default();
     for row in 0..600_u32 {
         let t = f64::from(row);

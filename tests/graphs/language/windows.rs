@@ -1,22 +1,13 @@
 //! When a windowed value exists: not while the window is cold, too empty or too short.
 
-use super::SAMPLES;
+use super::samples;
 use crate::workbench::Bench;
 
 fn slope(parameters: &str) -> Bench {
-    let text = format!(
-        "{SAMPLES}
-[nodes.gradients]
-type = \"slope\"
-inputs.signal = \"temperature\"
-windows = [\"150s\"]
-unit = \"mK/min\"
-{parameters}
-[outputs]
-out = \"gradients\"
-position = \"position\"
-"
-    );
+    let text = samples()
+        .slope("gradients", "temperature", "150s", "mK/min")
+        .with(parameters)
+        .outputs("out = 'gradients'; position = 'position'");
     Bench::new(&text, &[])
 }
 

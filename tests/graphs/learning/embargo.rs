@@ -1,35 +1,18 @@
 //! What a learner is told, and when.
 
-use crate::workbench::{Bench, compiled, problems};
+use crate::workbench::{Bench, Graph, compiled, problems};
 
 /// A position every 30 s whose slope over `window` is predicted, and a temperature every 10 s that is the time in seconds.
-fn graph(about: &str, window: &str, ahead: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[signals.temperature]
-unit = "K"
-channels = ["a"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "3min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["{window}"]
-[nodes.told]
-type = "test_told"
-about = "{about}"
-inputs.features = "temperature"
-inputs.truth = "drift"
-ahead = "{ahead}"
-learn = {{ outliers = inf, margin = inf }}
-[outputs]
-out = "told"
-"#
-    )
+fn graph(about: &str, window: &str, ahead: &str) -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "a", "1min")
+        .signal("position", "nm", "Z", "3min")
+        .slope("drift", "position", window, "")
+        .model("told", "test_told", "temperature", "drift", ahead)
+        .with(&format!(
+            "about = '{about}'; learn = {{ outliers = inf, margin = inf }}"
+        ))
+        .outputs("out = 'told'")
 }
 
 /// Runs for an hour; what was predicted at each tick, and the ticks that had a truth.

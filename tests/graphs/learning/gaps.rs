@@ -4,27 +4,17 @@ use athermal::core::engine::Engine;
 use athermal::core::prng::Prng;
 
 use super::world::{fitted_on, run};
+use crate::workbench::Graph;
 
 const LEARNED: f64 = 0.0;
 const OUTLIER: f64 = 3.0;
 
-fn graph(node: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[signals.shift]
-unit = "nm"
-channels = ["Z"]
-max_age = "10s"
-[nodes.model]
-{node}
-inputs.truth = "shift"
-ahead = "0s"
-[outputs]
-out = "model"
-learning = "model:learning"
-"#
-    )
+fn graph(node: &str) -> Graph {
+    Graph::new()
+        .signal("shift", "nm", "Z", "10s")
+        .section("nodes.model", node)
+        .with("inputs.truth = 'shift'; ahead = '0s'")
+        .outputs("out = 'model'; learning = 'model:learning'")
 }
 
 /// A tick every 10 s: what comes back to 0 by a hundredth of itself each, with noise of 0.1.

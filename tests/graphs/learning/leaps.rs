@@ -4,6 +4,7 @@ use athermal::core::engine::Engine;
 use athermal::core::prng::Prng;
 
 use super::world::{fitted_on, run};
+use crate::workbench::Graph;
 
 const LEARNED: f64 = 0.0;
 const OUTLIER: f64 = 3.0;
@@ -15,29 +16,13 @@ const TREND: &str = "type = \"kalman\"\ntrend = true\nnoises = { observation = \
 const RLS: &str = "type = \"rls\"";
 const SGD: &str = "type = \"linear\"\nsolver = { type = \"sgd\" }\nlearn = true";
 
-fn graph(node: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[signals.temperature]
-unit = "K"
-channels = ["a", "b"]
-max_age = "10s"
-[signals.shift]
-unit = "nm"
-channels = ["Z"]
-max_age = "10s"
-[nodes.model]
-{node}
-inputs.features = "temperature"
-inputs.truth = "shift"
-ahead = "0s"
-[outputs]
-out = "model"
-deviation = "model:std_dev"
-learning = "model:learning"
-"#
-    )
+fn graph(node: &str) -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "a b", "10s")
+        .signal("shift", "nm", "Z", "10s")
+        .section("nodes.model", node)
+        .with("inputs.features = 'temperature'; inputs.truth = 'shift'; ahead = '0s'")
+        .outputs("out = 'model'; deviation = 'model:std_dev'; learning = 'model:learning'")
 }
 
 /// A tick every 10 s: two temperatures, and `3a + b/2` with noise of 1.
@@ -54,7 +39,7 @@ fn rows(seed: u64, count: usize) -> Vec<[f64; 3]> {
 
 /// What a model of a kind gives on some rows, after a fit on others.
 fn outputs(node: &str, rows_run: &[[f64; 3]]) -> Vec<Vec<f64>> {
-    let mut text = graph(node);
+    let mut text = graph(node).to_string();
     if node == SGD {
         text = text.replace("deviation = \"model:std_dev\"", "again = \"model\"");
     }

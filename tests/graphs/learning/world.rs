@@ -8,36 +8,17 @@ use athermal::core::prng::Prng;
 use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::recording::Table;
 
-use crate::workbench::{plan, secs};
+use crate::workbench::{Graph, plan, secs};
 
 /// A model of the kind and parameters given, `ahead` 20 s.
-pub fn graph(node: &str) -> String {
-    format!(
-        r#"
-schema = 1
-[signals.temperature]
-unit = "K"
-channels = ["a", "b"]
-max_age = "1min"
-[signals.shift]
-unit = "nm"
-channels = ["Z"]
-max_age = "1min"
-[signals.hold]
-unit = "1"
-channels = ["door"]
-max_age = "30s"
-[nodes.model]
-{node}
-inputs.features = "temperature"
-inputs.truth = "shift"
-ahead = "20s"
-[outputs]
-out = "model"
-learning = "model:learning"
-hold = "hold"
-"#
-    )
+pub fn graph(node: &str) -> Graph {
+    Graph::new()
+        .signal("temperature", "K", "a b", "1min")
+        .signal("shift", "nm", "Z", "1min")
+        .signal("hold", "1", "door", "30s")
+        .section("nodes.model", node)
+        .with("inputs.features = 'temperature'; inputs.truth = 'shift'; ahead = '20s'")
+        .outputs("out = 'model'; learning = 'model:learning'; hold = 'hold'")
 }
 
 pub const RLS: &str = "type = \"rls\"\nforgetting = { type = \"constant\", factor = 0.98 }\nlearn = { outliers = 6.0, margin = 0.5 }";

@@ -5,44 +5,23 @@ use athermal::core::engine::Carry;
 use athermal::run::live::{LiveOptions, Stepper, pair};
 
 use super::model::{d, model, s};
+use crate::workbench::Graph;
 
 /// A predicted rate, what it is integrated into, and what is put out of that.
-const GRAPH: &str = r#"
-schema = 1
-[time]
-column = "t"
-[signals.temperature]
-unit = "Cel"
-channels = ["plate", "room", "chuck"]
-max_age = "1min"
-[signals.position]
-unit = "nm"
-channels = ["Z"]
-max_age = "1min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = ["5min"]
-unit = "nm/min"
-[nodes.rate]
-type = "linear"
-inputs = { features = "temperature", truth = "drift.Z" }
-ahead = "150s"
-[nodes.compensate]
-type = "compensate"
-inputs.rate = "rate"
-range = "50 um"
-max_rate = "3000 nm/min"
-max_slew = "50 nm/s"
-[nodes.safe]
-type = "safe_state"
-inputs.signal = "compensate"
-when_lost = "hold"
-max_slew = "50 nm/s"
-[outputs]
-correction = "compensate"
-safe = "safe"
-"#;
+fn corrected() -> Graph {
+    Graph::new()
+        .time("t")
+        .signal("temperature", "Cel", "plate room chuck", "1min")
+        .signal("position", "nm", "Z", "1min")
+        .slope("drift", "position", "5min", "nm/min")
+        .model("rate", "linear", "temperature", "drift.Z", "150s")
+        .section("nodes.compensate", "type = 'compensate'")
+        .with("inputs.rate = 'rate'; range = '50 um'")
+        .with("max_rate = '3000 nm/min'; max_slew = '50 nm/s'")
+        .node("safe", "safe_state", "compensate")
+        .with("when_lost = 'hold'; max_slew = '50 nm/s'")
+        .outputs("correction = 'compensate'; safe = 'safe'")
+}
 
 /// What is put out at a row every 10 s from `from` on, in nm.
 fn go(stepper: &mut Stepper, from: i64, count: i64) -> Vec<Vec<f64>> {
@@ -65,7 +44,7 @@ fn swapped(new: &Model) -> (Vec<f64>, Vec<f64>, Carry) {
         retain: d(600),
         ..LiveOptions::default()
     };
-    let (mut stepper, mut control) = pair(&model(GRAPH, "0"), options).unwrap();
+    let (mut stepper, mut control) = pair(&model(&corrected(), "0"), options).unwrap();
     let before = go(&mut stepper, 0, 1000).pop().unwrap();
     assert!(before[0].abs() > 1000.0, "{before:?}");
     let staged = control.stage(new, false).unwrap();
@@ -78,7 +57,7 @@ fn swapped(new: &Model) -> (Vec<f64>, Vec<f64>, Carry) {
 
 #[test]
 fn a_correction_goes_on_from_where_it_stands_when_its_rate_is_fitted_anew() {
-    let (before, after, told) = swapped(&model(GRAPH, "1"));
+    let (before, after, told) = swapped(&model(&corrected(), "1"));
     for (before, after) in before.iter().zip(&after) {
         assert!((after - before).abs() <= 500.0, "{before} to {after} nm");
     }
@@ -88,7 +67,7 @@ fn a_correction_goes_on_from_where_it_stands_when_its_rate_is_fitted_anew() {
 
 #[test]
 fn a_correction_goes_on_from_where_it_stands_when_it_follows_another_rate() {
-    let other = GRAPH
+    let other = corrected()
         .replace("[nodes.rate]", "[nodes.other]")
         .replace("inputs.rate = \"rate\"", "inputs.rate = \"other\"");
     let renamed = other.replace(
@@ -107,7 +86,7 @@ fn a_correction_goes_on_from_where_it_stands_when_it_follows_another_rate() {
 
 #[test]
 fn a_correction_that_is_told_in_another_unit_stands_where_it_stood() {
-    let other = GRAPH
+    let other = corrected()
         .replace("50 um", "50000 nm")
         .replace("correction = ", "correction_nm = ")
         .replace("safe = ", "safe_nm = ");
@@ -122,8 +101,8 @@ fn a_correction_that_is_told_in_another_unit_stands_where_it_stood() {
 #[test]
 fn an_output_does_not_change_its_unit_under_its_name() {
     let options = LiveOptions::default();
-    let (_, mut control) = pair(&model(GRAPH, "0"), options).unwrap();
-    let other = model(&GRAPH.replace("50 um", "50000 nm"), "0");
+    let (_, mut control) = pair(&model(&corrected(), "0"), options).unwrap();
+    let other = model(&corrected().replace("50 um", "50000 nm"), "0");
     let refused = control.stage(&other, false).unwrap_err();
     assert!(
         refused.to_string().contains(
