@@ -104,14 +104,26 @@ impl Worker {
     ///
     /// # Errors
     /// As [`pass`](Self::pass).
-    pub fn finish(
+    pub fn finish(&mut self, now: Moment, put: impl FnMut(&Output<'_>)) -> Result<(), EngineError> {
+        self.finish_while(now, |_| true, put).map(|_| ())
+    }
+
+    /// The same for as long as `goes_on`: true once nothing waits.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn finish_while(
         &mut self,
         now: Moment,
+        mut goes_on: impl FnMut(&Self) -> bool,
         mut put: impl FnMut(&Output<'_>),
-    ) -> Result<(), EngineError> {
-        while self.decide(now, true, &mut put)?.is_some() {}
+    ) -> Result<bool, EngineError> {
+        let mut is_done = false;
+        while !is_done && goes_on(self) {
+            is_done = self.decide(now, true, &mut put)?.is_none();
+        }
         self.recorder.wake();
-        Ok(())
+        Ok(is_done)
     }
 
     /// Freezes learning, or lets it go on.

@@ -109,8 +109,14 @@ impl Gate {
         let longest = self.links.iter().map(|link| link.silent).max();
         let latest = since + self.settle + longest.unwrap_or_default();
         // Where others give, nobody is waited for longer than `settle`; nor is one that is away once those that are back have settled.
-        let giving = || self.links.iter().filter(|link| !is_start && link.gives(since));
-        let others = giving().any(|link| !link.is_awaited).then_some(since + self.settle);
+        let giving = || {
+            self.links
+                .iter()
+                .filter(|link| !is_start && link.gives(since))
+        };
+        let others = giving()
+            .any(|link| !link.is_awaited)
+            .then_some(since + self.settle);
         let back = giving().filter_map(|link| match link.state {
             LinkState::Connected(back) if link.is_awaited => Some(back + self.settle),
             _ => None,

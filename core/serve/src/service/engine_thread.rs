@@ -130,9 +130,9 @@ impl EngineThread {
     fn work(&mut self) -> Result<(), EngineError> {
         let mut left = self.sources.len();
         let (mut published, mut sound) = (Moment::START, self.clock.now());
+        let mut is_stopped = false;
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
-            let mut is_stopped = false;
             while let Ok(order) = self.orders.pop() {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
@@ -148,25 +148,26 @@ impl EngineThread {
             let is_ahead = self.worker.is_crowded();
             sound = if is_ahead { sound } else { now };
             let is_patient = now - sound < PATIENCE;
-            let is_held = is_ahead && is_patient;
-            let is_crowded = self.worker.recorder().is_crowded() || is_held;
+            let is_crowded = self.worker.recorder().is_crowded() || is_ahead && is_patient;
             let is_full = self.worker.sequencer().is_crowded();
             for nth in 0..self.sources.len() {
-                if !is_full && (!is_crowded || !self.sources[nth].waits) {
+                if !is_stopped && !is_full && (!is_crowded || !self.sources[nth].waits) {
                     has_more |= self.take(nth, &mut left)?;
                 }
             }
             let now = self.clock.now();
             let sinks = &mut self.sinks;
             // What the replica cannot take in is stepped later: a backlog of any length.
-            let goes_on = |worker: &Worker| is_stopped || !is_patient || !worker.is_crowded();
+            let goes_on = |worker: &Worker| !is_patient || !worker.is_crowded();
             self.worker
                 .pass_while(now, goes_on, |output| sinks.put(output))?;
             if let Some((last, to)) = self.worker.went_back() {
                 let _ = self.remarks.push(Remark::WentBack(last, to));
             }
-            if is_stopped || left == 0 {
-                return self.worker.finish(now, |output| sinks.put(output));
+            let is_over = is_stopped || left == 0;
+            let put = |output: &Output<'_>| sinks.put(output);
+            if is_over && self.worker.finish_while(now, goes_on, put)? {
+                return Ok(());
             }
             if now - published >= Shared::EVERY {
                 published = now;
@@ -175,17 +176,15 @@ impl EngineThread {
             if has_more {
                 continue;
             }
-            let due = self.worker.due();
+            // What is due waits for the replica, and sources for what is due.
             let is_held = is_crowded || self.worker.is_crowded();
-            let longest = if is_held { HOLD } else { NAP };
-            let mut nap = due.map_or(longest, |due| {
+            let longest = if is_held || is_full { HOLD } else { NAP };
+            let due = self.worker.due().filter(|_| !is_held);
+            let nap = due.map_or(longest, |due| {
                 let ns = (due - self.clock.now()).as_ns();
                 Wait::from_nanos(ns.max(0) as u64).min(longest)
             });
-            if is_held {
-                // What is due waits for the replica.
-                nap = HOLD;
-            } else if !nap.is_zero() {
+            if !nap.is_zero() && !is_held {
                 self.worker.mirror_again();
             }
             if !nap.is_zero() {
