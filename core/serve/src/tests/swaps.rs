@@ -197,7 +197,7 @@ struct Beacon {
 crate::register_companion!(Beacon, "page");
 
 impl Companion for Beacon {
-    pub(super) fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
+    fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
         if self.broken {
             return Err(ConnectorError::new("it is broken"));
         }
@@ -247,7 +247,7 @@ impl Bench {
         (model, deployment, mistakes)
     }
 
-    fn start(&self, graph: &str) -> Service {
+    pub(super) fn start(&self, graph: &str) -> Service {
         self.try_start(graph).unwrap()
     }
 
