@@ -133,6 +133,7 @@ impl EngineThread {
         let mut is_stopped = false;
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
+            let was_stopped = is_stopped;
             while let Ok(order) = self.orders.pop() {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
@@ -151,7 +152,9 @@ impl EngineThread {
             let is_crowded = self.worker.recorder().is_crowded() || is_ahead && is_patient;
             let is_full = self.worker.sequencer().is_crowded();
             for nth in 0..self.sources.len() {
-                if !is_stopped && !is_full && (!is_crowded || !self.sources[nth].waits) {
+                let source = &self.sources[nth];
+                let is_held = was_stopped || is_full && source.is_giving();
+                if !is_held && (!is_crowded || !source.waits) {
                     has_more |= self.take(nth, &mut left)?;
                 }
             }
