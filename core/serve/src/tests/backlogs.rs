@@ -16,14 +16,14 @@ use crate::service::{Service, ServiceEvent};
 struct Backlog {
     rows: i64,
     /// Whether stamps are the time of day, in any order.
-    clock: bool,
+    of_clock: bool,
 }
 
 crate::register_source!(Backlog, "backlog");
 
 impl Source for Backlog {
     fn stamps(&self) -> Stamps {
-        match self.clock {
+        match self.of_clock {
             true => Stamps::Clock,
             false => Stamps::Order,
         }
@@ -55,7 +55,7 @@ fn bench(rows: i64, clock: bool) -> Bench {
     let mut bench = Bench::new();
     let sections = format!(
         "[runtime]\nwait = \"0 s\"\nsettle = \"200 ms\"\ncheckpoint = \"50 ms\"\n\
-         [sources.in]\ntype = \"backlog\"\nrows = {rows}\nclock = {clock}\n\
+         [sources.in]\ntype = \"backlog\"\nrows = {rows}\nof_clock = {clock}\n\
          [sinks.out]\ntype = \"lines\"\n"
     );
     bench.sections = sections.leak();
