@@ -232,11 +232,19 @@ impl Judge {
         if !self.channels[channel].pace.lasts(now) {
             return false;
         }
+        // Of those that are before it, it is the time of most.
         let Vote { score, .. } = self.vote(now, |pace, time, future| {
-            // Whoever is not before it shows that it was not of the future.
+            let is_before = last - time > future && pace.goes(2, now);
+            let is_there = is_within(time, stamp, future);
+            i32::from(is_before && is_there) - i32::from(is_before && !is_there)
+        });
+        if score < 0 {
+            return false;
+        }
+        // Whoever is not before it shows that it was not of the future.
+        let Vote { score, .. } = self.vote(now, |pace, time, future| {
             let is_before = last - time > future;
-            let is_there = is_before && is_within(time, stamp, future) && pace.lasts(now);
-            i32::from(is_there) - i32::from(!is_before && pace.goes(2, now))
+            i32::from(is_before && pace.lasts(now)) - i32::from(!is_before && pace.goes(2, now))
         });
         score > 0 || score == 0 && self.is_nearer(stamp, last, now)
     }

@@ -327,3 +327,34 @@ fn whoever_is_right_is_heard_where_the_host_is_trusted_or_most_are_right() {
         panic!("{error}");
     }
 }
+
+#[test]
+fn a_right_majority_is_heard_beside_one_that_is_ahead_and_one_that_began_in_2100() {
+    let feeding = |clock, every, connected, backlog, phase| Feeding {
+        clock,
+        every,
+        delay: 0,
+        connected,
+        backlog,
+        hole: (0, 0),
+        phase,
+    };
+    let case = Case {
+        feeding: vec![
+            feeding(Clock::Right, 500, 9_108, 0, 390),
+            feeding(Clock::Right, 500, 9_467, 0, 31),
+            feeding(Clock::Right, 500, 9_489, 0, 9),
+            feeding(
+                Clock::Begins(4_102_444_800_000, 5_657),
+                2_000,
+                3_289,
+                600_000,
+                192,
+            ),
+            feeding(Clock::Off(30_000), 500, 2_935, 0, 355),
+        ],
+        trusted: None,
+        guess: None,
+    };
+    holds(&case).unwrap();
+}
