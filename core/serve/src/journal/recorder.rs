@@ -50,7 +50,9 @@ pub(super) enum Message {
     Resume(Resume),
     Stamp(u32, Instant),
     Offset(u32, Duration),
+    Lag(u32, Duration),
     Pending(Sample),
+    Waiting(Sample),
     Resumed,
 }
 
@@ -149,8 +151,10 @@ impl Recorder {
         }
         let failures = self.progress.failures();
         let (stamps, pending) = (timeline.stamps(), timeline.pending());
-        let offsets = timeline.offsets().iter().enumerate();
-        let pieces = stamps.len() + timeline.offsets().len() + pending.len() + 2;
+        let (offsets, lags) = (timeline.offsets(), timeline.lags());
+        let waiting = timeline.waiting().iter();
+        let sources = offsets.len() + lags.len();
+        let pieces = stamps.len() + sources + pending.len() + waiting.len() + 2;
         if self.queue.slots() < pieces.min(self.queue.buffer().capacity()) {
             return;
         }
@@ -162,10 +166,15 @@ impl Recorder {
         };
         let stamps = stamps.iter().enumerate();
         let stamps = stamps.map(|(nth, stamp)| Message::Stamp(nth as u32, *stamp));
+        let offsets = offsets.iter().enumerate();
         let offsets = offsets.filter_map(|(nth, of)| of.map(|of| Message::Offset(nth as u32, of)));
+        let lags = lags.iter().enumerate();
+        let lags = lags.filter_map(|(nth, of)| of.map(|of| Message::Lag(nth as u32, of)));
         let messages = std::iter::once(Message::Resume(resume))
             .chain(stamps)
             .chain(offsets)
+            .chain(lags)
+            .chain(waiting.map(|of| Message::Waiting(*of)))
             .chain(pending.map(|of| Message::Pending(*of)))
             .chain(std::iter::once(Message::Resumed));
         for message in messages {

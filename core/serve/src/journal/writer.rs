@@ -8,6 +8,7 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use rtrb::Consumer;
 
+use super::begin::kept;
 use super::recorder::{Message, Resume};
 use super::sync::{Mark, Syncer};
 use super::{Begin, JournalError, JournalOptions, Progress, Record, segment};
@@ -133,10 +134,13 @@ impl Writer {
                         *of = Some(offset.as_ns());
                     }
                 }
-                Message::Pending(of) => {
-                    let sample = (of.channel, of.stamp, of.value.to_bits());
-                    self.begin.pending.push(sample);
+                Message::Lag(source, least) => {
+                    if let Some(of) = self.begin.lags.get_mut(source as usize) {
+                        *of = Some(least.as_ns());
+                    }
                 }
+                Message::Pending(of) => self.begin.pending.push(kept(&of)),
+                Message::Waiting(of) => self.begin.waiting.push(kept(&of)),
                 Message::Resumed => self.resumed(),
             }
         }
@@ -254,7 +258,10 @@ impl Writer {
         begin.stamps.resize(begin.feed.channels.len(), Instant::MIN);
         begin.offsets.fill(None);
         begin.offsets.resize(begin.feed.sources.len(), None);
+        begin.lags.fill(None);
+        begin.lags.resize(begin.feed.sources.len(), None);
         begin.pending.clear();
+        begin.waiting.clear();
     }
 
     /// Goes on in another file. The one before stays as it is.

@@ -21,6 +21,8 @@ pub struct SinkCounts {
     pub dropped: AtomicU64,
     /// Commands that were not put out because they were too old.
     pub behind: AtomicU64,
+    /// Commands that were not put out because a newer one was due at the same time.
+    pub superseded: AtomicU64,
     /// How often it failed.
     pub failures: AtomicU64,
     /// Rows that were handed to its thread, and those that the thread took.
@@ -115,6 +117,10 @@ impl FrameSender {
     /// Hands a row over. Where there is no room a command is dropped and counted. A log has it from the journal then, with all that
     /// follow until there is room for many: making them again is worth it.
     pub(super) fn send(&mut self, output: &Output<'_>, revision: u64) {
+        if output.is_superseded && !self.is_log {
+            self.counts.superseded.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
         let width = HEAD + self.places.len();
         let least = if self.is_missing {
             self.ring.buffer().capacity() / 2

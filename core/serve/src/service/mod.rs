@@ -61,10 +61,10 @@ use crate::journal::{
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
-use crate::sequencer::{Admission, Sequencer};
+use crate::sequencer::{Leader, Sequencer};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
-use engine_thread::{EngineThread, Order};
+use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
 use host_clock::HostClock;
 use observer::Observers;
@@ -121,7 +121,7 @@ pub struct Service {
     keeper: Keeper,
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
-    remarks: Consumer<(Admission, u64)>,
+    remarks: Consumer<Remark>,
     /// What sources left out, by their names.
     heard: Receiver<(String, String)>,
     shared: Arc<Shared>,
@@ -210,6 +210,9 @@ impl Service {
         let stamps = recovered.timeline.stamps().to_vec();
         let mut sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
         let mut host = HostClock::new(options.host_time, clock, &sources);
+        if let Some(guess) = host::now() {
+            sequencer.guess(guess, clock.now());
+        }
         if let Some((time, now)) = host.look(true) {
             sequencer.synchronise(time, now);
         }
@@ -361,8 +364,19 @@ impl Service {
         while let Ok(work) = self.asked.try_recv() {
             work(self);
         }
-        while let Ok((admission, count)) = self.remarks.pop() {
-            events.push(ServiceEvent::NotAccepted { admission, count });
+        while let Ok(remark) = self.remarks.pop() {
+            events.push(match remark {
+                Remark::NotAccepted(admission, count, leader) => {
+                    let name = |of: &Leader| Some(self.sources.get(of.source)?.0.clone());
+                    let leader = leader.and_then(|of| Some((name(&of)?, of)));
+                    ServiceEvent::NotAccepted {
+                        admission,
+                        count,
+                        leader,
+                    }
+                }
+                Remark::WentBack(last, to) => ServiceEvent::WentBack { last, to },
+            });
         }
         let remark = |(source, words)| ServiceEvent::SourceRemark { source, words };
         events.extend(self.heard.try_iter().map(remark));
