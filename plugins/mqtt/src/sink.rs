@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use athermal_core::time::Duration;
 use athermal_serve::connector::{
-    ConnectorError, Kept, OutRow, Outlet, ParameterRemark, Purpose, Sink, SinkWiring,
+    ConnectorError, Kept, OutRow, Outlet, ParameterRemark, Place, Purpose, Sink, SinkWiring,
 };
 use athermal_serve::deployment::Size;
 use athermal_serve::register_sink;
@@ -172,15 +172,16 @@ impl Outlet for MqttOutlet {
 
 /// A broker cannot be asked which rows it has: those behind the last place that was kept are published again.
 impl Kept for MqttOutlet {
-    fn end(&mut self) -> Result<u64, ConnectorError> {
-        self.publisher.drained()
+    fn end(&mut self) -> Result<Place, ConnectorError> {
+        self.publisher.drained()?;
+        Ok(Place::default())
     }
 
-    fn rows_after(&mut self, _: u64) -> Result<Option<u64>, ConnectorError> {
+    fn rows_after(&mut self, _: Place) -> Result<Option<u64>, ConnectorError> {
         Ok(Some(0))
     }
 
-    fn cut(&mut self, _: u64, _: u64) -> Result<(), ConnectorError> {
+    fn cut(&mut self, _: Place, _: u64) -> Result<(), ConnectorError> {
         Ok(())
     }
 }
