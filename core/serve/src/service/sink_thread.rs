@@ -67,6 +67,8 @@ pub(super) struct SinkThread {
     pub(super) done: u64,
     /// …of which so many are kept, and when that was tried last.
     pub(super) kept: (u64, Clock),
+    /// Whether no row of this run has been kept.
+    pub(super) is_new: bool,
     /// Where a log was when a run before ended.
     pub(super) was: Option<Position>,
     /// How many rows stand behind that place that have not been made again yet.
@@ -179,6 +181,8 @@ impl SinkThread {
             let cut = guarded(|| kept.cut(place, rows - unknown));
             self.port.health.report(cut);
         }
+        // However often it is killed: what stands behind the place is no more than what one run wrote in a few seconds.
+        self.keep(true);
     }
 
     /// Puts out the row that was taken: a log's however often that fails, until it is to stop.
@@ -276,10 +280,14 @@ impl SinkThread {
         let every = if self.gate.is_some() { KEEP.1 } else { KEEP.0 };
         let patience = if at_once { ENDS } else { Wait::ZERO };
         self.is_kept(patience);
-        let is_early = !at_once && self.kept.1.elapsed() < every;
-        if self.kept.0 == self.done || is_early || !self.keeping.is_free() {
+        // The first row of a run is what tells its file from others, where those are moved.
+        let is_first = self.is_new && self.done > self.kept.0;
+        let is_early = !at_once && !is_first && self.kept.1.elapsed() < every;
+        // Where not all rows behind the place have been made again, its end is further than that.
+        if self.kept.0 == self.done || is_early || self.there > 0 || !self.keeping.is_free() {
             return;
         }
+        self.is_new &= !is_first;
         self.kept.1 = Clock::now();
         let applied = self.gate.as_ref().map_or(&[][..], CommandGate::applied);
         let finite = |value: &f64| Some(*value).filter(|value| value.is_finite());

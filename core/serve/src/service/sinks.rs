@@ -179,6 +179,7 @@ impl OpenSink {
             keeping: Aside::default(),
             done: happenings,
             kept: (u64::MAX, Clock::now()),
+            is_new: !is_command,
             was,
             there: 0,
         }
