@@ -1,5 +1,6 @@
 //! The end of the journal that the engine thread holds: it never waits, and goes on when nothing can be written.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -90,12 +91,27 @@ impl Recorder {
         begin: Begin,
         options: JournalOptions,
     ) -> Result<Self, JournalError> {
+        Self::start_after(|| Ok(()), folder, begin, options)
+    }
+
+    /// The same, once the folder has been prepared. Where that fails, or the file cannot be made since the disk is full or may not be
+    /// written, both are tried again as after any failure; nothing is written into a folder that holds another journal by then.
+    ///
+    /// # Errors
+    /// When there can never be such a file.
+    pub fn start_after(
+        prepare: impl FnMut() -> io::Result<()> + Send + 'static,
+        folder: &Path,
+        begin: Begin,
+        options: JournalOptions,
+    ) -> Result<Self, JournalError> {
         let (queue, messages) = RingBuffer::new(options.queue.max(16));
         let progress = Arc::new(Progress::default());
         progress.set_written(begin.event);
         progress.set_synced(begin.event, begin.happenings);
         let (event, happenings, frozen) = (begin.event, begin.happenings, begin.frozen);
-        let writer = Writer::begin(folder, begin, options, messages, Arc::clone(&progress))?;
+        let known = Arc::clone(&progress);
+        let writer = Writer::begin(Box::new(prepare), folder, begin, options, messages, known)?;
         let thread = std::thread::Builder::new()
             .name("journal".to_owned())
             .spawn(move || writer.run());

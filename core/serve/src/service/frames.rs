@@ -1,7 +1,7 @@
 //! Rows on their way to a sink: a bounded ring of words, so that the engine thread hands them over without allocating or waiting.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -25,6 +25,8 @@ pub struct SinkCounts {
     pub superseded: AtomicU64,
     /// How often it failed.
     pub failures: AtomicU64,
+    /// Why it cannot put out at the moment.
+    pub(super) error: Mutex<Option<String>>,
     /// Rows that were handed to its thread, and those that the thread took.
     sent: AtomicU64,
     taken: AtomicU64,
@@ -38,6 +40,12 @@ pub struct SinkCounts {
 }
 
 impl SinkCounts {
+    /// Why it cannot put out at the moment; none where it can.
+    #[must_use]
+    pub fn error(&self) -> Option<String> {
+        self.error.lock().map_or(None, |error| error.clone())
+    }
+
     /// How many rows wait.
     #[must_use]
     pub fn waiting(&self) -> u64 {

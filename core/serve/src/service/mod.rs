@@ -53,7 +53,7 @@ use crate::companion::Beside;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
-use crate::folder::{StateFolder, StatePaths};
+use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
 use crate::journal::{
     FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
@@ -138,6 +138,8 @@ pub struct Service {
     events: Receiver<ServiceEvent>,
     own: Vec<ServiceEvent>,
     folder: StateFolder,
+    /// The model that was given, where it could not be kept yet.
+    unkept: Option<Model>,
     keep: Keep,
     retired: Clock,
     retiring: Aside<()>,
@@ -182,9 +184,14 @@ impl Service {
             companions,
         } = deployment;
         let folder = StateFolder::open(&options.state)?;
-        if let Some(revision) = model.revision() {
-            folder.keep_model(model, &revision)?;
-        }
+        // A disk that cannot be written is a state, and no reason to do without corrections.
+        let unkept = match model.revision().map(|of| folder.keep_model(model, &of)) {
+            Some(Err(FolderError::NotWritten { error, .. })) if may_pass(&error) => {
+                Some(model.clone())
+            }
+            Some(kept) => kept.map(|()| None)?,
+            None => None,
+        };
         let units = outputs(&model.plan);
         let open = |declared: crate::deployment::DeclaredSink| {
             let wiring = sinks::wiring(&declared, &units, &model.plan);
@@ -202,7 +209,8 @@ impl Service {
             sync: wait(runtime.sync),
             ..JournalOptions::default()
         };
-        let recorder = Recorder::start(&folder.journal(), recovered.begin(), journal)?;
+        let (prepare, begin) = (folder.preparation(), recovered.begin());
+        let recorder = Recorder::start_after(prepare, &folder.journal(), begin, journal)?;
         let progress = Arc::clone(recorder.progress());
         let clock = MonotonicClock::start();
         let feed = fed(recovered.engine.plan(), &given);
@@ -308,6 +316,7 @@ impl Service {
             events,
             own: Vec::new(),
             folder,
+            unkept,
             keep: keep(&runtime),
             retired: Clock::now(),
             retiring: Aside::default(),
@@ -393,6 +402,7 @@ impl Service {
         let status = self.progress.status();
         if status.is_degraded != self.is_degraded {
             self.is_degraded = status.is_degraded;
+            self.keep_model();
             events.push(ServiceEvent::Journal(status));
         }
         if let Some((time, now)) = self.host.look(false) {
@@ -406,6 +416,7 @@ impl Service {
         self.watches.iter_mut().for_each(|watch| watch.look(now));
         if self.retired.elapsed() >= RETIRE {
             self.retired = Clock::now();
+            self.keep_model();
             let (folder, keep) = (StatePaths::clone(&self.folder), self.keep);
             let checkpoints = self.keeper.checkpoints().clone();
             self.retiring.take();
