@@ -145,7 +145,7 @@ fn every_mistake_is_told_with_its_place_and_the_nearest_name() {
         }
         athermal(&arguments)
             .ended(2)
-            .tells(&["`slop`", "wrong.toml:16:8"]);
+            .tells(&["`slop`", "wrong.toml:19:8"]);
     }
 }
 
