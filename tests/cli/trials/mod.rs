@@ -154,7 +154,7 @@ expect = [{ of = "zero", valid_above = 0.5 }]
         finished.tells(&[
             "A073",
             "there is no simulated machine `plain-machine`",
-            "graph.toml:39",
+            "graph.toml:45",
         ]);
     }
 }
