@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use athermal::core::document::GraphFile;
-use athermal_serve::deployment::SECTIONS;
 
 use crate::terminal::Terminal;
 
 /// Warns of the sections of a machine file that are not read.
 pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
-    let written = |key: &&&str| graph.deployment.contains_key(**key);
-    let unread = SECTIONS.iter().filter(written);
+    // Which model is to run it reads.
+    let unread = graph.deployment.keys().filter(|key| *key != "model");
     let unread: Vec<_> = unread.map(|section| format!("`[{section}]`")).collect();
     if !unread.is_empty() {
         terminal.warning(format_args!(

@@ -191,3 +191,39 @@ fn a_service_is_asked_given_another_graph_and_ended_from_the_command_line() {
         nowhere.told
     );
 }
+
+#[test]
+fn a_service_is_found_by_its_machine_file_wherever_it_keeps_its_state() {
+    let scratch = desk("elsewhere");
+    let (machine, plain) = (scratch.path("line.toml"), format!("{GRAPH}{SERVICE}"));
+    std::fs::create_dir_all(scratch.path("base")).unwrap();
+    let kept = "schema = 1\n[runtime]\nstate = \"kept\"\n";
+    scratch.file("base/kept.toml", kept);
+    let named = plain.replace("[runtime]", "[runtime]\nstate = \"here/state\"");
+    let inherited = plain.replace("schema = 1", "schema = 1\nextends = \"base/kept.toml\"");
+    let aside = scratch.path("aside").display().to_string();
+    for (text, more, state) in [
+        (&plain, &[][..], "line.state"),
+        (&named, &[], "here/state"),
+        (&inherited, &[], "base/kept"),
+        (&inherited, &["--state", &*aside], "aside"),
+    ] {
+        scratch.file("line.toml", text);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .arg("serve")
+            .arg(&machine)
+            .args(more)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        until(&scratch, state, |status| status["ticks"].as_u64() > Some(5));
+        assert!(scratch.path(state).join("journal").is_dir(), "{state}");
+        // Killed, it leaves its sockets behind, and the next one is found all the same.
+        child.kill().unwrap();
+        child.wait().unwrap();
+        std::fs::remove_file(scratch.path("history.csv")).unwrap();
+    }
+    let gone = athermal(&[&"status", &machine]);
+    assert_ne!(gone.status, 0, "{}", gone.out);
+}

@@ -143,6 +143,54 @@ fn a_full_disk_of_the_state_is_reported_and_the_service_goes_on() {
     assert!(history(&scratch) == by_run(&scratch));
 }
 
+/// Started on such a disk it does what one that runs does when the disk becomes so.
+#[test]
+fn a_start_on_a_disk_that_is_full_or_may_not_be_written_is_a_state_and_the_journal_goes_on() {
+    for (name, is_full) in [("start-full", true), ("start-read-only", false)] {
+        let scratch = begun(name);
+        let Some(disk) = Disk::small(&scratch) else {
+            return;
+        };
+        let write = |may: bool| match (is_full, may) {
+            (true, false) => disk.fill(),
+            (true, true) => disk.make_room(),
+            (false, may) => {
+                let how = if may { "remount,rw" } else { "remount,ro" };
+                let path = disk.path.display().to_string();
+                assert!(is_done("mount", &["-o", how, &path]));
+            }
+        };
+        let (state, out) = (disk.path.join("state"), scratch.path("history.csv"));
+        let named: &str = &state.display().to_string();
+        let mut text = String::new();
+        // A new state, one that a kill left, and one that was ended.
+        for round in 0..3 {
+            let rows = 200 + 400 * round;
+            write(false);
+            let mut child = serve(&scratch, &["--state", named]);
+            append(&scratch, rows, rows + 200);
+            until_rows(&out, rows + 200, &mut child);
+            text += &until_reported(&mut child, "the journal cannot be written: ");
+            // It is not reported as often as it is tried.
+            std::thread::sleep(Duration::from_millis(2_500));
+            write(true);
+            let again = until_reported(&mut child, "the journal is written again; ");
+            assert!(!again.contains("the journal cannot be written"), "{again}");
+            append(&scratch, rows + 200, rows + 400);
+            until_rows(&out, rows + 400, &mut child);
+            until_journalled(&scratch, &state, (rows + 399) as f64 / 10.0);
+            if round == 0 {
+                std::thread::sleep(Duration::from_millis(500));
+                child.kill().unwrap();
+                child.wait().unwrap();
+            } else {
+                text += &end(child);
+            }
+        }
+        assert!(history(&scratch) == by_run(&scratch), "{text}");
+    }
+}
+
 #[test]
 fn rows_wait_for_a_sink_whose_disk_is_full_and_none_is_lost() {
     let scratch = begun("full-sink");

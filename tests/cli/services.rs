@@ -259,13 +259,57 @@ fn the_ticks_of_a_simulated_live_hour_are_those_of_its_replay_its_evaluation_and
 
 #[test]
 fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_twice() {
-    let kills = if std::env::var_os("ATHERMAL_LONG").is_some() {
-        2_000
-    } else {
-        200
+    killed("kills", SERVICE, 200);
+}
+
+#[test]
+fn a_service_that_is_killed_while_its_sink_changes_files_has_each_row_once_over_all_of_them() {
+    let rotated = SERVICE.replace("history.csv\"", "history.csv\"\nrotate = \"2 kB\"");
+    let scratch = killed("kills-rotated", &rotated, 100);
+    let full = all_of(&scratch).len() - 1;
+    println!("{full} files were full");
+    assert!(full > 200, "{full}");
+}
+
+/// The files of a sink, in order, the one that is written last.
+fn all_of(scratch: &Scratch) -> Vec<std::path::PathBuf> {
+    let folder = scratch.path("history.csv").parent().unwrap().to_owned();
+    let files = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|of| of.unwrap().path());
+    let is_of_it = |of: &std::path::PathBuf| {
+        let name = of.file_name().unwrap().to_string_lossy();
+        name.starts_with("history") && name.ends_with(".csv")
     };
-    let scratch = desk("kills", SERVICE);
-    let (log, out) = (scratch.path("log.csv"), scratch.path("history.csv"));
+    let mut files: Vec<_> = files.filter(is_of_it).collect();
+    files.sort();
+    files
+}
+
+/// All that a service wrote, as one file.
+fn whole_history(scratch: &Scratch) -> String {
+    let texts = all_of(scratch)
+        .into_iter()
+        .map(|of| std::fs::read_to_string(of).unwrap());
+    let mut whole = String::new();
+    for text in texts {
+        let rows = text.find('\n').map_or(0, |end| end + 1);
+        whole += if whole.is_empty() {
+            &text
+        } else {
+            &text[rows..]
+        };
+    }
+    without_revisions(&whole)
+}
+
+/// Kills a service so often, and compares all that it wrote with what a run writes.
+fn killed(name: &str, service: &str, kills: usize) -> Scratch {
+    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
+    let kills = if is_long { 10 * kills } else { kills };
+    let scratch = desk(name, service);
+    let log = scratch.path("log.csv");
+    let lines = |scratch: &Scratch| all_of(scratch).iter().map(|of| lines(of)).sum::<usize>();
     let (mut prng, mut written) = (Prng::stream(1, "kills"), 0);
     scratch.file("log.csv", HEADER);
     let mut at_work = 0;
@@ -275,31 +319,36 @@ fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_tw
         written += count;
     };
     for nth in 0..kills {
-        let before = lines(&out);
+        let before = lines(&scratch);
         add(20);
         let mut child = serve(&scratch, &[]);
         // Three of four are killed at work, the others anywhere.
         let began = Instant::now();
-        while nth % 4 != 0 && lines(&out) <= before && began.elapsed() < Duration::from_secs(20) {
+        while nth % 4 != 0 && lines(&scratch) <= before && began.elapsed() < Duration::from_secs(20)
+        {
             std::thread::sleep(Duration::from_millis(1));
         }
         add(20);
         std::thread::sleep(Duration::from_micros(prng.between(0.0, 30e3) as u64));
         let _ = child.kill();
         let _ = child.wait();
-        at_work += usize::from(lines(&out) > before);
+        at_work += usize::from(lines(&scratch) > before);
     }
     let written = 40 * kills;
     let mut child = serve(&scratch, &[]);
     // All rows may stand there already, and then it would be asked to end before it is up.
     until_reported(&mut child, "goes on where it ended");
-    until_rows(&out, written, &mut child);
+    let began = Instant::now();
+    while lines(&scratch) < written && began.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
     end(child);
-    assert!(history(&scratch) == by_run(&scratch));
+    assert!(whole_history(&scratch) == by_run(&scratch));
     let state = scratch.path("line.state");
     athermal(&[&"replay", &state, &"--check"]).ended(0);
     println!("{kills} kills, {at_work} of them at work, {written} rows");
     assert!(at_work * 2 > kills, "{at_work}");
+    scratch
 }
 
 #[test]

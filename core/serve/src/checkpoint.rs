@@ -177,7 +177,12 @@ impl Checkpoints {
             error,
         };
         let mut files = Vec::new();
-        for entry in fs::read_dir(&self.folder).map_err(unreadable)? {
+        let entries = match fs::read_dir(&self.folder) {
+            // One that could not be made yet.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(files),
+            entries => entries.map_err(unreadable)?,
+        };
+        for entry in entries {
             let entry = entry.map_err(unreadable)?;
             let happenings = entry.file_name().to_str().and_then(|name| {
                 let digits = name.strip_prefix("checkpoint-")?.strip_suffix(".state")?;

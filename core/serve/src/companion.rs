@@ -75,6 +75,9 @@ pub fn read_companion<T: Companion + Default + DeserializeOwned + JsonSchema + '
 macro_rules! register_companion {
     ($spec:ty, $section:literal) => {
         $crate::__private::inventory::submit! {
+            $crate::__private::Section($section)
+        }
+        $crate::__private::inventory::submit! {
             $crate::companion::CompanionKind {
                 section: $section,
                 read: $crate::companion::read_companion::<$spec>,

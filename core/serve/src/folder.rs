@@ -3,6 +3,7 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration as Wait, Instant as Clock};
 use std::{fmt, io};
 
@@ -18,7 +19,24 @@ const ENDS: Wait = Wait::from_secs(1);
 #[derive(Debug)]
 pub struct StateFolder {
     paths: StatePaths,
-    _lock: File,
+    /// None as long as it can be neither made nor locked.
+    lock: Arc<Mutex<Option<File>>>,
+}
+
+/// Whether what keeps a disk from being written may pass: it is full, or may not be written. Then it is tried again, and no mistake.
+#[must_use]
+pub fn may_pass(error: &io::Error) -> bool {
+    use io::ErrorKind::{
+        AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory,
+    };
+    let never = [
+        AlreadyExists,
+        InvalidFilename,
+        InvalidInput,
+        IsADirectory,
+        NotADirectory,
+    ];
+    !never.contains(&error.kind())
 }
 
 /// What is where in a state folder. Whoever only reads needs no lock.
@@ -34,58 +52,95 @@ impl std::ops::Deref for StateFolder {
 }
 
 impl StateFolder {
-    /// Makes the folder where it is not there, and locks it.
+    /// Makes the folder where it is not there, and locks it. One on a disk that is full or may not be written is [prepared](Self::prepare)
+    /// later.
     ///
     /// # Errors
-    /// When another process holds it for more than a second, or it cannot be written.
+    /// When another process holds it for more than a second, or it can never be one.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
-        let not_written = |path: &Path| {
-            let path = path.to_owned();
-            move |error| FolderError::NotWritten { path, error }
-        };
-        let lock = path.join("lock");
-        fs::create_dir_all(path).map_err(not_written(path))?;
-        let mut options = File::options();
-        options.read(true).write(true).create(true).truncate(false);
-        let mut file = options.open(&lock).map_err(not_written(&lock))?;
-        let began = Clock::now();
-        while let Err(error) = file.try_lock() {
-            match error {
-                TryLockError::Error(error) => return Err(not_written(&lock)(error)),
-                TryLockError::WouldBlock if began.elapsed() < ENDS => {
-                    std::thread::sleep(Wait::from_millis(20));
-                }
-                TryLockError::WouldBlock => {
-                    let mut by = String::new();
-                    let _ = file.read_to_string(&mut by);
-                    return Err(FolderError::Held {
-                        path: path.to_owned(),
-                        by: by.trim().parse().ok(),
-                    });
-                }
-            }
-        }
-        let id = std::process::id();
-        let noted = file
-            .set_len(0)
-            .and_then(|()| file.rewind())
-            .and_then(|()| writeln!(file, "{id}"));
-        noted.map_err(not_written(&lock))?;
         let folder = Self {
             paths: StatePaths::new(path),
-            _lock: file,
+            lock: Arc::default(),
         };
-        let parts = [
-            folder.journal(),
-            folder.checkpoints(),
-            folder.models(),
-            folder.swaps(),
-        ];
-        for part in parts {
-            fs::create_dir_all(&part).map_err(not_written(&part))?;
+        match folder.prepare() {
+            Err(FolderError::NotWritten { error, .. }) if may_pass(&error) => {}
+            prepared => prepared?,
         }
         Ok(folder)
     }
+
+    /// Locks the folder, and makes what it lacks, as far as that has not been done.
+    ///
+    /// # Errors
+    /// When another process holds it, or it cannot be written.
+    pub fn prepare(&self) -> Result<(), FolderError> {
+        let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if lock.is_none() {
+            *lock = Some(locked(self.path())?);
+        }
+        for part in [
+            self.journal(),
+            self.checkpoints(),
+            self.models(),
+            self.swaps(),
+        ] {
+            fs::create_dir_all(&part).map_err(not_written(&part))?;
+        }
+        Ok(())
+    }
+
+    /// The same, for whoever does not have the folder.
+    pub(crate) fn preparation(&self) -> impl FnMut() -> io::Result<()> + Send + 'static {
+        let folder = Self {
+            paths: self.paths.clone(),
+            lock: Arc::clone(&self.lock),
+        };
+        move || folder.prepare().map_err(io::Error::other)
+    }
+}
+
+fn not_written(path: &Path) -> impl Fn(io::Error) -> FolderError {
+    let path = path.to_owned();
+    move |error| FolderError::NotWritten {
+        path: path.clone(),
+        error,
+    }
+}
+
+/// The lock of a folder, which is made where it is not there.
+fn locked(path: &Path) -> Result<File, FolderError> {
+    let lock = path.join("lock");
+    fs::create_dir_all(path).map_err(not_written(path))?;
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    let opened = options.open(&lock);
+    // One that may not be written can be locked all the same.
+    let opened = opened.or_else(|error| File::open(&lock).map_err(|_| error));
+    let mut file = opened.map_err(not_written(&lock))?;
+    let began = Clock::now();
+    while let Err(error) = file.try_lock() {
+        match error {
+            TryLockError::Error(error) => return Err(not_written(&lock)(error)),
+            TryLockError::WouldBlock if began.elapsed() < ENDS => {
+                std::thread::sleep(Wait::from_millis(20));
+            }
+            TryLockError::WouldBlock => {
+                let mut by = String::new();
+                let _ = file.read_to_string(&mut by);
+                return Err(FolderError::Held {
+                    path: path.to_owned(),
+                    by: by.trim().parse().ok(),
+                });
+            }
+        }
+    }
+    let id = std::process::id();
+    // Who holds it is for people: a full disk does not know.
+    let _ = file
+        .set_len(0)
+        .and_then(|()| file.rewind())
+        .and_then(|()| writeln!(file, "{id}"));
+    Ok(file)
 }
 
 impl StatePaths {

@@ -28,7 +28,9 @@ fn is_synchronised() -> bool {
     false
 }
 
-fn now() -> Option<Instant> {
+/// The host's time as it is, right or not; none before 1970.
+#[must_use]
+pub fn now() -> Option<Instant> {
     let since = std::time::UNIX_EPOCH.elapsed().ok()?;
     i64::try_from(since.as_nanos()).ok().map(Instant::from_ns)
 }

@@ -62,5 +62,6 @@ mod tests;
 /// What macros of this crate make use of.
 #[doc(hidden)]
 pub mod __private {
+    pub use super::document::Section;
     pub use {inventory, schemars, serde_json};
 }

@@ -9,7 +9,7 @@ use athermal_run::model::Model;
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
 use crate::compile::Plan;
 use crate::engine::{Engine, EngineError, StateTransfer};
-use crate::folder::{StateFolder, StatePaths};
+use crate::folder::{StateFolder, StatePaths, may_pass};
 use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
 use crate::replay::{Difference, Replay};
 use crate::sequencer::Timeline;
@@ -29,6 +29,8 @@ pub struct Recovered {
     feed: FeedNames,
     event: u64,
     happenings: u64,
+    /// Whether the end of the journal could not be cut to what was read of it.
+    is_unsealed: bool,
 }
 
 /// How a service was found.
@@ -230,7 +232,7 @@ impl Recovered {
         let (revision, frozen) = (self.engine.revision().to_owned(), self.engine.frozen());
         let at = (self.event, self.happenings);
         let mut begin = Begin::new(self.feed.clone(), revision, at, frozen, &self.timeline);
-        begin.after_failure = self.report.ahead > 0;
+        begin.after_failure = self.report.ahead > 0 || self.is_unsealed;
         begin
     }
 
@@ -289,9 +291,11 @@ impl Recovered {
                 _ => replay.pass_by(&record),
             }
         }
-        if seals {
-            log.seal()?;
-        }
+        let is_unsealed = seals
+            && match log.seal() {
+                Err(JournalError::NotWritten { error, .. }) if may_pass(&error) => true,
+                sealed => sealed.map(|()| false)?,
+            };
         report.ahead = from.saturating_sub(seen);
         report.torn = log.torn().cloned();
         report.stepped = replay.stepped();
@@ -310,6 +314,7 @@ impl Recovered {
             feed,
             event: log.event() + report.ahead,
             happenings: seen.max(from),
+            is_unsealed,
             report,
         })
     }

@@ -383,7 +383,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use super::*;
-    use crate::connector::{ConnectorError, Inlet, Kept, Outflow};
+    use crate::connector::{ConnectorError, Inlet, Kept, Outflow, Place};
 
     /// A counter that may break a rule.
     #[derive(Debug, Clone, Copy, PartialEq)]
@@ -473,18 +473,19 @@ mod tests {
     }
 
     impl Kept for Writing {
-        fn end(&mut self) -> Result<u64, ConnectorError> {
-            Ok(self.bytes().len() as u64)
+        fn end(&mut self) -> Result<Place, ConnectorError> {
+            let rows = self.bytes().len() as u64;
+            Ok(Place { file: 0, rows })
         }
 
-        fn rows_after(&mut self, end: u64) -> Result<Option<u64>, ConnectorError> {
-            Ok((self.bytes().len() as u64).checked_sub(end))
+        fn rows_after(&mut self, end: Place) -> Result<Option<u64>, ConnectorError> {
+            Ok((self.bytes().len() as u64).checked_sub(end.rows))
         }
 
-        fn cut(&mut self, end: u64, rows: u64) -> Result<(), ConnectorError> {
+        fn cut(&mut self, end: Place, rows: u64) -> Result<(), ConnectorError> {
             let mut bytes = self.bytes();
             if !self.1 {
-                bytes.truncate((end + rows) as usize);
+                bytes.truncate((end.rows + rows) as usize);
             }
             std::fs::write(&self.0, bytes).map_err(ConnectorError::new)
         }

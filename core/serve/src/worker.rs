@@ -15,6 +15,8 @@ pub struct Worker {
     stepper: Stepper,
     recorder: Recorder,
     generation: u64,
+    /// The last tick and a stamp, where another segment began because the tick was of the future.
+    went_back: Option<(Instant, Instant)>,
 }
 
 /// What came of a tick.
@@ -24,8 +26,10 @@ pub struct Output<'a> {
     pub at: Instant,
     /// Whether it was made by time alone.
     pub is_beat: bool,
-    /// How far the tick lies behind the newest stamp and the time since.
+    /// How old the tick is: by how much more its source lags behind the host than it did at the least.
     pub behind: Duration,
+    /// Whether a newer tick is due already, so that it is no command.
+    pub is_superseded: bool,
     /// It may leave once so many records are written; see [`Progress::wait_written`](crate::journal::Progress::wait_written).
     pub records: u64,
     /// How many ticks, beats, breaks and freezes there are then.
@@ -43,6 +47,7 @@ impl Worker {
             stepper,
             recorder,
             generation: 0,
+            went_back: None,
         }
     }
 
@@ -65,29 +70,60 @@ impl Worker {
     ///
     /// # Errors
     /// When the rules have other channels than the graph.
-    pub fn pass(
+    pub fn pass(&mut self, now: Moment, put: impl FnMut(&Output<'_>)) -> Result<(), EngineError> {
+        self.pass_while(now, |_| true, put)
+    }
+
+    /// The same for as long as `goes_on`: what is due then stays so.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn pass_while(
         &mut self,
         now: Moment,
+        mut goes_on: impl FnMut(&Self) -> bool,
         mut put: impl FnMut(&Output<'_>),
     ) -> Result<(), EngineError> {
-        while self.decide(now, false, &mut put)?.is_some() {}
+        while goes_on(self) && self.decide(now, false, &mut put)?.is_some() {}
         self.recorder.wake();
         self.recorder.mend(self.sequencer.timeline());
         Ok(())
+    }
+
+    /// Where another segment began because the last tick was of the future: that tick, and a stamp of the time that it is. Once.
+    pub fn went_back(&mut self) -> Option<(Instant, Instant)> {
+        self.went_back.take()
+    }
+
+    /// Makes the replica anew where ticks could not be mirrored. It takes as long as a checkpoint: for a moment in which nothing is due.
+    pub fn mirror_again(&mut self) {
+        self.stepper.mirror_again();
     }
 
     /// Steps all that waits, without waiting any longer. For the end of all sources.
     ///
     /// # Errors
     /// As [`pass`](Self::pass).
-    pub fn finish(
+    pub fn finish(&mut self, now: Moment, put: impl FnMut(&Output<'_>)) -> Result<(), EngineError> {
+        self.finish_while(now, |_| true, put).map(|_| ())
+    }
+
+    /// The same for as long as `goes_on`: true once nothing waits.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn finish_while(
         &mut self,
         now: Moment,
+        mut goes_on: impl FnMut(&Self) -> bool,
         mut put: impl FnMut(&Output<'_>),
-    ) -> Result<(), EngineError> {
-        while self.decide(now, true, &mut put)?.is_some() {}
+    ) -> Result<bool, EngineError> {
+        let mut is_done = false;
+        while !is_done && goes_on(self) {
+            is_done = self.decide(now, true, &mut put)?.is_none();
+        }
         self.recorder.wake();
-        Ok(())
+        Ok(is_done)
     }
 
     /// Freezes learning, or lets it go on.
@@ -147,7 +183,6 @@ impl Worker {
         at_the_end: bool,
         put: &mut impl FnMut(&Output<'_>),
     ) -> Result<Option<()>, EngineError> {
-        let newest = self.sequencer.newest(now);
         let decision = if at_the_end {
             self.sequencer.finish(now)
         } else {
@@ -166,6 +201,17 @@ impl Worker {
             Some(Decision::Break) => {
                 self.stepper.segment();
                 self.recorder.record(Record::Break { afresh: false });
+                return Ok(Some(()));
+            }
+            Some(Decision::Back { last, to }) => {
+                self.went_back = Some((last, to));
+                self.stepper.segment();
+                self.recorder.record(Record::Break { afresh: true });
+                return Ok(Some(()));
+            }
+            Some(Decision::Lag { source, least }) => {
+                let source = source as u32;
+                self.recorder.record(Record::Lag { source, least });
                 return Ok(Some(()));
             }
             Some(Decision::Shift { source, offset }) => {
@@ -190,7 +236,8 @@ impl Worker {
         put(&Output {
             at,
             is_beat,
-            behind: newest.map_or(Duration::ZERO, |newest| newest - at),
+            behind: self.sequencer.age(now),
+            is_superseded: self.sequencer.is_superseded(),
             records,
             happenings: self.recorder.happenings(),
             stepped,

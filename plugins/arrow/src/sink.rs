@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use athermal_core::time::{Duration, Instant};
 use athermal_files::TimeColumn;
-use athermal_serve::connector::{ConnectorError, Kept, OutRow, Outlet, Sink, SinkWiring};
+use athermal_serve::connector::{ConnectorError, Kept, OutRow, Outlet, Place, Sink, SinkWiring};
 use athermal_serve::journal::sync_folder;
 use athermal_serve::register_sink;
 use schemars::JsonSchema;
@@ -259,18 +259,21 @@ impl Stretches {
     }
 
     /// A place: the stretch, and how many of its rows are before it.
-    fn place(&self) -> u64 {
+    fn place(&self) -> Place {
         let last = self.files.last();
-        last.map_or(0, |of| (of.stretch.cast_unsigned() << 32) + of.rows)
+        last.map_or(Place::default(), |of| Place {
+            file: of.stretch.cast_unsigned(),
+            rows: of.rows,
+        })
     }
 
     /// The rows behind a place, by the files that they stand in; none where it is gone.
-    fn behind(&self, place: u64) -> Option<Vec<(usize, u64)>> {
-        let (stretch, before) = (place.cast_signed() >> 32, place & 0xffff_ffff);
+    fn behind(&self, place: Place) -> Option<Vec<(usize, u64)>> {
+        let (stretch, before) = (place.file.cast_signed(), place.rows);
         let holds = |of: &RowFile| of.stretch == stretch && of.rows >= before;
-        let first = match place {
-            0 => 0,
-            _ => self.files.iter().position(holds)?,
+        let first = match place == Place::default() {
+            true => 0,
+            false => self.files.iter().position(holds)?,
         };
         let files = self.files.iter().enumerate().skip(first);
         let behind = files.map(|(nth, of)| match nth == first {
@@ -280,7 +283,7 @@ impl Stretches {
         Some(behind.collect())
     }
 
-    fn cut(&mut self, place: u64, mut rows: u64) -> io::Result<()> {
+    fn cut(&mut self, place: Place, mut rows: u64) -> io::Result<()> {
         let length = self.length() as u64;
         for (nth, behind) in self.behind(place).unwrap_or_default() {
             let stays = behind.min(rows);
@@ -336,7 +339,7 @@ impl Outlet for Stretches {
 }
 
 impl Kept for Stretches {
-    fn end(&mut self) -> Result<u64, ConnectorError> {
+    fn end(&mut self) -> Result<Place, ConnectorError> {
         let synced = self.write().and_then(|()| match self.files.last() {
             Some(last) => last.file.sync_data(),
             None => Ok(()),
@@ -346,12 +349,12 @@ impl Kept for Stretches {
         Ok(self.place())
     }
 
-    fn rows_after(&mut self, end: u64) -> Result<Option<u64>, ConnectorError> {
+    fn rows_after(&mut self, end: Place) -> Result<Option<u64>, ConnectorError> {
         let behind = self.behind(end);
         Ok(behind.map(|files| files.into_iter().map(|(_, rows)| rows).sum()))
     }
 
-    fn cut(&mut self, end: u64, rows: u64) -> Result<(), ConnectorError> {
+    fn cut(&mut self, end: Place, rows: u64) -> Result<(), ConnectorError> {
         Self::cut(self, end, rows).map_err(|error| failed(&self.folder, &error))
     }
 }

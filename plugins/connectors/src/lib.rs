@@ -2,7 +2,7 @@
 //!
 //! | kind | source | sink |
 //! |---|---|---|
-//! | `csv`, `jsonl` | a file that is followed as it grows, also when it is rotated | a file with a row for each tick |
+//! | `csv`, `jsonl` | a file that is followed as it grows, also when it is rotated | a file with a row for each tick, and those that were full before |
 //! | `stdin`, `stdout` | rows from standard input | rows to standard output |
 //! | `replay` | a recording, at its pace or another | |
 //! | `simulation` | a simulated machine | the corrections that it applies |
@@ -17,6 +17,7 @@ mod follow;
 mod pace;
 mod pipe;
 mod replay;
+mod row_files;
 mod simulation;
 mod stream;
 mod table;

@@ -120,6 +120,20 @@ pub fn begun_columns(path: &Path) -> Option<Vec<String>> {
     ends.names(format).ok()
 }
 
+/// The instant of the last row of a file that a sink with these columns began; none where it has no row.
+///
+/// # Errors
+/// The file cannot be read, or is not one with these columns.
+pub fn begun_until(
+    path: &Path,
+    format: Format,
+    time: &TimeColumn,
+    columns: &[String],
+) -> Result<Option<Instant>, FileError> {
+    let begun = Begun::of(path, format, time, columns, None)?;
+    Ok(begun.and_then(|of| of.last_ns).map(Instant::from_ns))
+}
+
 /// What lines are called where one of them is no such as a run wrote.
 const FIRST_LINE: &str = "its first line";
 const LAST_LINE: &str = "its last line";

@@ -52,7 +52,7 @@ mod typed;
 mod unpacked;
 mod writer;
 
-pub use begun::begun_columns;
+pub use begun::{begun_columns, begun_until};
 pub use cell::{number, text_of, with_decimal_point};
 pub use dataset::{Dataset, layout, recordings_in};
 pub use detect::{

@@ -10,10 +10,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration as Wait;
 
 use athermal_command::{Failure, Format, Terminal, println};
+use athermal_core::diagnostic::{Diagnostics, Sources};
+use athermal_core::document::{Disk, load};
 use athermal_serve::service::usual_state;
 use serde_json::{Value, json};
 
-use crate::control::RUN;
+use crate::control::{RUN, notes, sockets};
 
 /// Where the unit of the package keeps the states of services.
 const STATES: &str = "/var/lib/athermal";
@@ -91,15 +93,38 @@ impl Address {
             return Ok(Self::Loopback { authority, token });
         }
         let tried = places(name, Path::new(STATES), Path::new(RUN));
-        let is_socket =
-            |path: &&PathBuf| fs::metadata(path).is_ok_and(|of| of.file_type().is_socket());
-        let found = tried.iter().find(is_socket).cloned();
+        let found = one_of(&tried).cloned();
         found
             .map(Self::Socket)
             .ok_or_else(|| ClientError::NoService {
                 name: name.to_owned(),
                 tried,
             })
+    }
+
+    /// The service of a machine file, and the folder in which it keeps its state.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn of_machine(
+        machine: &Path,
+        state: Option<&Path>,
+    ) -> Result<(Self, PathBuf), ClientError> {
+        let states = state.map_or_else(|| states_of(machine), |of| vec![of.to_owned()]);
+        let of_state = |state: PathBuf| {
+            sockets(&state)
+                .into_iter()
+                .map(move |of| (of, state.clone()))
+        };
+        let (tried, states): (Vec<_>, Vec<_>) = states.into_iter().flat_map(of_state).unzip();
+        let found = one_of(&tried).and_then(|found| tried.iter().position(|of| of == found));
+        match found {
+            Some(nth) => Ok((Self::Socket(tried[nth].clone()), states[nth].clone())),
+            None => Err(ClientError::NoService {
+                name: machine.display().to_string(),
+                tried,
+            }),
+        }
     }
 
     /// Asks for something.
@@ -186,27 +211,59 @@ impl Address {
     }
 }
 
+/// The socket of these at which a service answers; without one, the first that there is.
+fn one_of(places: &[PathBuf]) -> Option<&PathBuf> {
+    let is_socket = |path: &&PathBuf| fs::metadata(path).is_ok_and(|of| of.file_type().is_socket());
+    // One that was killed leaves its socket behind.
+    let answers = |path: &&PathBuf| is_socket(path) && UnixStream::connect(path).is_ok();
+    let found = places.iter().find(answers);
+    found.or_else(|| places.iter().find(is_socket))
+}
+
+/// Where the service of a machine file may keep its state: where one noted it that runs, where the file says, and beside the file.
+fn states_of(machine: &Path) -> Vec<PathBuf> {
+    let noted = notes(machine)
+        .into_iter()
+        .filter_map(|of| fs::read_link(of).ok());
+    noted
+        .chain(named_state(machine))
+        .chain([usual_state(machine)])
+        .collect()
+}
+
+/// The state folder that a machine file names, or one that it extends.
+fn named_state(machine: &Path) -> Option<PathBuf> {
+    let (mut files, mut mistakes) = (Sources::new(), Diagnostics::new());
+    let document = load(machine, &Disk, &mut files, &mut mistakes)?;
+    let runtime = document.tree.as_table()?.get("runtime")?;
+    let state = runtime.as_table()?.get("state")?;
+    Some(files.resolve(state.place, state.as_text()?))
+}
+
 /// Where the socket of a service may be. State folders know where it is.
 fn places(name: &str, states: &Path, run: &Path) -> Vec<PathBuf> {
     let path = Path::new(name);
-    let folder = match path.is_dir() {
-        true => path.to_owned(),
-        false => usual_state(path),
-    };
-    let noted = |folder: PathBuf| {
-        let note = folder.join("socket");
-        fs::read_to_string(&note).map_or(note, PathBuf::from)
+    let folders = match path.is_dir() {
+        true => vec![path.to_owned()],
+        false => states_of(path),
     };
     // A name may have dots of its own.
     let is_file = path.exists() || path.extension().is_some_and(|of| of == "toml");
     let stem = path.file_stem().filter(|_| is_file);
     let stem = stem.map_or(name.into(), |of| of.to_string_lossy());
-    vec![
-        path.to_owned(),
-        noted(folder),
-        noted(states.join(name)),
-        run.join(format!("{stem}.sock")),
-    ]
+    let mut places = vec![path.to_owned()];
+    let packaged = [states.join(name), states.join(&*stem)];
+    places.extend(
+        folders
+            .into_iter()
+            .chain(packaged)
+            .flat_map(|of| sockets(&of)),
+    );
+    places.push(run.join(format!("{stem}.sock")));
+    // Each once, where it comes first.
+    let mut seen = std::collections::BTreeSet::new();
+    places.retain(|place| seen.insert(place.clone()));
+    places
 }
 
 /// The status of an answer, and what follows its head.
@@ -315,10 +372,11 @@ mod tests {
         fs::create_dir_all(states.join("line.v2")).unwrap();
         fs::write(states.join("line.v2/socket"), "/run/athermal/another.sock").unwrap();
         let found = places("line.v2", &states, run);
-        assert_eq!(found[2], run.join("another.sock"));
-        assert_eq!(found[3], run.join("line.v2.sock"));
+        let own = run.join("line.v2.sock");
+        assert!(found.contains(&run.join("another.sock")), "{found:?}");
+        assert_eq!(found.last(), Some(&own));
         // The name of a machine file is that of its service.
-        assert_eq!(places("line.v2.toml", &states, run)[3], found[3]);
+        assert_eq!(places("line.v2.toml", &states, run).last(), Some(&own));
         fs::remove_dir_all(states).unwrap();
     }
 

@@ -24,6 +24,8 @@ use crate::token::Token;
 pub(crate) const RUN: &str = "/run/athermal";
 /// The socket in a state folder, where that folder cannot be written.
 const SOCKET: &str = "control.sock";
+/// The file in a state folder that says where the socket is.
+const NOTE: &str = "socket";
 /// How many bytes the path of a socket has at most, on all systems.
 const LONGEST: usize = 100;
 /// How long the service may take to let somebody look on.
@@ -41,12 +43,11 @@ impl Companion for Control {
             Ok::<_, ConnectorError>((listener, token))
         });
         let tcp = tcp.transpose()?;
-        // Whoever asks finds the socket by the state folder, wherever it is.
-        let noted = fs::write(
-            beside.state.join("socket"),
-            path.as_os_str().as_encoded_bytes(),
-        );
-        noted.map_err(failed("socket".to_owned()))?;
+        // Whoever asks finds the socket by the state folder, wherever it is, and that by the machine file. Where nothing can be written
+        // it is looked for where it may be.
+        let bytes = path.as_os_str().as_encoded_bytes();
+        let _ = fs::write(beside.state.join(NOTE), bytes);
+        let note = Note::of(beside);
         let hub = Arc::new(Hub::default());
         let (handle, seen) = (beside.handle.clone(), Arc::clone(&hub));
         let look = move |service: &mut Service| {
@@ -58,17 +59,22 @@ impl Companion for Control {
         let routes = Routes::new(beside.clone(), hub);
         let doors = Doors { unix, tcp, path };
         let server = Server::start(doors, routes).map_err(failed("thread".to_owned()))?;
-        Ok(Box::new(server))
+        Ok(Box::new((server, note)))
     }
 }
 
 impl Control {
     fn socket(&self, beside: &Beside) -> Result<(PathBuf, UnixListener), ConnectorError> {
-        let path = match &self.socket {
+        let mut path = match &self.socket {
             Some(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
             None => socket_of(Path::new(RUN), &beside.name, &beside.state),
         };
-        let bound = bind(&path);
+        let mut bound = bind(&path);
+        if bound.is_err() && self.socket.is_none() {
+            // A state folder that cannot be written keeps nobody from asking.
+            path = elsewhere(&beside.state.join(SOCKET));
+            bound = bind(&path);
+        }
         let bound = bound.map_err(|error| {
             let path = path.display();
             ConnectorError::new(format_args!(
@@ -97,8 +103,53 @@ fn short(path: PathBuf) -> PathBuf {
     if path.as_os_str().len() <= LONGEST {
         return path;
     }
-    let hash = fnv_1a(path.as_os_str().as_encoded_bytes());
-    std::env::temp_dir().join(format!("athermal-{hash:016x}.sock"))
+    elsewhere(&path)
+}
+
+/// Where what has no room at a path stands, among temporary files.
+fn elsewhere(path: &Path) -> PathBuf {
+    std::env::temp_dir().join(format!("athermal-{:016x}.sock", hash(path)))
+}
+
+fn hash(path: &Path) -> u64 {
+    fnv_1a(path.as_os_str().as_encoded_bytes())
+}
+
+/// Where the socket of a service with this state folder may be.
+pub(crate) fn sockets(state: &Path) -> Vec<PathBuf> {
+    let state = std::path::absolute(state).unwrap_or_else(|_| state.to_owned());
+    let noted = fs::read_to_string(state.join(NOTE)).ok().map(PathBuf::from);
+    let own = state.join(SOCKET);
+    let elsewhere = elsewhere(&own);
+    noted.into_iter().chain([own, elsewhere]).collect()
+}
+
+/// Where a service may note its state folder by its machine file.
+pub(crate) fn notes(machine: &Path) -> [PathBuf; 2] {
+    let machine = fs::canonicalize(machine).unwrap_or_else(|_| machine.to_owned());
+    let name = format!("athermal-{:016x}.state", hash(&machine));
+    [Path::new(RUN).join(&name), std::env::temp_dir().join(name)]
+}
+
+/// A link to the state folder of a service, for as long as that runs.
+struct Note(Option<PathBuf>);
+
+impl Note {
+    fn of(beside: &Beside) -> Self {
+        let link = |path: &PathBuf| {
+            let _ = fs::remove_file(path);
+            std::os::unix::fs::symlink(&beside.state, path).is_ok()
+        };
+        Self(notes(&beside.machine).into_iter().find(link))
+    }
+}
+
+impl Drop for Note {
+    fn drop(&mut self) {
+        if let Some(path) = &self.0 {
+            let _ = fs::remove_file(path);
+        }
+    }
 }
 
 /// Binds a socket that its user and group may use. One that nobody listens on any more is taken over; what is no socket stays.

@@ -101,6 +101,9 @@ pub fn status(of: &Value) -> String {
             sink["behind"],
             sink["failures"]
         );
+        if let Some(error) = sink["error"].as_str() {
+            let _ = writeln!(all, "  {error}; tried again");
+        }
     }
     for channel in of["channels"].as_array().into_iter().flatten() {
         let left_out = ["late", "repeated", "future", "clock"];

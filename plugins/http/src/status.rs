@@ -152,6 +152,7 @@ fn sinks(service: &Service) -> Vec<Value> {
             "dropped": of.dropped.load(Ordering::Relaxed),
             "behind": of.behind.load(Ordering::Relaxed),
             "failures": of.failures.load(Ordering::Relaxed),
+            "error": of.error(),
             "waiting": of.waiting(),
         })
     };

@@ -5,6 +5,8 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 
+use athermal_serve::folder::may_pass;
+
 /// The name of the file in the state folder.
 pub const FILE: &str = "token";
 
@@ -37,6 +39,7 @@ impl Token {
                 }
                 Ok(Self(text))
             }
+            // One that cannot be kept is known to nobody: until the next start nothing is ordered by it.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Self::make(&path),
             Err(error) => Err(error),
         }
@@ -48,7 +51,12 @@ impl Token {
         let text: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         let mut options = OpenOptions::new();
         let file = options.write(true).create_new(true).mode(0o600).open(path);
-        writeln!(file?, "{text}")?;
+        let written = file.and_then(|mut file| writeln!(file, "{text}"));
+        match written {
+            Err(error) if !may_pass(&error) => return Err(error),
+            Err(_) => drop(std::fs::remove_file(path)),
+            Ok(()) => {}
+        }
         Ok(Self(text))
     }
 

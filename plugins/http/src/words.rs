@@ -4,7 +4,7 @@ use athermal_analysis::figures::{instant, seconds};
 use athermal_command::Message;
 use athermal_core::diagnostic::{count, counted};
 use athermal_run::live::Notice;
-use athermal_serve::sequencer::{Admission, Refusal};
+use athermal_serve::sequencer::{Admission, Leader, Refusal};
 use athermal_serve::service::ServiceEvent;
 use serde_json::{Value, json};
 
@@ -43,8 +43,22 @@ pub fn described(event: &ServiceEvent, channels: &[String]) -> (bool, Message) {
             of_sink(sink),
             format!("sink `{sink}` puts out again"),
         ),
-        ServiceEvent::NotAccepted { admission, count } => {
-            not_accepted(*admission, *count, channels)
+        ServiceEvent::NotAccepted {
+            admission,
+            count,
+            leader,
+        } => not_accepted(*admission, *count, leader.as_ref(), channels),
+        ServiceEvent::WentBack { last, to } => {
+            let (last, to) = (seconds(*last), seconds(*to));
+            fault(
+                "went_back",
+                json!({ "last_s": last, "to_s": to }),
+                format!(
+                    "the last tick, at {}, was of the future: it is {}; a segment begins there",
+                    instant(last),
+                    instant(to)
+                ),
+            )
         }
         ServiceEvent::Swap(of) => notice(of),
         ServiceEvent::Staged { revision, .. } => note(
@@ -80,7 +94,7 @@ pub fn described(event: &ServiceEvent, channels: &[String]) -> (bool, Message) {
             match is_synchronised {
                 true => "the host's clock is synchronised: stamps are compared with it from now on",
                 false => {
-                    "the host's clock is not synchronised: until it is, the clocks of sources are not judged, and the first stamp may be any"
+                    "the host's clock is not synchronised: until it is, the clocks of sources are not judged by it, and what is of the future is known from sources alone"
                 }
             },
         ),
@@ -139,6 +153,11 @@ pub fn notice(notice: &Notice) -> (bool, Message) {
             let words = format!("{} {were} missed", counted(*ticks, "tick"));
             fault("missed", json!({ "ticks": ticks }), words)
         }
+        Notice::Mirrored => note(
+            "mirrored",
+            Value::Null,
+            "what runs is known again: checkpoints and swaps go on",
+        ),
     }
 }
 
@@ -151,7 +170,12 @@ fn fault(name: &'static str, facts: Value, words: impl std::fmt::Display) -> (bo
 }
 
 /// A sample that was left out, and how many like it.
-fn not_accepted(admission: Admission, count: u64, channels: &[String]) -> (bool, Message) {
+fn not_accepted(
+    admission: Admission,
+    count: u64,
+    leader: Option<&(String, Leader)>,
+    channels: &[String],
+) -> (bool, Message) {
     let (reason, sample, why) = match admission {
         Admission::Late(sample) => ("late", Some(sample), "came after its tick".to_owned()),
         Admission::Twice(sample) => (
@@ -160,7 +184,7 @@ fn not_accepted(admission: Admission, count: u64, channels: &[String]) -> (bool,
             "is not after the one before".to_owned(),
         ),
         Admission::Refused(sample, Refusal::Future { ahead }) => {
-            let why = format!("is {ahead} ahead of the newest one and the time since");
+            let why = format!("is {ahead} ahead of what time it is");
             ("future", Some(sample), why)
         }
         Admission::Refused(sample, Refusal::Clock { off }) => (
@@ -168,9 +192,10 @@ fn not_accepted(admission: Admission, count: u64, channels: &[String]) -> (bool,
             Some(sample),
             format!("is {off} from the time of its arrival"),
         ),
-        Admission::Refused(_, Refusal::NoChannel) | Admission::Accepted(_) | Admission::Held => {
-            ("no channel", None, "is of no channel".to_owned())
-        }
+        Admission::Refused(_, Refusal::NoChannel)
+        | Admission::Accepted(_)
+        | Admission::Waits(_)
+        | Admission::Held => ("no channel", None, "is of no channel".to_owned()),
     };
     let channel = sample.and_then(|of| channels.get(of.channel as usize));
     let name = channel.map_or("a sample", String::as_str);
@@ -181,9 +206,22 @@ fn not_accepted(admission: Admission, count: u64, channels: &[String]) -> (bool,
         1 => "others like it are counted".to_owned(),
         count => format!("{count} so far"),
     };
+    let clock = leader.map_or_else(String::new, |(source, of)| {
+        let leading = channels.get(of.channel).map_or("", String::as_str);
+        format!(
+            "; the clock of source `{source}` is ahead by {}: {leading}",
+            of.ahead
+        )
+    });
     fault(
         "not_accepted",
-        json!({ "reason": reason, "channel": channel, "count": count }),
-        format!("{name}{at}: left out, since it {why}; {so_far}"),
+        json!({
+            "reason": reason,
+            "channel": channel,
+            "count": count,
+            "clock": leader.map(|(source, _)| source),
+            "ahead_s": leader.map(|(_, of)| of.ahead.secs()),
+        }),
+        format!("{name}{at}: left out, since it {why}{clock}; {so_far}"),
     )
 }

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration as Wait;
 
+use athermal_core::node::Forms;
 use athermal_core::time::Duration;
+use athermal_serve::connector::ParameterRemark;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 use crate::client::Settings;
 
@@ -26,6 +29,19 @@ pub struct Broker {
     /// The certificates that its own is judged by; those of the system without.
     #[serde(skip)]
     pub authorities: Option<PathBuf>,
+    /// By what it knows the client, where it asks for that.
+    #[serde(skip)]
+    pub identity: Option<Identity>,
+}
+
+/// By what a broker knows a client that has a certificate.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// The file with the certificate, and those of the authorities between it and the one that the broker knows.
+    pub certificate: PathBuf,
+    /// The file with its key, which only the service's user reads.
+    pub key: PathBuf,
 }
 
 impl TryFrom<String> for Broker {
@@ -76,6 +92,7 @@ impl FromStr for Broker {
             port,
             is_secure,
             authorities: None,
+            identity: None,
         })
     }
 }
@@ -130,10 +147,15 @@ pub enum Version {
     Five,
 }
 
+/// A text that does not belong into a file that others read.
+#[derive(Debug, Clone, PartialEq, Eq, JsonSchema)]
+#[schemars(transparent)]
+pub struct Secret(SecretPlace);
+
 /// Where a text stands that does not belong into a file that others read.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Secret {
+struct SecretPlace {
     /// A file with it, relative to the machine file; blanks and line ends around it do not count.
     #[serde(default)]
     file: Option<PathBuf>,
@@ -142,9 +164,25 @@ pub struct Secret {
     env: Option<String>,
 }
 
+impl<'de> Deserialize<'de> for Secret {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let place = Forms::new("where it stands, { file = \"…\" } or { env = \"…\" }")
+            .text(|_: String| None)
+            .table(Some)
+            .read(deserializer)?;
+        place.map(Self).ok_or_else(|| {
+            D::Error::custom(
+                "a secret has no place in a file that others read: write `{ file = \"…\" }` with a file that has it, or \
+                 `{ env = \"…\" }` with a variable of the environment; only the name of a user may stand here, as `name`",
+            )
+        })
+    }
+}
+
 impl Secret {
     fn read(&self, folder: &Path) -> Result<String, String> {
-        match (&self.file, &self.env) {
+        let SecretPlace { file, env } = &self.0;
+        match (file, env) {
             (Some(file), None) => {
                 let path = folder.join(file);
                 let read = std::fs::read_to_string(&path);
@@ -191,12 +229,39 @@ impl Login {
 pub struct Way<'a> {
     pub broker: &'a Broker,
     pub authorities: Option<&'a PathBuf>,
+    pub identity: Option<&'a Identity>,
     pub login: Option<&'a Login>,
     pub client_id: Option<&'a ClientId>,
     pub keep_alive: Duration,
 }
 
 impl Way<'_> {
+    /// What is wrong with it, before anything runs.
+    pub fn remarks(&self) -> Vec<ParameterRemark> {
+        let (is_secure, mut all) = (self.broker.is_secure, Vec::new());
+        let mut mistake = |at: &str, words: String, help: &str| {
+            all.push(ParameterRemark {
+                at: vec![at.to_owned()],
+                is_mistake: true,
+                words,
+                help: help.to_owned(),
+            });
+        };
+        if is_secure && !cfg!(feature = "tls") {
+            let help = "take a program that has TLS, as release archives and the Debian package do, or build it with `--features tls`";
+            mistake("broker", without_tls(self.broker), help);
+        }
+        if self.identity.is_some() && !is_secure {
+            let words = format!(
+                "a certificate of the client is of TLS, and {} is spoken to without",
+                self.broker
+            );
+            let help = "write `mqtts://` in place of `mqtt://`, or leave `tls` out";
+            mistake("tls", words, help);
+        }
+        all
+    }
+
     /// What a connection is made of, for a source or sink of this name on a machine.
     ///
     /// # Errors
@@ -209,6 +274,10 @@ impl Way<'_> {
     ) -> Result<Settings, String> {
         let mut broker = self.broker.clone();
         broker.authorities = self.authorities.map(|path| folder.join(path));
+        broker.identity = self.identity.map(|of| Identity {
+            certificate: folder.join(&of.certificate),
+            key: folder.join(&of.key),
+        });
         let own = match machine {
             Some(machine) => format!("athermal-{machine}-{name}"),
             None => format!("athermal-{name}"),
@@ -224,6 +293,11 @@ impl Way<'_> {
             last_will: None,
         })
     }
+}
+
+/// That a program speaks no TLS.
+pub fn without_tls(broker: &Broker) -> String {
+    format!("{broker} asks for TLS, and this program was built without it")
 }
 
 /// Ten seconds: a broker that is gone is noticed within twice of it.
@@ -274,9 +348,11 @@ mod tests {
     #[test]
     fn a_password_comes_from_a_file_or_the_environment_and_from_nowhere_else() {
         let folder = std::env::temp_dir();
-        let secret = |file: Option<&str>, env: Option<&str>| Secret {
-            file: file.map(PathBuf::from),
-            env: env.map(str::to_owned),
+        let secret = |file: Option<&str>, env: Option<&str>| {
+            Secret(SecretPlace {
+                file: file.map(PathBuf::from),
+                env: env.map(str::to_owned),
+            })
         };
         let name = format!("athermal-mqtt-secret-{}", std::process::id());
         std::fs::write(folder.join(&name), " word \n").unwrap();
@@ -290,5 +366,23 @@ mod tests {
         assert_eq!(secret(None, Some("PATH")).read(&folder), Ok(path));
         assert!(secret(None, None).read(&folder).is_err());
         assert!(secret(Some("a"), Some("b")).read(&folder).is_err());
+    }
+
+    #[test]
+    fn a_password_in_clear_is_refused_with_the_way_to_write_it_and_without_the_password() {
+        for text in [
+            "password = \"w0rd\"",
+            "user = \"w0rd\"\npassword = { env = \"P\" }",
+        ] {
+            let error = toml::from_str::<Login>(text).unwrap_err();
+            let error = error.message();
+            assert!(error.contains("{ file = \"…\" }"), "{error}");
+            assert!(error.contains("{ env = \"…\" }"), "{error}");
+            assert!(!error.contains("w0rd"), "{error}");
+        }
+        let login = "name = \"me\"\npassword = { env = \"P\" }";
+        assert!(toml::from_str::<Login>(login).is_ok());
+        let error = toml::from_str::<Login>("name = \"me\"\npassword = 7").unwrap_err();
+        assert!(error.message().contains("{ file = "), "{error}");
     }
 }

@@ -206,8 +206,9 @@ fn secure(broker: &Broker) -> Result<rumqttc::Transport, String> {
 
 #[cfg(not(feature = "tls"))]
 fn secure(broker: &Broker) -> Result<rumqttc::Transport, String> {
+    let words = crate::broker::without_tls(broker);
     Err(format!(
-        "{broker} asks for TLS, and this program was built without it: build it with the feature `tls`, as release archives are"
+        "{words}: build it with the feature `tls`, as release archives are"
     ))
 }
 

@@ -177,7 +177,7 @@ impl Messages {
     }
 
     /// What is wrong with it.
-    pub fn mistakes(&self, has_time: bool) -> Vec<Mistake> {
+    pub fn mistakes(&self, time: Option<&TimeForm>) -> Vec<Mistake> {
         let mut all = Vec::new();
         let mut wrong = |key: &str, why: String| all.push((vec![key.to_owned()], why));
         if let Some(why) = topic::mistake(&self.topic) {
@@ -254,11 +254,11 @@ impl Messages {
             }
         }
         match &self.time {
-            _ if is_plain && !matches!(self.time, Some(TimeForm::Arrival(_))) => {
+            _ if is_plain && !self.is_stamped_at_arrival(time) => {
                 let why = "a message that is a number has no time: write `time = \"arrival\"`, or where the `value` stands";
                 wrong("topic", why.to_owned());
             }
-            None if !has_time => {
+            None if time.is_none() => {
                 let why = "where the time stands is not known: write `time = { at = \"/…\" }`, or `time = \"arrival\"`";
                 wrong("topic", why.to_owned());
             }
@@ -362,6 +362,7 @@ impl Messages {
             }),
             values,
             instants: Box::default(),
+            flags: Box::default(),
         }
     }
 
@@ -466,10 +467,35 @@ mod tests {
                 Some("sequence"),
             ),
         ] {
-            let mistakes = messages(&text).mistakes(false);
+            let mistakes = messages(&text).mistakes(None);
             let keys: Vec<_> = mistakes.iter().map(|(at, _)| at[0].as_str()).collect();
             assert_eq!(keys, Vec::from_iter(key), "{text}: {mistakes:?}");
         }
+    }
+
+    #[test]
+    fn plain_numbers_have_the_time_of_their_arrival_where_the_source_says_so() {
+        let (arrival, there) = (
+            TimeForm::Arrival(Arrival::Arrival),
+            TimeForm::There(TimePlace {
+                at: "/t".to_owned(),
+                unit: None,
+            }),
+        );
+        let plain = "topic = \"x/{s}\"\nchannel = \"t.{s}\"\n";
+        let own = format!("{plain}time = {{ at = \"/t\" }}\n");
+        for (text, time, mistakes) in [
+            (plain, Some(&arrival), 0),
+            (plain, Some(&there), 1),
+            (plain, None, 1),
+            (&own, Some(&arrival), 1),
+        ] {
+            let found = messages(text).mistakes(time);
+            assert_eq!(found.len(), mistakes, "{text}: {found:?}");
+        }
+        let form = messages(plain).empty_form(Some(&arrival), 0, &[]);
+        let at = athermal_core::time::Instant::from_ns(7);
+        assert_eq!(form.read(b"21.5", at).given[0].stamp, at);
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub struct Form {
     pub values: Values,
     /// The channels, by their numbers, that say from when on a planned value applies: written as the time is, read in seconds.
     pub instants: Box<[usize]>,
+    /// The channels, by their numbers, of unit 1: `true` is 1 of them, and no number of any other.
+    pub flags: Box<[usize]>,
 }
 
 /// Where the time of a value stands.
@@ -90,6 +92,7 @@ pub enum Reason {
     NotThere,
     Null,
     NotANumber,
+    Truth,
     NotFinite,
     NoTime,
     WrongTime,
@@ -111,6 +114,9 @@ impl fmt::Display for Reason {
             Self::NotThere => "it has no value where one is expected",
             Self::Null => "the value is null",
             Self::NotANumber => "the value is no number",
+            Self::Truth => {
+                "true or false is no number of a channel whose unit is not 1: write `unit = \"1\"`"
+            }
             Self::NotFinite => "the value is not finite",
             Self::NoTime => "it has no time where one is expected",
             Self::WrongTime => "its time cannot be read",
@@ -184,7 +190,10 @@ impl Form {
         if let Values::Plain(channel) = self.values {
             let text = text_of(payload)?;
             into.newest = Some(arrival);
-            let value = number_of_text(text)?;
+            let value = match text.trim().parse() {
+                Ok(is) => self.truth(is, channel)?,
+                Err(_) => number_of_text(text)?,
+            };
             into.given.push(Reading {
                 channel,
                 stamp: arrival,
@@ -214,6 +223,7 @@ impl Form {
                 let stamp = self.stamp(&message, &message, arrival)?;
                 into.newest = Some(stamp);
                 self.is_good(&message, &message)?;
+                let mut left_out = Vec::new();
                 for (at, channel) in fields {
                     match self.value_at(&message, at, *channel) {
                         Ok(Some(value)) => into.given.push(Reading {
@@ -222,9 +232,15 @@ impl Form {
                             value,
                         }),
                         Ok(None) => {}
-                        Err(left_out) => into.left_out.push(left_out),
+                        Err(of) => left_out.push(of),
                     }
                 }
+                // A message need not have all of its values each time.
+                let is_value = |of: &Reading| !self.instants.contains(&of.channel);
+                if into.given.iter().any(is_value) {
+                    left_out.retain(|of| !matches!(of.reason, Reason::NotThere | Reason::Null));
+                }
+                into.left_out.extend(left_out);
             }
             Values::Each { list, .. } => {
                 let Some(items) = message.pointer(list).and_then(Value::as_array) else {
@@ -285,7 +301,11 @@ impl Form {
     /// at once.
     fn value_at(&self, part: &Value, at: &str, channel: usize) -> Result<Option<f64>, LeftOut> {
         if !self.instants.contains(&channel) {
-            return number_at(part, at).map(Some);
+            let value = match part.pointer(at) {
+                Some(Value::Bool(is)) => self.truth(*is, channel),
+                _ => number_at(part, at),
+            };
+            return value.map(Some);
         }
         let Some(found) = part.pointer(at).filter(|found| !found.is_null()) else {
             return Ok(None);
@@ -298,6 +318,14 @@ impl Form {
         let instant = ns.map(|ns| (Instant::from_ns(ns) - Instant::from_ns(0)).secs());
         let instant = instant.ok_or_else(|| LeftOut::new(Reason::WrongTime, found));
         instant.map(Some)
+    }
+
+    /// What true or false is as a value of a channel.
+    fn truth(&self, is: bool, channel: usize) -> Result<f64, LeftOut> {
+        match self.flags.contains(&channel) {
+            true => Ok(f64::from(is)),
+            false => Err(LeftOut::new(Reason::Truth, is)),
+        }
     }
 
     /// The time of a part of a message: its own, or that of the message.
@@ -382,7 +410,6 @@ fn number_at(part: &Value, at: &str) -> Result<f64, LeftOut> {
     match found {
         Value::Number(number) => finite(number.as_f64().unwrap_or(f64::NAN), found),
         Value::String(text) => number_of_text(text),
-        Value::Bool(is) => Ok(f64::from(*is)),
         Value::Null => Err(LeftOut::new(Reason::Null, at)),
         other => Err(LeftOut::new(Reason::NotANumber, other)),
     }

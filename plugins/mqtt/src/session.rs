@@ -129,7 +129,7 @@ impl<'a> Session<'a> {
                 let was_kept = subscriptions.has_asked;
                 subscriptions.connected(session_present, sender);
                 self.was_connected = true;
-                self.inlet.gaps.connected();
+                self.inlet.gaps.connected(arrival());
                 self.out.connected();
                 if was_kept && !session_present {
                     let (broker, id) =
@@ -205,7 +205,7 @@ impl<'a> Session<'a> {
             for left_out in &of.left_out {
                 self.leave_out(left_out.reason, topic, &left_out.what);
             }
-            let gap = self.inlet.gaps.seen(topic, of.newest, of.sequence);
+            let gap = self.inlet.gaps.seen(topic, of.newest, of.sequence, arrival);
             self.report(topic, gap);
             into.extend(of.given);
         }

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use athermal_core::time::Duration;
 use athermal_serve::connector::{
-    ConnectorError, Kept, OutRow, Outlet, ParameterRemark, Purpose, Sink, SinkWiring,
+    ConnectorError, Kept, OutRow, Outlet, ParameterRemark, Place, Purpose, Sink, SinkWiring,
 };
 use athermal_serve::deployment::Size;
 use athermal_serve::register_sink;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::broker::{Broker, ClientId, Login, Version, Way, keep_alive};
+use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive};
 use crate::client::{Connection, Settings};
 use crate::outgoing::{Form, Outgoing};
 use crate::publisher::{Manner, Publisher};
@@ -35,6 +35,9 @@ pub struct MqttSink {
     /// With `mqtts://`: a file of certificates that the broker's own is judged by; those of the system without.
     #[serde(default)]
     authorities: Option<PathBuf>,
+    /// With `mqtts://`: by what the broker knows this client, where it asks for that: { certificate = "…", key = "…" }, files of PEM.
+    #[serde(default)]
+    tls: Option<Identity>,
     /// The client id, if not the usual one: `athermal-`, the names of machine and sink, and `-sink`. No two clients may have one.
     #[serde(default)]
     client_id: Option<ClientId>,
@@ -77,6 +80,19 @@ const fn second() -> Duration {
     Duration::from_ns(1_000_000_000)
 }
 
+impl MqttSink {
+    fn way(&self) -> Way<'_> {
+        Way {
+            broker: &self.broker,
+            authorities: self.authorities.as_ref(),
+            identity: self.tls.as_ref(),
+            login: self.login.as_ref(),
+            client_id: self.client_id.as_ref(),
+            keep_alive: self.keep_alive,
+        }
+    }
+}
+
 impl Sink for MqttSink {
     fn purpose(&self) -> Purpose {
         match self.spool.0 {
@@ -92,7 +108,10 @@ impl Sink for MqttSink {
             let many = text.split('/').any(|of| matches!(of, "+" | "#"));
             let many =
                 many.then(|| "it is published under one topic, and not under many".to_owned());
-            let words = topic::mistake(text).or(many)?;
+            let shared = topic::is_shared(text).then(|| {
+                "a shared subscription is of a source: nothing is published under it".to_owned()
+            });
+            let words = topic::mistake(text).or(many).or(shared)?;
             Some(ParameterRemark {
                 at: vec![key.to_owned()],
                 is_mistake: true,
@@ -100,18 +119,15 @@ impl Sink for MqttSink {
                 help: "write a topic such as \"machine/drift/{output}\"".to_owned(),
             })
         };
-        topics.into_iter().filter_map(mistake).collect()
+        let mut all = self.way().remarks();
+        all.extend(topics.into_iter().filter_map(mistake));
+        all
     }
 
     fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError> {
-        let way = Way {
-            broker: &self.broker,
-            authorities: self.authorities.as_ref(),
-            login: self.login.as_ref(),
-            client_id: self.client_id.as_ref(),
-            keep_alive: self.keep_alive,
-        };
-        let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
+        let settings = self
+            .way()
+            .settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
         let settings = settings.map_err(ConnectorError::new)?;
         let alive = self.alive.clone();
         let alive = alive.unwrap_or_else(|| format!("{}/alive", settings.client_id));
@@ -140,7 +156,7 @@ impl Sink for MqttSink {
             is_version_open: self.version.is_none(),
         };
         Ok(Box::new(MqttOutlet {
-            form: Form::new(&self.topic, wiring.outputs, !is_command),
+            form: Form::new(&self.topic, wiring.outputs),
             publisher: Publisher::start(settings, manner)?,
             messages: Vec::new(),
         }))
@@ -172,15 +188,16 @@ impl Outlet for MqttOutlet {
 
 /// A broker cannot be asked which rows it has: those behind the last place that was kept are published again.
 impl Kept for MqttOutlet {
-    fn end(&mut self) -> Result<u64, ConnectorError> {
-        self.publisher.drained()
+    fn end(&mut self) -> Result<Place, ConnectorError> {
+        self.publisher.drained()?;
+        Ok(Place::default())
     }
 
-    fn rows_after(&mut self, _: u64) -> Result<Option<u64>, ConnectorError> {
+    fn rows_after(&mut self, _: Place) -> Result<Option<u64>, ConnectorError> {
         Ok(Some(0))
     }
 
-    fn cut(&mut self, _: u64, _: u64) -> Result<(), ConnectorError> {
+    fn cut(&mut self, _: Place, _: u64) -> Result<(), ConnectorError> {
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::time::{Duration, Instant};
+use athermal_core::unit::Unit;
 use athermal_serve::connector::{
     ConnectorError, Inlet, Mapping, Outflow, ParameterRemark, Seen, Source, SourceWiring, Stop,
     WiredChannel,
@@ -14,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use tokio::runtime::Builder;
 
-use crate::broker::{Broker, ClientId, Login, Version, Way, keep_alive};
+use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive};
 use crate::client::{Ended, Settings};
 use crate::gap::GapWatch;
 use crate::left_out::LeftOutCounts;
@@ -43,6 +44,9 @@ pub struct MqttSource {
     /// With `mqtts://`: a file of certificates that the broker's own is judged by; those of the system without.
     #[serde(default)]
     authorities: Option<PathBuf>,
+    /// With `mqtts://`: by what the broker knows this client, where it asks for that: { certificate = "…", key = "…" }, files of PEM.
+    #[serde(default)]
+    tls: Option<Identity>,
     /// Under which id the broker keeps the session, if not the usual one. No two clients may have one.
     #[serde(default)]
     client_id: Option<ClientId>,
@@ -105,15 +109,21 @@ pub(crate) struct Route {
 }
 
 impl MqttSource {
-    fn settings(&self, wiring: &SourceWiring) -> Result<Settings, ConnectorError> {
-        let way = Way {
+    fn way(&self) -> Way<'_> {
+        Way {
             broker: &self.broker,
             authorities: self.authorities.as_ref(),
+            identity: self.tls.as_ref(),
             login: self.login.as_ref(),
             client_id: self.client_id.as_ref(),
             keep_alive: self.keep_alive,
-        };
-        let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
+        }
+    }
+
+    fn settings(&self, wiring: &SourceWiring) -> Result<Settings, ConnectorError> {
+        let settings = self
+            .way()
+            .settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
         Ok(Settings {
             version: self.version.unwrap_or(Version::Five),
             receive_maximum: self.receive_maximum,
@@ -170,14 +180,24 @@ impl MqttSource {
                     quality: None,
                     values: Values::Plain(channel),
                     instants: Box::default(),
+                    flags: Box::default(),
                 },
             });
         }
-        let instants = channels.iter().enumerate();
-        let instants = instants.filter(|(_, of)| of.channel.is_instant);
-        let instants: Box<[usize]> = instants.map(|(nth, _)| nth).collect();
+        let those = |is: &dyn Fn(&WiredChannel) -> bool| -> Box<[usize]> {
+            let all = channels.iter().enumerate();
+            all.filter(|(_, of)| is(of)).map(|(nth, _)| nth).collect()
+        };
+        let (instants, mappings) = (those(&|of| of.channel.is_instant), self.mappings());
+        let flags = those(&|of| {
+            let mapping = of.mapped.as_ref().and_then(|of| mappings.get(of.mapping));
+            let unit = mapping.and_then(|of| of.unit.as_ref());
+            let is_as_graph = unit.is_some() || of.conversion.is_none();
+            is_as_graph && unit.unwrap_or(&of.unit).factor_to(&Unit::one()) == Some(1.0)
+        });
         for route in &mut routes {
             route.form.instants.clone_from(&instants);
+            route.form.flags.clone_from(&flags);
         }
         routes
     }
@@ -201,14 +221,14 @@ impl Source for MqttSource {
             words,
             help: help.to_owned(),
         };
-        let mut all = Vec::new();
+        let mut all = self.way().remarks();
         if let Some(why) = time.and_then(TimeForm::mistake) {
             let help = "write `time = { at = \"/timestamp\", unit = \"ms\" }`";
             all.push(remark(vec!["time".to_owned()], true, why, help));
         }
         for (nth, messages) in self.messages.iter().enumerate() {
             let own = ["messages".to_owned(), nth.to_string()];
-            for (key, why) in messages.mistakes(time.is_some()) {
+            for (key, why) in messages.mistakes(time) {
                 let help = "`athermal nodes mqtt` explains the keys of `messages`";
                 all.push(remark([&own[..], &key].concat(), true, why, help));
             }

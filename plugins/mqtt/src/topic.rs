@@ -2,6 +2,9 @@
 
 use athermal_core::document::{fill_placeholders, placeholders};
 
+/// What a shared subscription begins with: the name of its group follows, and then the topic, under which its messages come.
+const SHARED: &str = "$share/";
+
 /// A topic as a machine file has it, with the members of sets filled in. A name in braces that is left stands for one level.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
@@ -37,14 +40,16 @@ impl Topic {
                 Level::Any(before.to_owned(), after.to_owned())
             }
         };
-        let levels: Vec<_> = filled.split('/').map(level).collect();
+        let topic = behind_group(&filled);
+        let group = &filled[..filled.len() - topic.len()];
+        let levels: Vec<_> = topic.split('/').map(level).collect();
         let filters = levels.iter().map(|level| match level {
             Level::Exact(text) => text.as_str(),
             Level::Any(..) => "+",
             Level::Rest => "#",
         });
         Self {
-            filter: filters.collect::<Vec<_>>().join("/"),
+            filter: group.to_owned() + &filters.collect::<Vec<_>>().join("/"),
             levels,
         }
     }
@@ -76,10 +81,30 @@ impl Topic {
     }
 }
 
+/// The topic behind the group of a shared subscription; of any other all of it.
+fn behind_group(text: &str) -> &str {
+    let shared = text.strip_prefix(SHARED);
+    let split = shared.and_then(|rest| rest.split_once('/'));
+    split.map_or(text, |(_, topic)| topic)
+}
+
+/// Whether a topic is that of a shared subscription.
+pub fn is_shared(text: &str) -> bool {
+    text.starts_with(SHARED)
+}
+
 /// Why a topic of a machine file is none, if so.
 pub fn mistake(text: &str) -> Option<String> {
     let is_long = text.len() > 65_535;
-    let levels: Vec<_> = text.split('/').collect();
+    if let Some(rest) = text.strip_prefix(SHARED) {
+        let (group, topic) = rest.split_once('/').unwrap_or((rest, ""));
+        if group.is_empty() || topic.is_empty() || group.contains(['+', '#', '{']) {
+            let why =
+                "a shared subscription is `$share/GROUP/TOPIC`, with a plain name as its group";
+            return Some(why.to_owned());
+        }
+    }
+    let levels: Vec<_> = behind_group(text).split('/').collect();
     let wrong = |level: &&str| level.contains(['+', '#', '\0']) && !matches!(*level, "+" | "#");
     if text.is_empty() || is_long {
         return Some(format!("a topic of {} bytes is none", text.len()));
@@ -121,6 +146,19 @@ mod tests {
             ("plant/+/T", "plant/+/T", "plant//T", "plant/T"),
             ("plant/#", "plant/#", "plant/a/b", "plants"),
             ("{line}", "+", "anything", "any/thing"),
+            (
+                "$share/group/plant/{sensor}",
+                "$share/group/plant/plate1",
+                "plant/plate1",
+                "$share/group/plant/plate1",
+            ),
+            (
+                "$share/g/plant/{line}/+",
+                "$share/g/plant/+/+",
+                "plant/a/b",
+                "plant/a",
+            ),
+            ("$shared/g/a", "$shared/g/a", "$shared/g/a", "a"),
         ] {
             let of = topic(text);
             assert_eq!(of.filter(), filter);
@@ -135,8 +173,22 @@ mod tests {
 
     #[test]
     fn what_is_no_topic_is_said_to_be_none() {
-        assert_eq!(mistake("plant/+/{sensor}/#"), None);
-        for text in ["", "plant/a+", "plant/#/T", "plant/a#"] {
+        for text in ["plant/+/{sensor}/#", "$share/group/plant/+", "$share/g//a"] {
+            assert_eq!(mistake(text), None, "{text}");
+        }
+        for text in [
+            "",
+            "plant/a+",
+            "plant/#/T",
+            "plant/a#",
+            "$share/",
+            "$share/g",
+            "$share/g/",
+            "$share//a",
+            "$share/g+/a",
+            "$share/{line}/a",
+            "$share/g/a+",
+        ] {
             assert!(mistake(text).is_some(), "{text}");
         }
     }

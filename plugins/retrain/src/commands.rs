@@ -10,7 +10,6 @@ use athermal_core::time::Duration;
 use athermal_http::client::Address;
 use athermal_run::model::Model;
 use athermal_serve::journal::JournalRecording;
-use athermal_serve::service::usual_state;
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -57,8 +56,7 @@ struct Running {
 
 impl Running {
     fn of(machine: &Path, state: Option<&Path>, terminal: &Terminal) -> Result<Self, Failure> {
-        let state = state.map_or_else(|| usual_state(machine), Path::to_owned);
-        let address = Address::of(&state.to_string_lossy(), None)?;
+        let (address, state) = Address::of_machine(machine, state)?;
         let status = address.get("/v1/status")?.answered(terminal)?;
         Ok(Self {
             address,

@@ -10,12 +10,12 @@ const TOLD: &str = "does not read";
 fn run_tells_once_which_sections_of_a_machine_file_it_does_not_read() {
     let (scratch, plain, data, _) = desk("machine-file");
     let text = "extends = \"plain.toml\"\nschema = 1\n\
-                [sources.a]\n[sinks.log]\n[runtime]\nheartbeat = \"1s\"\n";
+                [sources.a]\n[sinks.log]\n[runtime]\nheartbeat = \"1s\"\n[control]\n[retrain]\n";
     let machine = scratch.file("machine.toml", text);
     let ran = athermal(&[&"run", &machine, &"--input", &data]).ended(0);
     ran.tells(&[
         "warning: ",
-        "machine.toml: `athermal run` goes by its options alone and does not read `[sources]`, `[sinks]`, `[runtime]`; `athermal serve",
+        "machine.toml: `athermal run` goes by its options alone and does not read `[sources]`, `[sinks]`, `[runtime]`, `[control]`, `[retrain]`; `athermal serve",
     ]);
     assert_eq!(ran.told.matches(TOLD).count(), 1, "{}", ran.told);
     let quiet = athermal(&[&"run", &plain, &"--input", &data]).ended(0);

@@ -79,7 +79,7 @@ fn a_hundred_swaps_from_another_thread_lose_nothing() {
             told.extend(control.pump());
             taken.extend(told.into_iter().filter_map(|notice| match notice {
                 Notice::TookOver { tick, .. } => Some(tick),
-                Notice::SentBack => None,
+                Notice::SentBack | Notice::Mirrored => None,
                 Notice::Missed { ticks } => panic!("{ticks} ticks were missed"),
             }));
         }

@@ -16,6 +16,7 @@ mod read;
 mod toml_text;
 mod tree;
 
+pub use declare::Section;
 pub use declare::declare;
 pub use declare::is_name;
 pub use declare::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};

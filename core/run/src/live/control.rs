@@ -1,5 +1,7 @@
 //! Decides the course of a replacement on the control thread: stage, shadow, commit, roll back.
 
+mod copy;
+
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -37,6 +39,8 @@ pub struct Control {
     committed: Option<Committed>,
     /// What the engine thread has sent back after a hand-over that is not yet known here.
     returned: Option<Box<LiveEngine>>,
+    /// A copy of what runs, after something was missed, until all that came before it has been taken in.
+    copy: Option<Box<LiveEngine>>,
     previous: Option<Previous>,
     event: u64,
     last: Option<Instant>,
@@ -98,6 +102,8 @@ pub enum Notice {
         /// How many.
         ticks: u64,
     },
+    /// What runs is known again after something was missed.
+    Mirrored,
 }
 
 /// The two ends of an engine of which there is a replica.
@@ -142,6 +148,7 @@ pub(super) fn pair(
         staged: None,
         committed: None,
         returned: None,
+        copy: None,
         previous: None,
         event: 0,
         last: None,
@@ -152,8 +159,8 @@ pub(super) fn pair(
 }
 
 impl Control {
-    /// Takes in the ticks that have been stepped since the last call, and returns what happened. Call it often enough that
-    /// the ring does not fill: at least once in [`LiveOptions::mirrored`] ticks.
+    /// Takes in ticks that have been stepped since the last call, [`LiveOptions::mirrored`] of them at most, and returns what happened.
+    /// Call it often enough that the ring does not fill: at least once in so many ticks.
     pub fn pump(&mut self) -> Vec<Notice> {
         self.catch_up();
         std::mem::take(&mut self.notices)
@@ -167,7 +174,10 @@ impl Control {
     /// Takes in what there is. What happened is kept for whoever pumps.
     fn catch_up(&mut self) {
         let mut notices = std::mem::take(&mut self.notices);
-        while let Ok(chunk) = self.ticks.read_chunk(self.row.len()) {
+        for _ in 0..self.options.mirrored.max(1) {
+            let Ok(chunk) = self.ticks.read_chunk(self.row.len()) else {
+                break;
+            };
             let (first, second) = chunk.as_slices();
             self.row[..first.len()].copy_from_slice(first);
             self.row[first.len()..].copy_from_slice(second);
@@ -175,6 +185,7 @@ impl Control {
             self.take_in(&mut notices);
         }
         self.take_back(&mut notices);
+        self.take_copy_at_rest(&mut notices);
         self.notices = notices;
     }
 
@@ -393,6 +404,11 @@ impl Control {
         let missed = mark.event - self.event - 1;
         if missed > 0 {
             self.lose(missed, notices);
+            self.event += missed;
+        }
+        if self.replica.is_none() {
+            self.take_back(notices);
+            self.take_copy(notices);
         }
         self.event = mark.event;
         match mark.what {
@@ -472,7 +488,9 @@ impl Control {
         else {
             return;
         };
-        // The engine that ran stands in where there is no replica of it.
+        // The engine that ran stands in where there is no replica of it; a copy of what has taken over stays.
+        let is_copy = |of: &mut LiveEngine| of.is_replica && of.revision == revision;
+        let copy = self.replica.take_if(|of| live.is_none() && is_copy(of));
         let old = self.replica.take().or_else(|| {
             returned
                 .map(|returned| *returned)
@@ -485,6 +503,7 @@ impl Control {
         });
         self.retained.keep(self.options.retain.max(plan.warm_up));
         self.running = plan;
+        self.replica = copy;
         if let (Some(mut live), Some(old)) = (live, old) {
             live.take_over(&old.engine);
             self.replica = Some(live);
@@ -498,6 +517,10 @@ impl Control {
     /// Takes what the engine thread has sent back; it is freed here.
     fn take_back(&mut self, notices: &mut Vec<Notice>) {
         while let Ok(returned) = self.returning.pop() {
+            if returned.is_replica {
+                self.copy = Some(returned);
+                continue;
+            }
             if !returned.refused {
                 self.returned = Some(returned);
                 continue;

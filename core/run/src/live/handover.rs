@@ -47,6 +47,8 @@ pub(super) struct LiveEngine {
     pub(super) event: u64,
     /// Whether it was sent back without having taken over.
     pub(super) refused: bool,
+    /// Whether it is a copy of what runs, for the control thread, which had missed something.
+    pub(super) is_replica: bool,
 }
 
 impl LiveEngine {
@@ -70,6 +72,7 @@ impl LiveEngine {
             outputs: vec![None; engine.plan().outputs.len()],
             event,
             refused: false,
+            is_replica: false,
             engine,
         })
     }

@@ -1,5 +1,6 @@
 //! Decides what the engine thread does at a tick: step, mirror, and take over a new engine when one has come.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use rtrb::{Consumer, Producer};
@@ -27,6 +28,8 @@ pub struct Stepper {
     tick: u64,
     generation: u64,
     missed: u64,
+    /// Whether something has been missed since the replica was made.
+    is_lost: bool,
 }
 
 /// What came of a tick.
@@ -63,6 +66,7 @@ impl Stepper {
             tick: 0,
             generation: 0,
             missed: 0,
+            is_lost: false,
         }
     }
 
@@ -82,6 +86,34 @@ impl Stepper {
     #[must_use]
     pub fn is_crowded(&self) -> bool {
         self.ticks.slots() < self.ticks.buffer().capacity() / 2
+    }
+
+    /// Sends the control thread a copy of what runs, where it has missed something and there is room for what follows. It takes as long
+    /// as a snapshot, and asks for memory: for a moment in which nothing is due. True where it was sent.
+    pub fn mirror_again(&mut self) -> bool {
+        let LiveEngine { engine, places, .. } = &*self.live;
+        // A copy would run nodes again that were given up here.
+        let can_copy = engine.panics().is_empty() && !self.leaving.is_full();
+        if !self.is_lost || self.is_crowded() || !can_copy {
+            return false;
+        }
+        // One that cannot be copied now is not tried again at each turn.
+        self.is_lost = false;
+        let twin = catch_unwind(AssertUnwindSafe(|| engine.twin()));
+        let Ok(Ok(engine)) = twin else {
+            return false;
+        };
+        let copy = LiveEngine {
+            revision: self.live.revision.clone(),
+            samples: self.live.samples.clone(),
+            places: places.clone(),
+            outputs: self.live.outputs.clone(),
+            event: self.event,
+            refused: false,
+            is_replica: true,
+            engine,
+        };
+        self.leaving.push(Box::new(copy)).is_ok()
     }
 
     /// The engine that runs.
@@ -165,6 +197,8 @@ impl Stepper {
         next.take_over(&self.live.engine);
         std::mem::swap(&mut self.live, next);
         self.generation += 1;
+        // Of one that was committed before something was missed the control thread has nothing.
+        self.is_lost |= self.missed > 0;
         self.release();
     }
 
@@ -214,7 +248,10 @@ impl Stepper {
                 }
                 chunk.commit_all();
             }
-            Err(_) => self.missed += 1,
+            Err(_) => {
+                self.missed += 1;
+                self.is_lost = true;
+            }
         }
     }
 }

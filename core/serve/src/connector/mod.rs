@@ -23,7 +23,7 @@ pub use kind::{
 pub(crate) use kind::{Kinds, all_sinks, all_sources};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
-pub use outlet::{Kept, OutRow, Outlet, Purpose, Sink, SinkWiring, WiredOutput};
+pub use outlet::{Kept, OutRow, Outlet, Place, Purpose, Sink, SinkWiring, WiredOutput};
 pub(crate) use source_link::{Arrival, SourceLink, link};
 pub use source_link::{Outflow, Remarks, SourceCounts};
 pub use stop::Stop;

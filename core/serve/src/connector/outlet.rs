@@ -3,6 +3,8 @@
 use std::fmt::Debug;
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
+
 use super::{ConnectorError, ParameterRemark};
 use crate::document::TimeBase;
 use crate::time::{Duration, Instant};
@@ -22,7 +24,7 @@ pub trait Sink: Debug + Send + Sync {
     /// The sink at work. Nothing is connected yet: that is for the first [`Outlet::put`].
     ///
     /// # Errors
-    /// When the parameters do not fit what is asked of it; the service does not start.
+    /// When it cannot be what is asked of it: a command keeps the service from starting, a log is tried again.
     fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError>;
 }
 
@@ -95,25 +97,39 @@ pub trait Outlet: Send {
     }
 }
 
+/// Where the rows of a sink end: a number of rows, whatever became of their bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// By what the sink knows the file in which they stand, or whatever else it has them in.
+    pub file: u64,
+    /// How many rows of it are before the place.
+    pub rows: u64,
+}
+
 /// The rows that a sink keeps.
 pub trait Kept {
     /// Where its end is, once all rows are on the disk, or wherever they go.
     ///
     /// # Errors
     /// As [`Outlet::put`], and where rows are still on their way. The place that was kept before is good until then.
-    fn end(&mut self) -> Result<u64, ConnectorError>;
+    fn end(&mut self) -> Result<Place, ConnectorError>;
 
     /// How many whole rows stand behind a place that [`end`](Self::end) gave; none where it is gone. What is left of a row is cut off.
     ///
     /// # Errors
     /// As [`Outlet::put`].
-    fn rows_after(&mut self, end: u64) -> Result<Option<u64>, ConnectorError>;
+    fn rows_after(&mut self, end: Place) -> Result<Option<u64>, ConnectorError>;
 
     /// Cuts back to so many rows behind a place.
     ///
     /// # Errors
     /// As [`Outlet::put`].
-    fn cut(&mut self, end: u64, rows: u64) -> Result<(), ConnectorError>;
+    fn cut(&mut self, end: Place, rows: u64) -> Result<(), ConnectorError>;
+
+    /// A place that [`end`](Self::end) gave is kept: it is not asked for what was before it any more.
+    fn forget(&mut self, end: Place) {
+        let _ = end;
+    }
 }
 
 /// What came of a tick, as a sink is given it.

@@ -360,6 +360,12 @@ impl SourceLink {
         Some(arrival)
     }
 
+    /// Whether what comes next is a sample, or a row of them.
+    pub(crate) fn is_giving(&self) -> bool {
+        let next = self.ring.peek();
+        matches!(next, Ok(Arrival::Sample(_) | Arrival::Row(_)))
+    }
+
     /// All that was taken stands in the journal once it has so many records.
     pub(crate) fn recorded(&self, records: u64) {
         // In this order: whoever sees the first sees the second, or a later one.

@@ -26,7 +26,7 @@ pub struct Runtime {
     pub settle: Duration,
     /// Instants no further apart are one tick, at the last of them.
     pub join: Duration,
-    /// A stamp further ahead of the newest one and the time since is refused.
+    /// A stamp further ahead of the newest one and the time since, and of a host whose clock is right, is of the future.
     pub future: Duration,
     /// At most so much is lost in a power cut.
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -33,9 +33,10 @@ impl FeedNames {
         let place = |channel| self.channels.iter().position(|of| of == channel);
         let places: Vec<_> = to.channels.iter().map(place).collect();
         let stamp = |place: &Option<usize>| place.map_or(Instant::MIN, |of| timeline.stamps()[of]);
-        let offset = |source| {
-            let place = self.sources.iter().position(|of| of == source);
-            place.and_then(|place| timeline.offsets()[place])
+        let of_source = |all: &[Option<Duration>]| {
+            let place = |source| self.sources.iter().position(|of| of == source);
+            let of = |source| place(source).and_then(|place| all[place]);
+            to.sources.iter().map(of).collect::<Vec<_>>()
         };
         let moved = |sample: &Sample| {
             let channel = places
@@ -47,9 +48,10 @@ impl FeedNames {
             })
         };
         let pending: Vec<_> = timeline.pending().filter_map(moved).collect();
-        let offsets = to.sources.iter().map(offset).collect();
+        let waiting = timeline.waiting().iter().filter_map(moved).collect();
+        let (offsets, lags) = (of_source(timeline.offsets()), of_source(timeline.lags()));
         let stamps = places.iter().map(stamp).collect();
-        Timeline::resume(timeline.last(), stamps, offsets, &pending)
+        Timeline::resume(timeline.last(), stamps, (offsets, lags), &pending, waiting)
     }
 
     /// A hash, for the header of a file.
@@ -88,6 +90,12 @@ pub struct Begin {
     pub(super) offsets: Vec<Option<i64>>,
     /// What waits: channel, stamp, and the bits of the value.
     pub(super) pending: Vec<(u32, Instant, u64)>,
+    /// The least lag of each source, in ns.
+    #[serde(default)]
+    pub(super) lags: Vec<Option<i64>>,
+    /// What is not decided on.
+    #[serde(default)]
+    pub(super) waiting: Vec<(u32, Instant, u64)>,
 }
 
 impl Begin {
@@ -111,6 +119,8 @@ impl Begin {
             stamps: Vec::new(),
             offsets: Vec::new(),
             pending: Vec::new(),
+            lags: Vec::new(),
+            waiting: Vec::new(),
         };
         begin.set(timeline);
         begin
@@ -130,26 +140,39 @@ impl Begin {
 
     /// Takes over where a timeline is.
     pub(super) fn set(&mut self, timeline: &Timeline) {
-        let sample = |of: &Sample| (of.channel, of.stamp, of.value.to_bits());
+        let ns = |of: &Option<Duration>| of.map(Duration::as_ns);
         self.last = timeline.last();
         self.stamps = timeline.stamps().to_vec();
-        let offsets = timeline.offsets().iter();
-        self.offsets = offsets.map(|of| of.map(Duration::as_ns)).collect();
-        self.pending = timeline.pending().map(sample).collect();
+        self.offsets = timeline.offsets().iter().map(ns).collect();
+        self.lags = timeline.lags().iter().map(ns).collect();
+        self.pending = timeline.pending().map(kept).collect();
+        self.waiting = timeline.waiting().iter().map(kept).collect();
     }
 
     /// What waits, and what has been stepped.
     #[must_use]
     pub fn timeline(&self) -> Timeline {
-        let offsets = self.offsets.iter().map(|of| of.map(Duration::from_ns));
+        let durations = |all: &[Option<i64>]| {
+            let all = all.iter().map(|of| of.map(Duration::from_ns));
+            let mut all: Vec<_> = all.collect();
+            all.resize(self.feed.sources.len(), None);
+            all
+        };
         let sample = |&(channel, stamp, bits): &(u32, Instant, u64)| Sample {
             channel,
             stamp,
             value: f64::from_bits(bits),
         };
         let pending: Vec<_> = self.pending.iter().map(sample).collect();
+        let waiting = self.waiting.iter().map(sample).collect();
+        let sources = (durations(&self.offsets), durations(&self.lags));
         let mut stamps = self.stamps.clone();
         stamps.resize(self.feed.channels.len(), Instant::MIN);
-        Timeline::resume(self.last, stamps, offsets.collect(), &pending)
+        Timeline::resume(self.last, stamps, sources, &pending, waiting)
     }
+}
+
+/// A sample as it is kept.
+pub(super) fn kept(of: &Sample) -> (u32, Instant, u64) {
+    (of.channel, of.stamp, of.value.to_bits())
 }

@@ -14,6 +14,8 @@ pub struct Progress {
     failures: AtomicU64,
     /// Whether the disk has failed, and it is not yet time to try again.
     failed: AtomicBool,
+    /// Whether it has failed, and nothing has been written since.
+    is_broken: AtomicBool,
     /// Whether somebody waited in vain, and nothing has been written since.
     is_stuck: AtomicBool,
     error: Mutex<Option<String>>,
@@ -58,7 +60,7 @@ impl Progress {
     /// Whether the program goes on without its journal at the moment.
     #[must_use]
     pub fn is_degraded(&self) -> bool {
-        self.failed() || self.is_stuck.load(Ordering::Acquire)
+        self.is_broken.load(Ordering::Acquire) || self.is_stuck.load(Ordering::Acquire)
     }
 
     /// Waits until all records below a number are written, but no longer than so long: what comes of them may leave then. False where
@@ -102,6 +104,7 @@ impl Progress {
     pub(super) fn set_written(&self, below: u64) {
         self.written.store(below, Ordering::Release);
         self.is_stuck.store(false, Ordering::Release);
+        self.is_broken.store(false, Ordering::Release);
     }
 
     pub(super) fn set_synced(&self, below: u64, happenings: u64) {
@@ -122,6 +125,7 @@ impl Progress {
         if let Ok(mut last) = self.error.lock() {
             *last = Some(error.to_string());
         }
+        self.is_broken.store(true, Ordering::Release);
         self.failed.store(true, Ordering::Release);
         // Last: who sees the number sees the rest.
         self.failures.fetch_add(1, Ordering::AcqRel);

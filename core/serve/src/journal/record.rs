@@ -17,6 +17,8 @@ pub enum Record {
     Twice(Sample),
     /// A sample was refused.
     Refused(Sample, Refusal),
+    /// A sample is too far ahead, and waits until it is decided on; what becomes of it has a record of its own.
+    Waits(Sample),
     /// All that waits up to an instant was stepped.
     Tick {
         /// The instant.
@@ -44,6 +46,13 @@ pub enum Record {
         source: u32,
         /// What is added to its stamps.
         offset: Duration,
+    },
+    /// A source lags behind the host by so much at the least.
+    Lag {
+        /// The source.
+        source: u32,
+        /// The host's time at an arrival less its stamp.
+        least: Duration,
     },
     /// Another graph takes over before the next tick. Its model is kept beside the journal.
     Swap {
@@ -76,6 +85,9 @@ const FREEZE: u8 = 9;
 const SHIFT: u8 = 10;
 const SWAP: u8 = 11;
 const NOTE: u8 = 12;
+// 13 is a mark of the file itself.
+const WAITS: u8 = 14;
+const LAG: u8 = 15;
 
 impl Record {
     /// The record of what became of a sample; none while that is open.
@@ -86,6 +98,7 @@ impl Record {
             Admission::Late(sample) => Self::Late(sample),
             Admission::Twice(sample) => Self::Twice(sample),
             Admission::Refused(sample, refusal) => Self::Refused(sample, refusal),
+            Admission::Waits(sample) => Self::Waits(sample),
             Admission::Held => return None,
         })
     }
@@ -101,7 +114,12 @@ impl Record {
             }
             Self::Break { afresh } => timeline.segment(*afresh),
             Self::Shift { source, offset } => timeline.shift(*source as usize, *offset),
-            _ => {}
+            Self::Lag { source, least } => timeline.lag(*source as usize, *least),
+            Self::Waits(sample) => timeline.wait(*sample),
+            Self::Late(sample) | Self::Twice(sample) | Self::Refused(sample, _) => {
+                timeline.decided(*sample);
+            }
+            Self::Freeze(_) | Self::Swap { .. } | Self::Note(_) => {}
         }
     }
 
@@ -126,6 +144,7 @@ impl Record {
             Self::Sample(of) => (sample(of), SAMPLE).1,
             Self::Late(of) => (sample(of), LATE).1,
             Self::Twice(of) => (sample(of), TWICE).1,
+            Self::Waits(of) => (sample(of), WAITS).1,
             Self::Refused(of, refusal) => {
                 sample(of);
                 let (why, by) = match refusal {
@@ -154,10 +173,14 @@ impl Record {
                 put(&[u8::from(*frozen)]);
                 FREEZE
             }
-            Self::Shift { source, offset } => {
+            Self::Shift { source, offset: by } | Self::Lag { source, least: by } => {
                 put(&source.to_le_bytes());
-                put(&offset.as_ns().to_le_bytes());
-                SHIFT
+                put(&by.as_ns().to_le_bytes());
+                if matches!(self, Self::Shift { .. }) {
+                    SHIFT
+                } else {
+                    LAG
+                }
             }
             Self::Swap { revision } => {
                 put(&revision.to_le_bytes());
@@ -177,6 +200,7 @@ impl Record {
             SAMPLE => Self::Sample(fields.sample()?),
             LATE => Self::Late(fields.sample()?),
             TWICE => Self::Twice(fields.sample()?),
+            WAITS => Self::Waits(fields.sample()?),
             REFUSED => {
                 let sample = fields.sample()?;
                 let [why] = fields.take()?;
@@ -205,6 +229,10 @@ impl Record {
             SHIFT => Self::Shift {
                 source: u32::from_le_bytes(fields.take()?),
                 offset: fields.duration()?,
+            },
+            LAG => Self::Lag {
+                source: u32::from_le_bytes(fields.take()?),
+                least: fields.duration()?,
             },
             SWAP => Self::Swap {
                 revision: fields.number()?,

@@ -1,5 +1,6 @@
 //! The end of the journal that the engine thread holds: it never waits, and goes on when nothing can be written.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -50,7 +51,9 @@ pub(super) enum Message {
     Resume(Resume),
     Stamp(u32, Instant),
     Offset(u32, Duration),
+    Lag(u32, Duration),
     Pending(Sample),
+    Waiting(Sample),
     Resumed,
 }
 
@@ -88,12 +91,27 @@ impl Recorder {
         begin: Begin,
         options: JournalOptions,
     ) -> Result<Self, JournalError> {
+        Self::start_after(|| Ok(()), folder, begin, options)
+    }
+
+    /// The same, once the folder has been prepared. Where that fails, or the file cannot be made since the disk is full or may not be
+    /// written, both are tried again as after any failure; nothing is written into a folder that holds another journal by then.
+    ///
+    /// # Errors
+    /// When there can never be such a file.
+    pub fn start_after(
+        prepare: impl FnMut() -> io::Result<()> + Send + 'static,
+        folder: &Path,
+        begin: Begin,
+        options: JournalOptions,
+    ) -> Result<Self, JournalError> {
         let (queue, messages) = RingBuffer::new(options.queue.max(16));
         let progress = Arc::new(Progress::default());
         progress.set_written(begin.event);
         progress.set_synced(begin.event, begin.happenings);
         let (event, happenings, frozen) = (begin.event, begin.happenings, begin.frozen);
-        let writer = Writer::begin(folder, begin, options, messages, Arc::clone(&progress))?;
+        let known = Arc::clone(&progress);
+        let writer = Writer::begin(Box::new(prepare), folder, begin, options, messages, known)?;
         let thread = std::thread::Builder::new()
             .name("journal".to_owned())
             .spawn(move || writer.run());
@@ -149,8 +167,10 @@ impl Recorder {
         }
         let failures = self.progress.failures();
         let (stamps, pending) = (timeline.stamps(), timeline.pending());
-        let offsets = timeline.offsets().iter().enumerate();
-        let pieces = stamps.len() + timeline.offsets().len() + pending.len() + 2;
+        let (offsets, lags) = (timeline.offsets(), timeline.lags());
+        let waiting = timeline.waiting().iter();
+        let sources = offsets.len() + lags.len();
+        let pieces = stamps.len() + sources + pending.len() + waiting.len() + 2;
         if self.queue.slots() < pieces.min(self.queue.buffer().capacity()) {
             return;
         }
@@ -162,10 +182,15 @@ impl Recorder {
         };
         let stamps = stamps.iter().enumerate();
         let stamps = stamps.map(|(nth, stamp)| Message::Stamp(nth as u32, *stamp));
+        let offsets = offsets.iter().enumerate();
         let offsets = offsets.filter_map(|(nth, of)| of.map(|of| Message::Offset(nth as u32, of)));
+        let lags = lags.iter().enumerate();
+        let lags = lags.filter_map(|(nth, of)| of.map(|of| Message::Lag(nth as u32, of)));
         let messages = std::iter::once(Message::Resume(resume))
             .chain(stamps)
             .chain(offsets)
+            .chain(lags)
+            .chain(waiting.map(|of| Message::Waiting(*of)))
             .chain(pending.map(|of| Message::Pending(*of)))
             .chain(std::iter::once(Message::Resumed));
         for message in messages {

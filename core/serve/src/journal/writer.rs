@@ -8,9 +8,12 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use rtrb::Consumer;
 
+use super::begin::kept;
+use super::log::files;
 use super::recorder::{Message, Resume};
 use super::sync::{Mark, Syncer};
 use super::{Begin, JournalError, JournalOptions, Progress, Record, segment};
+use crate::folder::may_pass;
 use crate::sequencer::Timeline;
 use crate::time::Instant;
 
@@ -20,9 +23,13 @@ const BATCH: usize = 256 << 10;
 const IDLE: Wait = Wait::from_millis(20);
 static ZEROS: [u8; 64 << 10] = [0; 64 << 10];
 
+/// What prepares the folder.
+pub(super) type Prepare = Box<dyn FnMut() -> io::Result<()> + Send>;
+
 /// Writes the journal.
-#[derive(Debug)]
 pub(super) struct Writer {
+    /// What is to be done before the first file is made, and the files that were there then; none once it is made.
+    before: Option<(Prepare, Vec<(u64, PathBuf)>)>,
     folder: PathBuf,
     options: JournalOptions,
     messages: Consumer<Message>,
@@ -53,6 +60,7 @@ struct Open {
 
 impl Writer {
     pub(super) fn begin(
+        prepare: Prepare,
         folder: &Path,
         begin: Begin,
         options: JournalOptions,
@@ -63,23 +71,26 @@ impl Writer {
             let path = path.to_owned();
             move |error| JournalError::NotWritten { path, error }
         };
-        fs::create_dir_all(folder).map_err(failed(folder))?;
-        remove_unfinished(folder).map_err(failed(folder))?;
         let path = folder.join(segment::name(begin.event));
-        let file = Open::create(folder, &begin, 0).map_err(failed(&path))?;
-        Ok(Self {
+        let mut writer = Self {
+            before: Some((prepare, files(folder).unwrap_or_default())),
             folder: folder.to_owned(),
             options,
             messages,
             progress,
             timeline: begin.timeline(),
-            file: Some(file),
+            file: None,
             begin,
             syncer: Syncer::start().map_err(failed(folder))?,
             asked: Clock::now(),
             failed: Clock::now(),
             bytes: Vec::with_capacity(2 * BATCH),
-        })
+        };
+        match writer.create() {
+            Err(error) if may_pass(&error) => writer.fail(&error),
+            created => created.map_err(failed(&path))?,
+        }
+        Ok(writer)
     }
 
     /// Writes until the other end is gone and all of it has been written.
@@ -133,10 +144,13 @@ impl Writer {
                         *of = Some(offset.as_ns());
                     }
                 }
-                Message::Pending(of) => {
-                    let sample = (of.channel, of.stamp, of.value.to_bits());
-                    self.begin.pending.push(sample);
+                Message::Lag(source, least) => {
+                    if let Some(of) = self.begin.lags.get_mut(source as usize) {
+                        *of = Some(least.as_ns());
+                    }
                 }
+                Message::Pending(of) => self.begin.pending.push(kept(&of)),
+                Message::Waiting(of) => self.begin.waiting.push(kept(&of)),
                 Message::Resumed => self.resumed(),
             }
         }
@@ -225,8 +239,19 @@ impl Writer {
 
     fn create(&mut self) -> io::Result<()> {
         static NUMBER: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(1);
+        if let Some((prepare, known)) = &mut self.before {
+            prepare()?;
+            fs::create_dir_all(&self.folder)?;
+            remove_unfinished(&self.folder)?;
+            let there = files(&self.folder).map_err(io::Error::other)?;
+            if there.iter().any(|of| !known.contains(of)) {
+                let words = "it holds a journal that was not there when the service started: start it again";
+                return Err(io::Error::other(words));
+            }
+        }
         let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         self.file = Some(Open::create(&self.folder, &self.begin, number)?);
+        self.before = None;
         Ok(())
     }
 
@@ -254,7 +279,10 @@ impl Writer {
         begin.stamps.resize(begin.feed.channels.len(), Instant::MIN);
         begin.offsets.fill(None);
         begin.offsets.resize(begin.feed.sources.len(), None);
+        begin.lags.fill(None);
+        begin.lags.resize(begin.feed.sources.len(), None);
         begin.pending.clear();
+        begin.waiting.clear();
     }
 
     /// Goes on in another file. The one before stays as it is.

@@ -24,6 +24,9 @@ pub enum Admission {
     Twice(Sample),
     /// Its stamp cannot be used.
     Refused(Sample, Refusal),
+    /// It is too far ahead, and waits in the journal until it is known what it is; [`Sequencer::pass`](super::Sequencer::pass) decides
+    /// on it then.
+    Waits(Sample),
     /// It waits until the offset of its source's clock is known; [`Sequencer::pass`](super::Sequencer::pass) decides on it then.
     Held,
 }
@@ -31,9 +34,9 @@ pub enum Admission {
 /// Why a stamp cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// It is too far ahead of the newest accepted stamp and the time since.
+    /// It is too far ahead of a trusted host, or of the newest accepted stamp and the time since.
     Future {
-        /// By how much it is ahead.
+        /// By how much it is ahead of the host where that is trusted, else of the newest stamp.
         ahead: Duration,
     },
     /// It is too far from the time of arrival, and its source's `clock` says to refuse it.
@@ -66,6 +69,20 @@ pub enum Decision<'a> {
     },
     /// What follows belongs to another segment.
     Break,
+    /// The last tick was of the future: another segment begins, whose times start again.
+    Back {
+        /// The last tick.
+        last: Instant,
+        /// A stamp of the time that it is.
+        to: Instant,
+    },
+    /// A source lags behind the host by so much at the least.
+    Lag {
+        /// The source.
+        source: usize,
+        /// The host's time at an arrival less its stamp.
+        least: Duration,
+    },
     /// The stamps of a source are shifted from now on.
     Shift {
         /// The source.
@@ -73,6 +90,17 @@ pub enum Decision<'a> {
         /// What is added to its stamps.
         offset: Duration,
     },
+}
+
+/// Whose clock is ahead of that of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Leader {
+    /// The source.
+    pub source: usize,
+    /// The channel that shows it.
+    pub channel: usize,
+    /// By how much it is ahead.
+    pub ahead: Duration,
 }
 
 /// What became of the samples of a channel so far.
@@ -84,7 +112,7 @@ pub struct Counts {
     pub late: u64,
     /// Those that came again.
     pub twice: u64,
-    /// Those from the future.
+    /// Those from the future, by what the host or the majority of sources says that it is.
     pub future: u64,
     /// Those that the rule for the source's clock refused.
     pub clock: u64,
@@ -100,7 +128,8 @@ impl Counts {
             Admission::Twice(_) => self.twice,
             Admission::Refused(_, Refusal::Future { .. }) => self.future,
             Admission::Refused(_, Refusal::Clock { .. }) => self.clock,
-            Admission::Refused(_, Refusal::NoChannel) | Admission::Held => 0,
+            Admission::Refused(_, Refusal::NoChannel) => 0,
+            Admission::Waits(_) | Admission::Held => 0,
         }
     }
 
@@ -111,7 +140,8 @@ impl Counts {
             Admission::Twice(_) => self.twice += 1,
             Admission::Refused(_, Refusal::Future { .. }) => self.future += 1,
             Admission::Refused(_, Refusal::Clock { .. }) => self.clock += 1,
-            Admission::Refused(_, Refusal::NoChannel) | Admission::Held => {}
+            Admission::Refused(_, Refusal::NoChannel) => {}
+            Admission::Waits(_) | Admission::Held => {}
         }
     }
 }

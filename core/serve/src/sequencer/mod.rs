@@ -16,28 +16,36 @@
 //! 1. Its source's clock is judged ([`ClockRule`]).
 //! 2. Not after its channel's last stamp, or waiting already: **twice**.
 //! 3. Not after the last tick: **late**, or within the channel's `late` given to the next tick.
-//! 4. Further than `future` ahead of the newest stamp and the time since: **refused**, unless its source gives stamps in order.
-//! 5. Else it is **accepted**, and waits.
+//! 4. Of the future: **refused**, or without a trusted host kept until it is known what it was (`judge.rs`): **waits**.
+//! 5. Else it is **accepted**, and waits for its tick.
+//!
+//! A stamp is of the future where it is more than `future` ahead of the trusted host and of the newest stamp and the time since. **The
+//! mirror** comes before 2 and 3: where the last tick was of the future by the trusted host, or the majority of sources has gone on
+//! before it for a minute, a segment begins, whose times start again ([`Decision::Back`]). No in-order source may be beside.
 
+mod age;
 mod decision;
 mod gate;
+mod judge;
+mod pace;
 mod rules;
 mod source_clock;
 mod timeline;
+mod turn;
 
 use std::collections::VecDeque;
 
-pub use decision::{Admission, Counts, Decision, Refusal, Sample};
+pub use decision::{Admission, Counts, Decision, Leader, Refusal, Sample};
 pub use rules::{ChannelRules, ClockRemedy, ClockRule, Rules, SourceRules};
 pub use timeline::Timeline;
 
 use crate::moment::Moment;
 use crate::time::{Duration, Instant};
+use age::Age;
 use gate::Gate;
+use judge::{Judge, Verdict};
 use source_clock::{Judged, Measured, SourceClock};
-
-/// How much faster than the host a source's clock is allowed to fall behind until its newest stamp no longer counts: 100 ppm.
-const DRIFT: i64 = 10_000;
+use turn::Turn;
 
 /// Makes ticks of samples.
 #[derive(Debug)]
@@ -45,21 +53,25 @@ pub struct Sequencer {
     rules: Rules,
     timeline: Timeline,
     gate: Gate,
+    judge: Judge,
+    ages: Vec<Age>,
     clocks: Vec<SourceClock>,
     /// The samples that wait, in the order of their arrival, with those that have gone since.
     arrivals: VecDeque<(Moment, Instant)>,
     /// All instants up to here are due.
     due_to: Instant,
-    /// The newest stamp that was accepted, and when.
-    newest: Option<(Instant, Moment)>,
     /// The last tick that samples made, and when it was cut.
     measured: Option<(Instant, Moment)>,
+    /// The source of its last sample.
+    source: usize,
     /// When the last tick or beat was cut.
     cut: Moment,
     /// The latest moment that a caller named.
     now: Moment,
-    /// The host's time at the start of the monotonic clock.
-    epoch: Option<Instant>,
+    /// What is being decided of the samples that wait for that.
+    turn: Option<Turn>,
+    /// The source whose least lag is to be kept anew.
+    lagged: Option<usize>,
     /// The source whose held samples are being released, and whether a segment ends before.
     release: Option<(usize, bool)>,
     counts: Vec<Counts>,
@@ -90,16 +102,25 @@ impl Sequencer {
         let last = timeline.last();
         let mut arrivals = VecDeque::with_capacity(rules.most);
         arrivals.extend(timeline.pending().map(|of| (now, of.stamp)));
+        let stamps = timeline.stamps().iter().zip(&rules.channels);
+        let newest = stamps.max_by_key(|(stamp, _)| **stamp);
+        let source = newest.map_or(0, |(_, of)| of.source);
+        let mut judge = Judge::new(&rules);
+        let waiting = timeline.waiting().iter();
+        waiting.for_each(|of| judge.waits(of.channel as usize));
         Self {
+            judge,
+            ages: Age::all(&timeline),
             clocks: rules.sources.iter().enumerate().map(clock).collect(),
             gate: Gate::new(&rules, now),
             arrivals,
             due_to: Instant::MIN,
-            newest: None,
             measured: (last > Instant::MIN).then_some((last, now)),
+            source,
             cut: now,
             now,
-            epoch: None,
+            turn: None,
+            lagged: None,
             release: None,
             counts: vec![Counts::default(); rules.channels.len()],
             hurried: 0,
@@ -108,10 +129,22 @@ impl Sequencer {
         }
     }
 
-    /// Gives the host's time, read once, where it is known to be right. Until then clocks are not judged, and the first stamp may be
-    /// any. From the first stamp on, it is the newest one that others are compared with: a source may be slow.
+    /// Gives the host's time, read once, where it is known to be right. Until then clocks are not judged by it.
     pub fn synchronise(&mut self, host: Instant, now: Moment) {
-        self.epoch = Some(host - (now - Moment::START));
+        self.set_host(host, now, true);
+        self.turn = self.turn.or(self.again());
+    }
+
+    /// Gives the host's time as it is, right or not: where sources do not agree it decides between them, and lags are kept by it.
+    pub fn guess(&mut self, host: Instant, now: Moment) {
+        self.set_host(host, now, false);
+    }
+
+    fn set_host(&mut self, host: Instant, now: Moment, is_trusted: bool) {
+        self.judge.set_host(host, now, is_trusted);
+        for (age, kept) in self.ages.iter_mut().zip(self.timeline.lags()) {
+            age.set_host(*kept, host, now);
+        }
     }
 
     /// A source is connected.
@@ -121,7 +154,12 @@ impl Sequencer {
 
     /// A source has lost its connection.
     pub fn away(&mut self, source: usize, now: Moment) {
-        self.gate.away(source, now);
+        let last = self.timeline.last();
+        let channels = &self.rules.channels;
+        let mut pending = self.timeline.pending();
+        let is_amid =
+            pending.any(|of| of.stamp > last && channels[of.channel as usize].source == source);
+        self.gate.away(source, is_amid, now);
     }
 
     /// A source has come to its end.
@@ -134,18 +172,41 @@ impl Sequencer {
         let Some(channel) = self.rules.channels.get(sample.channel as usize) else {
             return Admission::Refused(sample, Refusal::NoChannel);
         };
+        let source = channel.source;
         self.now = self.now.max(now);
-        let arrival = self.host_time(now);
-        let judged = match self.clocks.get_mut(channel.source) {
+        self.gate.gave(source, now);
+        let arrival = self.judge.trusted(now);
+        let judged = match self.clocks.get_mut(source) {
             Some(clock) => clock.judge(sample, arrival, now),
             None => Judged::Stamp(sample.stamp),
         };
+        if let Judged::Stamp(stamp) = judged {
+            self.look(Sample { stamp, ..sample }, source, now);
+        }
         let admission = match judged {
             Judged::Held => Admission::Held,
             Judged::Refused(refusal) => Admission::Refused(sample, refusal),
-            Judged::Stamp(stamp) => self.admit(Sample { stamp, ..sample }, now),
+            Judged::Stamp(stamp) => self.admit(Sample { stamp, ..sample }, now, false),
         };
         self.count(sample, admission)
+    }
+
+    /// Looks at the stamp of a sample that came, whatever becomes of it.
+    fn look(&mut self, sample: Sample, source: usize, now: Moment) {
+        let is_known_anew = self.judge.look(sample.channel as usize, sample.stamp, now);
+        let Some(age) = self.ages.get_mut(source) else {
+            return;
+        };
+        let lags = is_known_anew && age.lags(sample.stamp, now);
+        let lasting = if lags {
+            self.judge.lasting(source, now)
+        } else {
+            None
+        };
+        age.look(sample.stamp, now, lasting);
+        if is_known_anew && age.is_news(self.timeline.lags()[source], &self.judge, now) {
+            self.lagged = Some(source);
+        }
     }
 
     /// Whether samples of a source are held until the offset of its clock is known.
@@ -159,14 +220,16 @@ impl Sequencer {
     pub fn segment(&mut self) {
         self.timeline.segment(true);
         self.arrivals.clear();
-        (self.due_to, self.newest, self.measured) = (Instant::MIN, None, None);
+        (self.due_to, self.measured) = (Instant::MIN, None);
+        self.judge.begin();
     }
 
     /// When something is to be decided, if nothing arrives before.
     #[must_use]
     pub fn due(&self) -> Option<Moment> {
         let held = self.clocks.iter().filter_map(SourceClock::due).min();
-        let first = if self.release.is_some() || self.is_full() || self.is_behind() {
+        let is_deciding = self.release.is_some() || self.turn.is_some() || self.lagged.is_some();
+        let first = if is_deciding || self.is_full() || self.is_behind() {
             Some(self.now)
         } else if held.is_some() {
             None
@@ -186,10 +249,22 @@ impl Sequencer {
                 return Some(self.end_segment(now));
             }
             if let Some(sample) = self.clocks.get_mut(source).and_then(SourceClock::release) {
-                let admission = self.admit(sample, now);
+                let admission = self.admit(sample, now, false);
                 return Some(Decision::Sample(self.count(sample, admission)));
             }
             self.release = None;
+        }
+        if let Some(source) = self.lagged.take()
+            && let Some(least) = self.ages[source].least(&self.judge, now)
+        {
+            self.timeline.lag(source, least);
+            return Some(Decision::Lag { source, least });
+        }
+        if let Some(Turn::Back(to)) = self.turn {
+            return self.go_back(to, now);
+        }
+        if let Some(admission) = self.take_turn(now) {
+            return Some(Decision::Sample(admission));
         }
         let mut clocks = self.clocks.iter();
         let held = clocks.position(|clock| clock.due().is_some_and(|due| due <= now));
@@ -233,7 +308,45 @@ impl Sequencer {
     /// The newest stamp that was accepted and the time since: what time it is at the sources. None before the first.
     #[must_use]
     pub fn newest(&self, now: Moment) -> Option<Instant> {
-        self.newest.map(|(newest, when)| newest + (now - when))
+        self.judge.newest(now)
+    }
+
+    /// How old the last tick or beat is as a command: by how much more its source lags behind the host than it did at the least.
+    #[must_use]
+    pub fn age(&self, now: Moment) -> Duration {
+        let age = self.ages.get(self.source);
+        age.map_or(Duration::ZERO, |age| age.of(self.timeline.last(), now))
+    }
+
+    /// Whether a newer tick is due than the last one, so that it is no command. Of recordings and simulations each is one.
+    #[must_use]
+    pub fn is_superseded(&self) -> bool {
+        !self.rules.is_in_order(self.source) && self.is_behind()
+    }
+
+    /// Whose clock is ahead of that of a sample that came late or is of the future, where it is one.
+    #[must_use]
+    pub fn leader(&self, admission: Admission, now: Moment) -> Option<Leader> {
+        match admission {
+            Admission::Late(sample) => {
+                let leader = self.judge.leader(sample.channel as usize, now);
+                leader.map(|(source, channel, ahead)| Leader {
+                    source,
+                    channel,
+                    ahead,
+                })
+            }
+            Admission::Refused(sample, Refusal::Future { ahead }) => {
+                let channel = sample.channel as usize;
+                let source = self.rules.channels.get(channel)?.source;
+                Some(Leader {
+                    source,
+                    channel,
+                    ahead,
+                })
+            }
+            _ => None,
+        }
     }
 
     /// What waits, and where the log is.
@@ -257,11 +370,13 @@ impl Sequencer {
     /// Whether the host's time has been given.
     #[must_use]
     pub fn is_synchronised(&self) -> bool {
-        self.epoch.is_some()
+        self.judge.is_trusted()
     }
 
-    fn host_time(&self, now: Moment) -> Option<Instant> {
-        self.epoch.map(|epoch| epoch + (now - Moment::START))
+    /// Whether so many samples wait that what can be held back is better held back.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        self.timeline.len() >= self.rules.most / 2
     }
 
     fn count(&mut self, sample: Sample, admission: Admission) -> Admission {
@@ -271,25 +386,43 @@ impl Sequencer {
         admission
     }
 
-    fn admit(&mut self, sample: Sample, now: Moment) -> Admission {
+    /// Decides on a sample, by the rules 2 to 5. `has_waited`: it comes from those that wait.
+    fn admit(&mut self, sample: Sample, now: Moment, has_waited: bool) -> Admission {
         let channel = sample.channel as usize;
         let last = self.timeline.last();
-        if sample.stamp <= self.timeline.stamps()[channel] {
-            return Admission::Twice(sample);
-        }
+        let is_twice = sample.stamp <= self.timeline.stamps()[channel];
         let is_late = sample.stamp <= last;
         let late = self.rules.channels[channel].late;
         let is_too_late = || late.is_zero() || last - sample.stamp > late;
-        if is_late && (is_too_late() || self.timeline.len() >= self.rules.most) {
+        let is_full = self.timeline.len() >= self.rules.most;
+        let can_turn = self.turn.is_none() && !self.is_waiting_full();
+        let is_past = is_late && is_too_late() && can_turn;
+        if is_past && self.judge.shows_future((channel, sample.stamp), last, now) {
+            self.turn = Some(Turn::Back(sample.stamp));
+            return self.wait(sample);
+        }
+        if is_twice {
+            return Admission::Twice(sample);
+        }
+        if is_late && (is_too_late() || is_full) {
             return Admission::Late(sample);
         }
-        let source = self.rules.sources.get(self.rules.channels[channel].source);
-        let is_in_order = source.is_some_and(|source| source.is_in_order);
-        let known = || self.newest(now).or_else(|| self.host_time(now));
-        if !is_in_order && let Some(newest) = known() {
-            let ahead = sample.stamp - newest;
-            if ahead > self.rules.future {
-                return Admission::Refused(sample, Refusal::Future { ahead });
+        if let Some(ahead) = self.judge.ahead(channel, sample.stamp, now) {
+            match self.weigh(sample, now) {
+                Verdict::Open if has_waited || !self.is_waiting_full() => return self.wait(sample),
+                Verdict::Gap => {
+                    self.judge.set(sample.stamp, now);
+                    self.turn = self.again();
+                }
+                Verdict::Wrong | Verdict::Open => {
+                    let source = self.rules.channels[channel].source;
+                    let waiting = self.timeline.waiting().len();
+                    let is_alone = self.turn.is_some() || waiting == 0;
+                    self.turn = self
+                        .turn
+                        .or((!is_alone).then_some(Turn::WrongClock(source, ahead, waiting)));
+                    return Admission::Refused(sample, Refusal::Future { ahead });
+                }
             }
         }
         if !self.timeline.accept(sample) {
@@ -298,15 +431,21 @@ impl Sequencer {
         if !is_late {
             self.arrivals.push_back((now, sample.stamp));
         }
-        // A backlog does not move what is the newest; a clock that is slow by no more than its drift does.
-        let is_newest = self.newest.is_none_or(|(newest, when)| {
-            let since = now - when;
-            sample.stamp >= newest + since - Duration::from_ns(since.as_ns() / DRIFT)
-        });
-        if is_newest {
-            self.newest = Some((sample.stamp, now));
+        self.judge.accepted(channel, sample.stamp, now);
+        if !has_waited && self.turn.is_none() && self.judge.has_waiting(channel) {
+            let waiting = self.timeline.waiting().len();
+            self.turn = Some(Turn::WrongStamps(sample, waiting));
         }
         Admission::Accepted(sample)
+    }
+
+    fn weigh(&mut self, sample: Sample, now: Moment) -> Verdict {
+        if self.judge.is_trusted() {
+            return Verdict::Wrong;
+        }
+        let is_full = self.is_waiting_full();
+        let of = (sample.channel as usize, sample.stamp);
+        self.judge.weigh(of, now, is_full)
     }
 
     /// An instant is held until its last sample has come, whatever the order.
@@ -346,7 +485,9 @@ impl Sequencer {
     }
 
     fn cut(&mut self, now: Moment) -> Option<Decision<'_>> {
-        let (_, at) = self.timeline.next(self.rules.join)?;
+        let (_, newest) = self.timeline.next(self.rules.join)?;
+        let at = newest.stamp;
+        self.source = self.rules.channels[newest.channel as usize].source;
         self.measured = Some((at, now));
         self.cut = now;
         let row = self.timeline.tick(at);

@@ -11,7 +11,7 @@ pub struct Rules {
     pub join: Duration,
     /// After a start or a reconnect no tick is cut until every source has been connected so long, or is away for good.
     pub settle: Duration,
-    /// A stamp further ahead of the newest accepted one and the time since is refused.
+    /// A stamp further ahead of the newest accepted one and the time since, and of a trusted host, is of the future.
     pub future: Duration,
     /// How long nothing may be measured until time passes without samples; for ever without.
     pub heartbeat: Option<Duration>,
@@ -36,6 +36,13 @@ impl Default for Rules {
             sources: Vec::new(),
             channels: Vec::new(),
         }
+    }
+}
+
+impl Rules {
+    /// Whether the stamps of a source come in order.
+    pub(super) fn is_in_order(&self, source: usize) -> bool {
+        self.sources.get(source).is_some_and(|of| of.is_in_order)
     }
 }
 

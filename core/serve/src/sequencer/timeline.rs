@@ -6,6 +6,9 @@ use super::Sample;
 use crate::channel::ABSENT;
 use crate::time::{Duration, Instant};
 
+/// One in so many of the samples that may wait for their tick may wait to be decided on.
+pub(super) const WAITING: usize = 4;
+
 /// Accepted samples on their way into ticks. It has no clock and no thresholds: whatever is decided is applied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
@@ -16,6 +19,10 @@ pub struct Timeline {
     last: Instant,
     /// What is added to the stamps of each source.
     offsets: Vec<Option<Duration>>,
+    /// The least lag of each source behind the host.
+    lags: Vec<Option<Duration>>,
+    /// What is too far ahead and not decided on, in the order of arrival.
+    waiting: VecDeque<Sample>,
     row: Vec<f64>,
 }
 
@@ -28,17 +35,20 @@ impl Timeline {
             stamps: vec![Instant::MIN; channels],
             last: Instant::MIN,
             offsets: vec![None; sources],
+            lags: vec![None; sources],
+            waiting: VecDeque::new(),
             row: vec![ABSENT; channels],
         }
     }
 
-    /// One that goes on from a place in a log: the last tick, the newest stamps of channels and the offsets of sources.
+    /// One that goes on from a place in a log: the last tick, the newest stamps of channels, the offsets and least lags of sources.
     #[must_use]
     pub fn resume(
         last: Instant,
         stamps: Vec<Instant>,
-        offsets: Vec<Option<Duration>>,
+        (offsets, lags): (Vec<Option<Duration>>, Vec<Option<Duration>>),
         pending: &[Sample],
+        waiting: Vec<Sample>,
     ) -> Self {
         let mut timeline = Self {
             pending: VecDeque::with_capacity(pending.len()),
@@ -46,6 +56,8 @@ impl Timeline {
             stamps,
             last,
             offsets,
+            lags,
+            waiting: waiting.into(),
         };
         for &sample in pending {
             timeline.accept(sample);
@@ -58,6 +70,7 @@ impl Timeline {
         if sample.channel as usize >= self.stamps.len() {
             return false;
         }
+        self.decided(sample);
         let key = |of: &Sample| (of.stamp, of.channel);
         match self.pending.back() {
             Some(newest) if key(newest) >= key(&sample) => {
@@ -69,6 +82,20 @@ impl Timeline {
             _ => self.pending.push_back(sample),
         }
         true
+    }
+
+    /// Keeps a sample until it is decided on.
+    pub fn wait(&mut self, sample: Sample) {
+        self.waiting.push_back(sample);
+    }
+
+    /// A sample is decided on: it no longer waits for that.
+    pub fn decided(&mut self, sample: Sample) {
+        let key = |of: &Sample| (of.stamp, of.channel);
+        let mut waiting = self.waiting.iter();
+        if let Some(place) = waiting.position(|of| key(of) == key(&sample)) {
+            self.waiting.remove(place);
+        }
     }
 
     /// Takes all that waits up to an instant: a value for each channel, the newest where there are several.
@@ -100,6 +127,13 @@ impl Timeline {
         }
     }
 
+    /// A source lags behind the host by so much at the least.
+    pub fn lag(&mut self, source: usize, least: Duration) {
+        if let Some(of) = self.lags.get_mut(source) {
+            *of = Some(least);
+        }
+    }
+
     /// Nothing is stepped up to an instant any more: what waits there is dropped.
     pub fn not_before(&mut self, last: Instant) {
         self.pending.retain(|of| of.stamp > last);
@@ -124,17 +158,35 @@ impl Timeline {
         &self.offsets
     }
 
+    /// The least lag of each source behind the host, where that is known.
+    #[must_use]
+    pub fn lags(&self) -> &[Option<Duration>] {
+        &self.lags
+    }
+
+    /// The samples that are not decided on, in the order of their arrival.
+    #[must_use]
+    pub fn waiting(&self) -> &VecDeque<Sample> {
+        &self.waiting
+    }
+
+    /// The next sample that is not decided on, which no longer waits for that.
+    pub(super) fn next_waiting(&mut self) -> Option<Sample> {
+        self.waiting.pop_front()
+    }
+
     /// The samples that wait, by stamp, then channel.
     pub fn pending(&self) -> impl ExactSizeIterator<Item = &Sample> {
         self.pending.iter()
     }
 
-    /// The instant of the next tick where instants within `join` are one; none where nothing waits that is after the last one.
-    pub(super) fn next(&self, join: Duration) -> Option<(Instant, Instant)> {
+    /// The first instant of the next tick and its last sample, where instants within `join` are one; none where nothing waits that is
+    /// after the last one.
+    pub(super) fn next(&self, join: Duration) -> Option<(Instant, Sample)> {
         let first = self.pending.partition_point(|of| of.stamp <= self.last);
         let first = self.pending.get(first)?.stamp;
         let end = self.pending.partition_point(|of| of.stamp <= first + join);
-        Some((first, self.pending[end - 1].stamp))
+        Some((first, self.pending[end - 1]))
     }
 
     /// Makes room for so many channels, sources and samples. What waits for channels beyond is dropped.
@@ -142,6 +194,9 @@ impl Timeline {
         self.stamps.resize(channels, Instant::MIN);
         self.row.resize(channels, ABSENT);
         self.offsets.resize(sources, None);
+        self.lags.resize(sources, None);
+        self.waiting.retain(|of| (of.channel as usize) < channels);
+        self.waiting.reserve(room / WAITING);
         self.pending.retain(|of| (of.channel as usize) < channels);
         self.pending
             .reserve(room.saturating_sub(self.pending.len()));

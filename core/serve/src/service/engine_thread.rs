@@ -18,7 +18,7 @@ use crate::connector::{Arrival, SourceLink};
 use crate::diagnostic::panic_text;
 use crate::engine::EngineError;
 use crate::moment::{Moment, MonotonicClock};
-use crate::sequencer::Admission;
+use crate::sequencer::{Admission, Leader};
 use crate::time::{Duration, Instant};
 use crate::worker::{Output, Worker};
 
@@ -42,6 +42,15 @@ pub(super) enum Order {
     Stop,
 }
 
+/// What the engine thread has to report.
+#[derive(Debug)]
+pub(super) enum Remark {
+    /// A sample was not accepted, for the so many-th time; whose clock is ahead of it.
+    NotAccepted(Admission, u64, Option<Leader>),
+    /// The last tick was of the future: it is the time of a stamp.
+    WentBack(Instant, Instant),
+}
+
 /// All that the engine thread has.
 pub(super) struct EngineThread {
     pub(super) worker: Worker,
@@ -49,8 +58,7 @@ pub(super) struct EngineThread {
     pub(super) sources: Vec<SourceLink>,
     pub(super) sinks: Sinks,
     pub(super) orders: Consumer<Order>,
-    /// Samples that were not accepted, some of them: for whoever reports.
-    pub(super) remarks: Producer<(Admission, u64)>,
+    pub(super) remarks: Producer<Remark>,
     pub(super) shared: Arc<Shared>,
     pub(super) events: Sender<ServiceEvent>,
 }
@@ -122,9 +130,10 @@ impl EngineThread {
     fn work(&mut self) -> Result<(), EngineError> {
         let mut left = self.sources.len();
         let (mut published, mut sound) = (Moment::START, self.clock.now());
+        let mut is_stopped = false;
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
-            let mut is_stopped = false;
+            let was_stopped = is_stopped;
             while let Ok(order) = self.orders.pop() {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
@@ -139,18 +148,29 @@ impl EngineThread {
             let now = self.clock.now();
             let is_ahead = self.worker.is_crowded();
             sound = if is_ahead { sound } else { now };
-            let is_crowded =
-                self.worker.recorder().is_crowded() || is_ahead && now - sound < PATIENCE;
+            let is_patient = now - sound < PATIENCE;
+            let is_crowded = self.worker.recorder().is_crowded() || is_ahead && is_patient;
+            let is_full = self.worker.sequencer().is_crowded();
             for nth in 0..self.sources.len() {
-                if !is_crowded || !self.sources[nth].waits {
+                let source = &self.sources[nth];
+                let is_held = was_stopped || is_full && source.is_giving();
+                if !is_held && (!is_crowded || !source.waits) {
                     has_more |= self.take(nth, &mut left)?;
                 }
             }
             let now = self.clock.now();
             let sinks = &mut self.sinks;
-            self.worker.pass(now, |output| sinks.put(output))?;
-            if is_stopped || left == 0 {
-                return self.worker.finish(now, |output| sinks.put(output));
+            // What the replica cannot take in is stepped later: a backlog of any length.
+            let goes_on = |worker: &Worker| !is_patient || !worker.is_crowded();
+            self.worker
+                .pass_while(now, goes_on, |output| sinks.put(output))?;
+            if let Some((last, to)) = self.worker.went_back() {
+                let _ = self.remarks.push(Remark::WentBack(last, to));
+            }
+            let is_over = is_stopped || left == 0;
+            let put = |output: &Output<'_>| sinks.put(output);
+            if is_over && self.worker.finish_while(now, goes_on, put)? {
+                return Ok(());
             }
             if now - published >= Shared::EVERY {
                 published = now;
@@ -159,12 +179,17 @@ impl EngineThread {
             if has_more {
                 continue;
             }
-            let due = self.worker.due();
-            let longest = if is_crowded { HOLD } else { NAP };
+            // What is due waits for the replica, and sources for what is due.
+            let is_held = is_crowded || self.worker.is_crowded();
+            let longest = if is_held || is_full { HOLD } else { NAP };
+            let due = self.worker.due().filter(|_| !is_held);
             let nap = due.map_or(longest, |due| {
                 let ns = (due - self.clock.now()).as_ns();
                 Wait::from_nanos(ns.max(0) as u64).min(longest)
             });
+            if !nap.is_zero() && !is_held {
+                self.worker.mirror_again();
+            }
             if !nap.is_zero() {
                 std::thread::park_timeout(nap);
             }
@@ -187,7 +212,10 @@ impl EngineThread {
                 Arrival::Sample(sample) => {
                     together = together.saturating_sub(1);
                     let admission = self.worker.arrive(sample, now);
-                    if !matches!(admission, Admission::Accepted(_) | Admission::Held) {
+                    if !matches!(
+                        admission,
+                        Admission::Accepted(_) | Admission::Waits(_) | Admission::Held
+                    ) {
                         self.remark(sample.channel as usize, admission);
                     }
                 }
@@ -221,7 +249,9 @@ impl EngineThread {
             .checked_ilog10()
             .is_some_and(|of| 10_u64.pow(of) == count)
         {
-            let _ = self.remarks.push((admission, count));
+            let leader = self.worker.sequencer().leader(admission, self.clock.now());
+            let remark = Remark::NotAccepted(admission, count, leader);
+            let _ = self.remarks.push(remark);
         }
     }
 
@@ -233,6 +263,7 @@ impl EngineThread {
             let Snapshot {
                 counts,
                 hurried,
+                waiting,
                 last,
                 newest: known,
                 stamps,
@@ -242,6 +273,7 @@ impl EngineThread {
             counts.clone_from_slice(sequencer.counts());
             stamps.copy_from_slice(sequencer.timeline().stamps());
             *hurried = sequencer.hurried();
+            *waiting = sequencer.timeline().waiting().len();
             *last = sequencer.timeline().last();
             *known = newest;
             *is_synchronised = sequencer.is_synchronised();

@@ -6,7 +6,8 @@ use crate::checkpoint::CheckpointError;
 use crate::connector::ConnectorError;
 use crate::engine::NodeCarry;
 use crate::journal::JournalStatus;
-use crate::sequencer::Admission;
+use crate::sequencer::{Admission, Leader};
+use crate::time::Instant;
 
 /// What happened.
 #[derive(Debug)]
@@ -50,6 +51,16 @@ pub enum ServiceEvent {
         admission: Admission,
         /// How many so far.
         count: u64,
+        /// Whose clock is ahead of it, where that is why.
+        leader: Option<(String, Leader)>,
+    },
+    /// The last tick was of the future by the host's clock, or by what most sources have shown for a minute: a segment has begun, whose
+    /// times start again.
+    WentBack {
+        /// The last tick.
+        last: Instant,
+        /// A stamp of the time that it is.
+        to: Instant,
     },
     /// Something happened at a hand-over.
     Swap(Notice),
@@ -73,7 +84,7 @@ pub enum ServiceEvent {
     NotTakenOver(String),
     /// Whether the host's clock is known to be right, where that matters to a source: at the start, and once it is.
     HostClock {
-        /// Until it is, clocks of sources are not judged, and the first stamp may be any.
+        /// Until it is, clocks of sources are not judged by it: what is of the future is known from sources alone.
         is_synchronised: bool,
     },
     /// A checkpoint was not written; it is tried again.

@@ -1,7 +1,7 @@
 //! Rows on their way to a sink: a bounded ring of words, so that the engine thread hands them over without allocating or waiting.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -21,8 +21,12 @@ pub struct SinkCounts {
     pub dropped: AtomicU64,
     /// Commands that were not put out because they were too old.
     pub behind: AtomicU64,
+    /// Commands that were not put out because a newer one was due at the same time.
+    pub superseded: AtomicU64,
     /// How often it failed.
     pub failures: AtomicU64,
+    /// Why it cannot put out at the moment.
+    pub(super) error: Mutex<Option<String>>,
     /// Rows that were handed to its thread, and those that the thread took.
     sent: AtomicU64,
     taken: AtomicU64,
@@ -36,6 +40,12 @@ pub struct SinkCounts {
 }
 
 impl SinkCounts {
+    /// Why it cannot put out at the moment; none where it can.
+    #[must_use]
+    pub fn error(&self) -> Option<String> {
+        self.error.lock().map_or(None, |error| error.clone())
+    }
+
     /// How many rows wait.
     #[must_use]
     pub fn waiting(&self) -> u64 {
@@ -115,6 +125,10 @@ impl FrameSender {
     /// Hands a row over. Where there is no room a command is dropped and counted. A log has it from the journal then, with all that
     /// follow until there is room for many: making them again is worth it.
     pub(super) fn send(&mut self, output: &Output<'_>, revision: u64) {
+        if output.is_superseded && !self.is_log {
+            self.counts.superseded.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
         let width = HEAD + self.places.len();
         let least = if self.is_missing {
             self.ring.buffer().capacity() / 2

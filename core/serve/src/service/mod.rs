@@ -53,7 +53,7 @@ use crate::companion::Beside;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
-use crate::folder::{StateFolder, StatePaths};
+use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
 use crate::journal::{
     FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
@@ -61,10 +61,10 @@ use crate::journal::{
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
-use crate::sequencer::{Admission, Sequencer};
+use crate::sequencer::{Leader, Sequencer};
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
-use engine_thread::{EngineThread, Order};
+use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
 use host_clock::HostClock;
 use observer::Observers;
@@ -121,7 +121,7 @@ pub struct Service {
     keeper: Keeper,
     engine: JoinHandle<Worker>,
     orders: Producer<Order>,
-    remarks: Consumer<(Admission, u64)>,
+    remarks: Consumer<Remark>,
     /// What sources left out, by their names.
     heard: Receiver<(String, String)>,
     shared: Arc<Shared>,
@@ -138,6 +138,8 @@ pub struct Service {
     events: Receiver<ServiceEvent>,
     own: Vec<ServiceEvent>,
     folder: StateFolder,
+    /// The model that was given, where it could not be kept yet.
+    unkept: Option<Model>,
     keep: Keep,
     retired: Clock,
     retiring: Aside<()>,
@@ -182,9 +184,14 @@ impl Service {
             companions,
         } = deployment;
         let folder = StateFolder::open(&options.state)?;
-        if let Some(revision) = model.revision() {
-            folder.keep_model(model, &revision)?;
-        }
+        // A disk that cannot be written is a state, and no reason to do without corrections.
+        let unkept = match model.revision().map(|of| folder.keep_model(model, &of)) {
+            Some(Err(FolderError::NotWritten { error, .. })) if may_pass(&error) => {
+                Some(model.clone())
+            }
+            Some(kept) => kept.map(|()| None)?,
+            None => None,
+        };
         let units = outputs(&model.plan);
         let open = |declared: crate::deployment::DeclaredSink| {
             let wiring = sinks::wiring(&declared, &units, &model.plan);
@@ -202,7 +209,8 @@ impl Service {
             sync: wait(runtime.sync),
             ..JournalOptions::default()
         };
-        let recorder = Recorder::start(&folder.journal(), recovered.begin(), journal)?;
+        let (prepare, begin) = (folder.preparation(), recovered.begin());
+        let recorder = Recorder::start_after(prepare, &folder.journal(), begin, journal)?;
         let progress = Arc::clone(recorder.progress());
         let clock = MonotonicClock::start();
         let feed = fed(recovered.engine.plan(), &given);
@@ -210,6 +218,9 @@ impl Service {
         let stamps = recovered.timeline.stamps().to_vec();
         let mut sequencer = Sequencer::resume(rules, recovered.timeline, clock.now());
         let mut host = HostClock::new(options.host_time, clock, &sources);
+        if let Some(guess) = host::now() {
+            sequencer.guess(guess, clock.now());
+        }
         if let Some((time, now)) = host.look(true) {
             sequencer.synchronise(time, now);
         }
@@ -305,6 +316,7 @@ impl Service {
             events,
             own: Vec::new(),
             folder,
+            unkept,
             keep: keep(&runtime),
             retired: Clock::now(),
             retiring: Aside::default(),
@@ -361,8 +373,19 @@ impl Service {
         while let Ok(work) = self.asked.try_recv() {
             work(self);
         }
-        while let Ok((admission, count)) = self.remarks.pop() {
-            events.push(ServiceEvent::NotAccepted { admission, count });
+        while let Ok(remark) = self.remarks.pop() {
+            events.push(match remark {
+                Remark::NotAccepted(admission, count, leader) => {
+                    let name = |of: &Leader| Some(self.sources.get(of.source)?.0.clone());
+                    let leader = leader.and_then(|of| Some((name(&of)?, of)));
+                    ServiceEvent::NotAccepted {
+                        admission,
+                        count,
+                        leader,
+                    }
+                }
+                Remark::WentBack(last, to) => ServiceEvent::WentBack { last, to },
+            });
         }
         let remark = |(source, words)| ServiceEvent::SourceRemark { source, words };
         events.extend(self.heard.try_iter().map(remark));
@@ -379,6 +402,7 @@ impl Service {
         let status = self.progress.status();
         if status.is_degraded != self.is_degraded {
             self.is_degraded = status.is_degraded;
+            self.keep_model();
             events.push(ServiceEvent::Journal(status));
         }
         if let Some((time, now)) = self.host.look(false) {
@@ -392,6 +416,7 @@ impl Service {
         self.watches.iter_mut().for_each(|watch| watch.look(now));
         if self.retired.elapsed() >= RETIRE {
             self.retired = Clock::now();
+            self.keep_model();
             let (folder, keep) = (StatePaths::clone(&self.folder), self.keep);
             let checkpoints = self.keeper.checkpoints().clone();
             self.retiring.take();

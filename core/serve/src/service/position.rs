@@ -6,11 +6,14 @@ use std::path::{Path, PathBuf};
 use athermal_run::live::store::write_whole;
 use serde::{Deserialize, Serialize};
 
+use crate::connector::Place;
+
 /// How far a sink is, as the state folder keeps it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Position {
-    /// Where its rows end: see [`Kept::end`](crate::connector::Kept::end).
-    pub(super) end: u64,
+    /// Where its rows end: see [`Kept::end`](crate::connector::Kept::end). None of a command, and where it was never opened.
+    #[serde(default)]
+    pub(super) place: Option<Place>,
     /// All rows of so many ticks, beats, breaks and freezes stand before.
     pub(super) happenings: u64,
     /// What a command had applied; none of a log.

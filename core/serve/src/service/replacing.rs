@@ -123,6 +123,15 @@ impl Service {
         self.note(&format!("{by}: {revision} is to take over"));
     }
 
+    /// Keeps the model that was given, where that has not been possible.
+    pub(super) fn keep_model(&mut self) {
+        self.unkept.take_if(|model| {
+            let (folder, model) = (StatePaths::clone(&self.folder), model.clone());
+            let revision = model.revision().unwrap_or_default();
+            within(move || folder.keep_model(&model, &revision).is_ok()) == Some(true)
+        });
+    }
+
     /// Looks whether a comparison is over, and does what was asked for then.
     pub(super) fn compare(&mut self, events: &mut Vec<ServiceEvent>) {
         let Some(verdict) = self.verdict().filter(|of| of.over) else {

@@ -16,7 +16,7 @@ use super::frames::{FrameReceiver, SinkCounts};
 use super::position::{Position, PositionFile};
 use super::sinks::made_again;
 use crate::aside::Aside;
-use crate::connector::{ConnectorError, OutRow, Outlet, Stop};
+use crate::connector::{ConnectorError, OutRow, Outlet, Place, Sink, SinkWiring, Stop};
 use crate::diagnostic::panic_message;
 use crate::folder::StatePaths;
 use crate::journal::Progress;
@@ -32,8 +32,25 @@ const KEEP: (Wait, Wait) = (Wait::from_secs(5), Wait::from_secs(1));
 /// How long the end waits for a disk that hangs.
 const ENDS: Wait = Wait::from_secs(2);
 
+/// What a sink is until it is open.
+pub(super) struct Shut;
+
+impl Outlet for Shut {
+    fn put(&mut self, _: &OutRow<'_>) -> Result<(), ConnectorError> {
+        Err(ConnectorError::new("it is not open"))
+    }
+}
+
+/// What a sink is opened by.
+pub(super) struct Opening {
+    pub(super) parameters: Box<dyn Sink>,
+    pub(super) wiring: SinkWiring,
+}
+
 /// A sink at work.
 pub(super) struct SinkThread {
+    /// None once it is open.
+    pub(super) opening: Option<Opening>,
     pub(super) port: Port,
     pub(super) frames: FrameReceiver,
     /// None of a log.
@@ -45,14 +62,16 @@ pub(super) struct SinkThread {
     pub(super) position: PositionFile,
     pub(super) progress: Arc<Progress>,
     /// What keeps its position, on a disk that may hang.
-    pub(super) keeping: Aside<io::Result<u64>>,
+    pub(super) keeping: Aside<io::Result<(u64, Option<Place>)>>,
     /// It has the rows of so many ticks, beats, breaks and freezes…
     pub(super) done: u64,
     /// …of which so many are kept, and when that was tried last.
     pub(super) kept: (u64, Clock),
-    /// Where a log was when a run before ended, and how many rows stand behind that place.
-    pub(super) was: Option<(Position, u64)>,
-    /// How many of these have not been made again yet.
+    /// Whether no row of this run has been kept.
+    pub(super) is_new: bool,
+    /// Where a log was when a run before ended.
+    pub(super) was: Option<Position>,
+    /// How many rows stand behind that place that have not been made again yet.
     pub(super) there: u64,
 }
 
@@ -67,6 +86,9 @@ pub(super) struct Port {
 impl SinkThread {
     /// Puts rows out until no more will come.
     pub(super) fn run(mut self) {
+        if !self.open() {
+            return;
+        }
         let mut is_dirty = self.was.is_some();
         self.go_on();
         while !self.port.stop.is_asked() {
@@ -96,23 +118,71 @@ impl SinkThread {
         }
     }
 
+    /// Opens it, and counts what stands behind the place where it was. That is tried again where it fails: a log that is wrong is no reason
+    /// to do without corrections. False where it is to stop before.
+    fn open(&mut self) -> bool {
+        while let Some(of) = &self.opening {
+            let place = self.was.as_ref().and_then(|was| was.place);
+            let opened = guarded(|| {
+                let mut outlet = of.parameters.open(of.wiring.clone())?;
+                let rows = match (place, outlet.kept()) {
+                    (Some(place), Some(kept)) => kept.rows_after(place)?,
+                    _ => None,
+                };
+                Ok((outlet, rows))
+            });
+            match opened {
+                Ok((outlet, rows)) => {
+                    // Where the place has gone nothing stands behind it: a row twice is less than one that is lost.
+                    if let Some(was) = self.was.as_mut().filter(|_| rows.is_none()) {
+                        was.place = None;
+                    }
+                    self.there = rows.unwrap_or(0);
+                    (self.port.outlet, self.opening) = (outlet, None);
+                    self.port.health.report(Ok(()));
+                }
+                Err(error) => {
+                    self.port.counts.failures.fetch_add(1, Ordering::Relaxed);
+                    self.port.health.report(Err(error));
+                    if self.was.is_none() {
+                        // What comes is made again by the next start, where this one never opens it.
+                        self.keep(true);
+                    }
+                    if !self.port.stop.wait(AGAIN) {
+                        return false;
+                    }
+                }
+            }
+        }
+        if self.gate.is_none() && self.port.outlet.kept().is_none() {
+            self.was = None;
+        }
+        true
+    }
+
     /// Goes on from where it was: what a run before left is put out, and what the journal does not know is cut off.
     fn go_on(&mut self) {
-        let Some((was, rows)) = self.was.take() else {
+        let (now, rows, was) = (self.done, self.there, self.was.take());
+        if let Some(was) = &was {
+            (self.done, self.kept.0) = (was.happenings.min(now), was.happenings);
+        }
+        if was.as_ref().is_none_or(|was| was.place.is_none()) {
+            // Before the first row: after a kill those behind it are known.
+            self.kept.0 = u64::MAX;
             self.keep(true);
-            return;
-        };
-        let now = self.done;
-        (self.done, self.kept.0, self.there) = (was.happenings.min(now), was.happenings, rows);
+        }
+        let Some(was) = was else { return };
         let is_whole = self.done >= now || self.make_again(now);
         let unknown = std::mem::take(&mut self.there);
         if unknown > 0
             && is_whole
-            && let Some(kept) = self.port.outlet.kept()
+            && let (Some(place), Some(kept)) = (was.place, self.port.outlet.kept())
         {
-            let cut = guarded(|| kept.cut(was.end, rows - unknown));
+            let cut = guarded(|| kept.cut(place, rows - unknown));
             self.port.health.report(cut);
         }
+        // However often it is killed: what stands behind the place is no more than what one run wrote in a few seconds.
+        self.keep(true);
     }
 
     /// Puts out the row that was taken: a log's however often that fails, until it is to stop.
@@ -210,40 +280,49 @@ impl SinkThread {
         let every = if self.gate.is_some() { KEEP.1 } else { KEEP.0 };
         let patience = if at_once { ENDS } else { Wait::ZERO };
         self.is_kept(patience);
-        let is_early = !at_once && self.kept.1.elapsed() < every;
-        if self.kept.0 == self.done || is_early || !self.keeping.is_free() {
+        // The first row of a run is what tells its file from others, where those are moved.
+        let is_first = self.is_new && self.done > self.kept.0;
+        let is_early = !at_once && !is_first && self.kept.1.elapsed() < every;
+        // Where not all rows behind the place have been made again, its end is further than that.
+        if self.kept.0 == self.done || is_early || self.there > 0 || !self.keeping.is_free() {
             return;
         }
+        self.is_new &= !is_first;
         self.kept.1 = Clock::now();
         let applied = self.gate.as_ref().map_or(&[][..], CommandGate::applied);
         let finite = |value: &f64| Some(*value).filter(|value| value.is_finite());
         let applied = applied.iter().map(finite).collect();
-        let end = match self.port.outlet.kept() {
-            Some(kept) => kept.end(),
-            None if self.gate.is_some() => Ok(0),
+        let place = match self.port.outlet.kept() {
+            Some(kept) => match kept.end() {
+                Ok(place) => Some(place),
+                Err(_) => return,
+            },
+            None if self.gate.is_some() || self.opening.is_some() => None,
             None => {
                 self.port.counts.safe.store(self.done, Ordering::Relaxed);
                 return;
             }
         };
-        let Ok(end) = end else { return };
         let (file, happenings) = (self.position.clone(), self.done);
         let position = Position {
-            end,
+            place,
             happenings,
             applied,
         };
-        let write = move || file.write(&position).map(|()| happenings);
+        let write = move || file.write(&position).map(|()| (happenings, place));
         self.keeping.start(write);
         self.is_kept(patience);
     }
 
     /// Looks whether the position is on the disk, for so long.
     fn is_kept(&mut self, patience: Wait) {
-        if let Some(Ok(kept)) = self.keeping.wait(patience) {
-            self.kept.0 = kept;
+        if let Some(Ok((happenings, place))) = self.keeping.wait(patience) {
+            self.kept.0 = happenings;
             if self.gate.is_none() {
-                self.port.counts.safe.store(kept, Ordering::Relaxed);
+                self.port.counts.safe.store(happenings, Ordering::Relaxed);
+            }
+            if let (Some(place), Some(kept)) = (place, self.port.outlet.kept()) {
+                kept.forget(place);
             }
         }
     }
@@ -277,6 +356,7 @@ impl Port {
 pub(super) struct Health {
     pub(super) sink: String,
     pub(super) events: Sender<ServiceEvent>,
+    pub(super) counts: Arc<SinkCounts>,
     /// Whether what it did last failed.
     pub(super) has_failed: bool,
     /// Whether it takes rows that cannot leave.
@@ -296,17 +376,21 @@ impl Health {
     /// Reports the first failure, and the first success after one. That a row was taken is no news where none can leave.
     fn report(&mut self, done: Result<(), ConnectorError>) {
         let sink = self.sink.clone();
+        let words = done.as_ref().err().map(ToString::to_string);
         let event = match (done, self.has_failed) {
             (Err(error), false) => ServiceEvent::SinkFailed { sink, error },
             (Ok(()), true) if !self.is_held => ServiceEvent::SinkBack { sink },
             _ => return,
         };
         self.has_failed = !self.has_failed;
+        if let Ok(mut error) = self.counts.error.lock() {
+            *error = words;
+        }
         let _ = self.events.send(event);
     }
 }
 
-fn guarded(work: impl FnOnce() -> Result<(), ConnectorError>) -> Result<(), ConnectorError> {
+fn guarded<T>(work: impl FnOnce() -> Result<T, ConnectorError>) -> Result<T, ConnectorError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let words = panic_message(&*panic);
         Err(ConnectorError::new(format_args!(

@@ -10,7 +10,7 @@ use super::command::CommandGate;
 use super::engine_thread::Sinks;
 use super::frames::{FrameReceiver, SinkCounts, frames};
 use super::position::{Position, PositionFile};
-use super::sink_thread::{Health, Port, SinkThread};
+use super::sink_thread::{Health, Opening, Port, Shut, SinkThread};
 use super::{ServiceError, ServiceEvent, spawn};
 use crate::aside::Aside;
 use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
@@ -23,18 +23,20 @@ use crate::time::{Duration, Instant};
 /// How many rows may wait for a sink.
 const ROWS: usize = 1 << 13;
 
-/// A sink that has been opened.
+/// A sink that is to be started.
 pub(super) struct OpenSink {
-    pub(super) declared: DeclaredSink,
-    pub(super) outlet: Box<dyn Outlet>,
-    pub(super) position: PositionFile,
-    pub(super) counts: Arc<SinkCounts>,
-    /// Where it was, and how many rows stand behind that place; none at its first start.
-    was: Option<(Position, u64)>,
+    declared: DeclaredSink,
+    wiring: SinkWiring,
+    /// That of a command. A log is opened by its own thread, which tries again where that fails.
+    outlet: Option<Box<dyn Outlet>>,
+    position: PositionFile,
+    counts: Arc<SinkCounts>,
+    /// Where it was; none at its first start.
+    was: Option<Position>,
 }
 
 impl OpenSink {
-    /// Opens a sink, and looks where its rows end.
+    /// Opens a command, and looks where a log was.
     pub(super) fn open(
         declared: DeclaredSink,
         wiring: SinkWiring,
@@ -44,22 +46,17 @@ impl OpenSink {
             sink: declared.name.clone(),
             error,
         };
-        let mut outlet = declared.parameters.open(wiring).map_err(failed)?;
+        let is_command = declared.parameters.purpose() == Purpose::Command;
+        let outlet = is_command.then(|| declared.parameters.open(wiring.clone()));
+        let outlet = outlet.transpose().map_err(failed)?;
         let position = PositionFile::new(folder.path(), &declared.name);
-        let was = match (position.read(), outlet.kept()) {
-            // Where the file has gone it begins anew, with what comes.
-            (Some(of), Some(kept)) => {
-                let rows = kept.rows_after(of.end).map_err(failed)?;
-                rows.map(|rows| (of, rows))
-            }
-            (of, _) => of.map(|of| (of, 0)),
-        };
         Ok(Self {
+            was: position.read(),
             declared,
+            wiring,
             outlet,
             position,
             counts: Arc::default(),
-            was,
         })
     }
 }
@@ -134,7 +131,7 @@ pub(super) fn start(
 
 impl OpenSink {
     fn thread(
-        mut self,
+        self,
         frames: FrameReceiver,
         is_dry: bool,
         (folder, happenings): (&StatePaths, u64),
@@ -142,28 +139,33 @@ impl OpenSink {
         stop: &Stop,
         events: &Sender<ServiceEvent>,
     ) -> SinkThread {
-        let is_command = self.declared.parameters.purpose() == Purpose::Command;
+        let is_command = self.outlet.is_some();
         let gate = is_command.then(|| {
             let mut gate = CommandGate::new(self.declared.behind, self.declared.rate.clone());
-            if let Some((was, _)) = &self.was {
+            if let Some(was) = &self.was {
                 gate.start_from(&was.applied());
             }
             gate
         });
-        let was = self.was.filter(|_| self.outlet.kept().is_some());
         // A command is never made again.
-        let known = was.as_ref().map_or(happenings, |of| of.0.happenings);
+        let was = self.was.filter(|_| !is_command);
+        let known = was.as_ref().map_or(happenings, |of| of.happenings);
         let safe = if is_command { u64::MAX } else { known };
         self.counts.safe.store(safe, Ordering::Relaxed);
         SinkThread {
             is_dry: is_dry && is_command,
+            opening: (!is_command).then_some(Opening {
+                parameters: self.declared.parameters,
+                wiring: self.wiring,
+            }),
             port: Port {
-                outlet: self.outlet,
-                counts: self.counts,
+                outlet: self.outlet.unwrap_or_else(|| Box::new(Shut)),
+                counts: Arc::clone(&self.counts),
                 stop: stop.clone(),
                 health: Health {
                     sink: self.declared.name,
                     events: events.clone(),
+                    counts: self.counts,
                     has_failed: false,
                     is_held: false,
                 },
@@ -177,6 +179,7 @@ impl OpenSink {
             keeping: Aside::default(),
             done: happenings,
             kept: (u64::MAX, Clock::now()),
+            is_new: !is_command,
             was,
             there: 0,
         }

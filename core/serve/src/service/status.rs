@@ -24,6 +24,7 @@ impl Shared {
             snapshot: Mutex::new(Snapshot {
                 counts: vec![Counts::default(); channels],
                 hurried: 0,
+                waiting: 0,
                 happenings: 0,
                 last: Instant::MIN,
                 newest: None,
@@ -47,6 +48,8 @@ pub struct Snapshot {
     pub counts: Vec<Counts>,
     /// How many ticks were cut early because too many samples waited.
     pub hurried: u64,
+    /// How many samples are too far ahead and not decided on.
+    pub waiting: usize,
     /// How many ticks, beats, breaks and freezes there were.
     pub happenings: u64,
     /// The last tick.
@@ -55,6 +58,6 @@ pub struct Snapshot {
     pub newest: Option<Instant>,
     /// The stamp of each channel's newest sample that was stepped; [`Instant::MIN`] before the first.
     pub stamps: Vec<Instant>,
-    /// Whether the host's time is known to be right. Until then clocks of sources are not judged, and the first stamp may be any.
+    /// Whether the host's time is known to be right. Until then clocks of sources are not judged by it.
     pub is_synchronised: bool,
 }

@@ -1,5 +1,6 @@
 //! A small machine, live: arrivals, an engine, a journal.
 
+mod backlogs;
 mod damage;
 mod failures;
 mod kills;

@@ -58,6 +58,11 @@ fn every_kind_of_record_is_read_as_it_was_written() {
         Record::Refused(sample(2.0), Refusal::Future { ahead: ns(7) }),
         Record::Refused(sample(2.0), Refusal::Clock { off: ns(-7) }),
         Record::Refused(sample(2.0), Refusal::NoChannel),
+        Record::Waits(sample(3.0)),
+        Record::Lag {
+            source: 3,
+            least: ns(-9),
+        },
         Record::Tick {
             at: Instant::from_ns(i64::MAX),
             hash: u64::MAX,

@@ -62,7 +62,7 @@ impl Inlet for Beats {
     }
 }
 
-fn stamp(nth: i64) -> Instant {
+pub(super) fn stamp(nth: i64) -> Instant {
     Instant::from_ns(nth * 100_000_000)
 }
 
@@ -216,23 +216,23 @@ impl Drop for Lit {
     }
 }
 
-struct Bench {
+pub(super) struct Bench {
     folder: Folder,
-    sections: &'static str,
+    pub(super) sections: &'static str,
 }
 
 const MACHINE: &str = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\ncheckpoint = \"50 ms\"\n\
                        [sources.in]\ntype = \"metronome\"\n[sinks.out]\ntype = \"lines\"\n";
 
 impl Bench {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             folder: Folder::new(),
             sections: MACHINE,
         }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(super) fn path(&self, name: &str) -> PathBuf {
         self.folder.0.join(name)
     }
 
@@ -247,7 +247,7 @@ impl Bench {
         (model, deployment, mistakes)
     }
 
-    fn start(&self, graph: &str) -> Service {
+    pub(super) fn start(&self, graph: &str) -> Service {
         self.try_start(graph).unwrap()
     }
 
@@ -261,14 +261,14 @@ impl Bench {
         Service::start(&model, deployment, &options).map(|(service, _)| service)
     }
 
-    fn model(&self, graph: &str) -> Model {
+    pub(super) fn model(&self, graph: &str) -> Model {
         let path = self.path("next.toml");
         fs::write(&path, graph).unwrap();
         Model::load(&path).unwrap()
     }
 
     /// Revision and bits of each tick that was put out, by its number.
-    fn out(&self) -> BTreeMap<i64, String> {
+    pub(super) fn out(&self) -> BTreeMap<i64, String> {
         let text = fs::read_to_string(self.path("out")).unwrap_or_default();
         let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
         let tick = |line: &str| {
@@ -279,7 +279,7 @@ impl Bench {
     }
 
     /// Runs until so many more ticks are out; what happened meanwhile.
-    fn more(&self, service: &mut Service, ticks: usize) -> Vec<ServiceEvent> {
+    pub(super) fn more(&self, service: &mut Service, ticks: usize) -> Vec<ServiceEvent> {
         let (began, before) = (Clock::now(), self.out().len());
         let mut events = Vec::new();
         while self.out().len() < before + ticks {
@@ -291,7 +291,7 @@ impl Bench {
     }
 
     /// What a kill would leave, stepped again: it has the bits that were put out.
-    fn check_replay(&self) -> usize {
+    pub(super) fn check_replay(&self) -> usize {
         let copy = Folder::new();
         copy_tree(&self.path("state"), &copy.0);
         // What is in the journal may not be out yet, and the other way round nothing is.
@@ -315,11 +315,11 @@ impl Bench {
 }
 
 /// With another window: its slopes are warmed by the past, all else is carried.
-fn other_windows() -> String {
+pub(super) fn other_windows() -> String {
     GRAPH.replace("[\"2s\", \"7s\"]", "[\"3s\", \"7s\", \"20s\"]")
 }
 
-fn took_over(events: &[ServiceEvent]) -> Vec<String> {
+pub(super) fn took_over(events: &[ServiceEvent]) -> Vec<String> {
     use athermal_run::live::Notice::TookOver;
     let revision = |of: &ServiceEvent| match of {
         ServiceEvent::Swap(TookOver { revision, .. }) => Some(revision.clone()),

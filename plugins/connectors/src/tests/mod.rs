@@ -2,6 +2,7 @@
 
 mod conformance;
 mod faults;
+mod kept;
 mod planned;
 
 use std::fs;
@@ -243,19 +244,4 @@ fn a_service_goes_on_where_it_was_stopped_without_a_row_twice() {
     }
     folder.start(FOLLOWED, KEPT).unwrap().stop().unwrap();
     assert!(found(&out) == expected(&folder.model(), &rows));
-}
-
-#[test]
-fn a_sink_refuses_a_file_with_other_columns() {
-    let folder = Folder::new();
-    fs::write(folder.file("out.csv"), "a,b\n1,2\n").unwrap();
-    let error = folder.start(FOLLOWED, KEPT).unwrap_err().to_string();
-    assert!(
-        error.contains("has other columns") && error.contains("move it away"),
-        "{error}"
-    );
-    assert_eq!(
-        fs::read_to_string(folder.file("out.csv")).unwrap(),
-        "a,b\n1,2\n"
-    );
 }

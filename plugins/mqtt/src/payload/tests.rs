@@ -18,6 +18,7 @@ fn one(time: Time) -> Form {
         quality: None,
         values: Values::One("/value".to_owned(), 3),
         instants: Box::default(),
+        flags: Box::default(),
     }
 }
 
@@ -36,6 +37,7 @@ fn each() -> Form {
             channels: HashMap::from([("Ch1.Room".to_owned(), 0), ("7".to_owned(), 1)]),
         },
         instants: Box::default(),
+        flags: Box::default(),
     }
 }
 
@@ -46,6 +48,7 @@ fn plain() -> Form {
         quality: None,
         values: Values::Plain(2),
         instants: Box::default(),
+        flags: Box::default(),
     }
 }
 
@@ -206,7 +209,41 @@ fn behaviour_22_an_object_gives_each_field_to_its_channel() {
     let payload = br#"{"time": "1970-01-01T00:00:01Z", "T": {"a": 1.5, "b": null}}"#;
     let readings = fields().read(payload, ARRIVAL);
     assert_eq!(readings.given, [reading(0, 1_000_000_000, 1.5)]);
-    assert_eq!(readings.left_out[0].reason, Reason::Null);
+}
+
+#[test]
+fn a_value_that_is_null_or_not_there_is_left_out_in_words_only_where_a_message_has_no_other() {
+    let with =
+        |values: &str| format!("{{\"time\": \"1970-01-01T00:00:01Z\", \"T\": {{{values}}}}}");
+    for (values, expected) in [
+        ("\"a\": 1.5, \"b\": null", &[][..]),
+        ("\"b\": 1.5", &[]),
+        ("\"a\": 1.5, \"b\": \"x\"", &[Reason::NotANumber]),
+        ("\"a\": null", &[Reason::Null, Reason::NotThere]),
+    ] {
+        assert_eq!(
+            reasons(&fields(), with(values).as_bytes()),
+            expected,
+            "{values}"
+        );
+    }
+}
+
+#[test]
+fn true_is_one_of_a_channel_whose_unit_is_one_and_no_number_of_any_other() {
+    for (mut form, text, channel) in [
+        (one(Time::Arrival), "{\"value\": true}", 3),
+        (plain(), " true\n", 2),
+    ] {
+        assert_eq!(reasons(&form, text.as_bytes()), [Reason::Truth]);
+        form.flags = Box::new([channel]);
+        let of = |text: &str| form.read(text.as_bytes(), ARRIVAL).given;
+        assert_eq!(of(text), [reading(channel, 7, 1.0)]);
+        assert_eq!(
+            of(&text.replace("true", "false")),
+            [reading(channel, 7, 0.0)]
+        );
+    }
 }
 
 #[test]

@@ -9,14 +9,19 @@ use athermal_core::prng::Prng;
 
 use crate::peer::publish_all;
 use crate::server::{Broker, Folder, SAFE};
-use crate::service::{Process, TOGETHER, both, history, machine};
+use crate::service::{APART, Process, TOGETHER, both, history, machine, one};
 
 const PACE: Duration = Duration::from_millis(10);
 
-fn messages(count: u64) -> Vec<(String, String)> {
-    (0..count)
-        .map(|nth| ("plant/all".to_owned(), both(10 * nth)))
-        .collect()
+/// Both values in a message, or a message for each.
+fn messages(source: &str, count: u64) -> Vec<(String, String)> {
+    let all = |nth: u64| match source == APART {
+        true => ["plant/plate", "plant/room"]
+            .map(|topic| (topic.to_owned(), one(10 * nth)))
+            .to_vec(),
+        false => vec![("plant/all".to_owned(), both(10 * nth))],
+    };
+    (0..count).flat_map(all).collect()
 }
 
 /// Who is killed.
@@ -49,6 +54,13 @@ fn run(
         true => text.replace("settle = \"0 s\"", "settle = \"5 s\""),
         false => text,
     };
+    // The other value of an instant may be given again behind what follows.
+    let text = match source == APART {
+        true => text
+            .replace("wait = \"0 ms\"", "wait = \"2 s\"")
+            .replace("settle = \"0 s\"", "settle = \"2 s\""),
+        false => text,
+    };
     fs::write(folder.0.join("machine.toml"), text).unwrap();
     let mut service = Process::start(&folder);
     // The first connection makes the session; what is published before it is nobody's.
@@ -71,7 +83,8 @@ fn run(
     );
     let publisher = {
         let (published, stop, port) = (Arc::clone(&published), Arc::clone(&stop), broker.port);
-        std::thread::spawn(move || publish_all(port, &messages(count), PACE, &published, &stop))
+        let messages = messages(source, count);
+        std::thread::spawn(move || publish_all(port, &messages, PACE, &published, &stop))
     };
     let mut prng = Prng::stream(seed, "kills");
     for nth in 0..kills {
@@ -158,6 +171,25 @@ fn behaviour_13_a_service_that_is_killed_again_and_again_loses_nothing() {
     };
     let (kills, count) = kills(15, 500);
     nothing_is_lost(broker, TOGETHER, count, kills, Victim::Service);
+}
+
+#[test]
+fn behaviour_13_a_service_that_is_killed_loses_no_value_where_each_is_a_message() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let (kills, count) = kills(8, 200);
+    nothing_is_lost(broker, APART, count / 2, kills, Victim::Service);
+}
+
+#[test]
+fn behaviour_13_broker_and_service_are_killed_in_turn_and_no_value_is_lost_where_each_is_a_message()
+{
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let (kills, count) = kills(8, 200);
+    nothing_is_lost(broker, APART, count / 2, kills, Victim::Either);
 }
 
 #[test]

@@ -5,6 +5,7 @@
 
 mod behaviours;
 mod kills;
+mod messages;
 mod outages;
 mod peer;
 mod secure;

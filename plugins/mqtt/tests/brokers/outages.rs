@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::peer::publish_all;
 use crate::server::{Broker, DEBIAN, Folder, SAFE};
-use crate::service::{Running, TOGETHER, both, history, machine};
+use crate::service::{APART, Running, TOGETHER, both, history, machine, one};
 
 const COUNT: u64 = 600;
 
@@ -148,4 +148,60 @@ fn behaviour_19_what_a_full_queue_dropped_while_the_service_was_away_is_reported
         events.iter().any(|of| of.contains(&missing)),
         "{missing}: {events:#?}"
     );
+}
+
+#[test]
+fn an_instant_in_the_middle_of_which_the_broker_was_lost_is_whole() {
+    let Some(mut broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let folder = Folder::new("amid");
+    let text = machine(broker.port, APART, "")
+        .replace("wait = \"20 ms\"", "wait = \"2 s\"")
+        .replace("settle = \"0 s\"", "settle = \"3 s\"");
+    let mut service = Running::start(&folder, &text);
+    (0..6).for_each(|_| service.settle());
+    let publish = |topic: &str| {
+        let mut peer = crate::peer::Peer::connect(broker.port, "peer", true).unwrap();
+        peer.publish_safely(topic, one(1_000).as_bytes(), false);
+    };
+    publish("plant/plate");
+    service.until_given(1);
+    broker.kill();
+    // Longer than an instant is held by itself.
+    (0..5).for_each(|_| service.settle());
+    assert!(history(&folder).is_empty(), "{:?}", history(&folder));
+    broker.start();
+    let mut peer = crate::peer::Peer::connect(broker.port, "peer", true).unwrap();
+    peer.publish_safely("plant/room", one(1_000).as_bytes(), false);
+    service.until("the row", |_| history(&folder).len() == 1);
+    let events = service.stop();
+    assert!(!events.iter().any(|of| of.contains("Late")), "{events:#?}");
+    assert_eq!(history(&folder).len(), 1);
+}
+
+#[test]
+fn a_backlog_with_a_hole_longer_than_future_is_taken_whole_and_so_is_what_is_live() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let folder = Folder::new("hole");
+    let text = machine(broker.port, TOGETHER, "");
+    let mut service = Running::start(&folder, &text);
+    service.settle();
+    service.stop();
+    let mut peer = crate::peer::Peer::connect(broker.port, "peer", true).unwrap();
+    let mut publish = |ms: u64| peer.publish_safely("plant/all", both(ms).as_bytes(), false);
+    // A minute ago, then nothing, then now.
+    publish(1_000_000);
+    (0..20).for_each(|nth| publish(1_030_000 + 10 * nth));
+    let mut service = Running::start(&folder, &text);
+    service.settle();
+    for nth in 0..6 {
+        publish(1_060_000 + 500 * nth);
+        std::thread::sleep(Duration::from_millis(500));
+        service.pump();
+    }
+    service.until("all rows", |_| history(&folder).len() == 27);
+    service.stop();
 }

@@ -72,12 +72,17 @@ pub struct Running {
 }
 
 pub fn deployment(folder: &Path) -> (Model, Deployment) {
+    declared(folder).unwrap_or_else(|shown| panic!("{shown}"))
+}
+
+/// What a machine file declares, or all of its mistakes.
+pub fn declared(folder: &Path) -> Result<(Model, Deployment), String> {
     let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
     let path = folder.join("machine.toml");
     let model = Model::load_from(&path, Wanted::default(), &mut sources, &mut doubts).unwrap();
     let deployment = Deployment::read(&model.graph, &model.plan, &sources, &mut doubts);
     let shown = doubts.render(&sources, false, 120);
-    (model, deployment.unwrap_or_else(|| panic!("{shown}")))
+    Ok((model, deployment.ok_or(shown)?))
 }
 
 impl Running {

@@ -7,11 +7,29 @@ use super::reading::{table, text};
 use crate::diagnostic::Diagnostics;
 use crate::document::tree::{Table, Value};
 
-pub(super) const SOURCES: &str = "sources";
-pub(super) const SINKS: &str = "sinks";
-pub(super) const MODEL: &str = "model";
-/// Sections of keys.
-pub(super) const TABLES: [&str; 5] = ["runtime", "control", "retrain", "page", "alarms"];
+const SOURCES: &str = "sources";
+const SINKS: &str = "sinks";
+const MODEL: &str = "model";
+/// Sections of keys that every program knows.
+const TABLES: [&str; 3] = ["runtime", "control", "retrain"];
+
+/// The name of a section of keys that a linked crate reads, if it is none that every program knows.
+#[derive(Debug)]
+pub struct Section(pub &'static str);
+
+inventory::collect!(Section);
+
+/// The sections of keys in this program.
+fn tables() -> impl Iterator<Item = &'static str> {
+    let more = inventory::iter::<Section>.into_iter().map(|of| of.0);
+    let more = more.filter(|name| !name.is_empty() && !TABLES.contains(name));
+    TABLES.into_iter().chain(more)
+}
+
+/// All of these sections.
+pub(super) fn sections() -> impl Iterator<Item = &'static str> {
+    [SOURCES, SINKS, MODEL].into_iter().chain(tables())
+}
 
 /// Checks the sections and hands them on as they stand.
 pub(super) fn declare(root: &Table, diagnostics: &mut Diagnostics) -> IndexMap<String, Value> {
@@ -23,15 +41,14 @@ pub(super) fn declare(root: &Table, diagnostics: &mut Diagnostics) -> IndexMap<S
             table(&entry.value, name, diagnostics);
         }
     }
-    for section in TABLES {
+    for section in tables() {
         root.get(section)
             .and_then(|value| table(value, section, diagnostics));
     }
     if let Some(value) = root.get(MODEL) {
         text(value, MODEL, diagnostics);
     }
-    let sections = [SOURCES, SINKS, MODEL].into_iter().chain(TABLES);
-    sections
+    sections()
         .filter_map(|section| Some((section.to_owned(), root.get(section)?.clone())))
         .collect()
 }

@@ -18,6 +18,7 @@ use super::problem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
+pub use deployment::Section;
 pub use names::is_name;
 pub use placeholder::{fill as fill_placeholders, names as placeholders};
 use reading::text;
@@ -25,7 +26,8 @@ pub use reading::{is_misspelt, known_keys};
 pub use table::{Arrangement, DecimalMark, Encoding, Separator, TableBase, TableFormat};
 pub use time_base::UNITS as TIME_UNITS;
 
-const SECTIONS: [&str; 20] = [
+/// Those that a graph has without a machine.
+const SECTIONS: [&str; 12] = [
     "schema",
     "name",
     "description",
@@ -38,14 +40,6 @@ const SECTIONS: [&str; 20] = [
     "nodes",
     "outputs",
     "tests",
-    deployment::SOURCES,
-    deployment::SINKS,
-    deployment::MODEL,
-    deployment::TABLES[0],
-    deployment::TABLES[1],
-    deployment::TABLES[2],
-    deployment::TABLES[3],
-    deployment::TABLES[4],
 ];
 
 /// Sections that say which names there are.
@@ -68,11 +62,12 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         );
         return None;
     };
-    known_keys(root, &SECTIONS, "a graph file", diagnostics);
+    let sections: Vec<_> = SECTIONS.into_iter().chain(deployment::sections()).collect();
+    known_keys(root, &sections, "a graph file", diagnostics);
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
     // What stands in a section that is none is no mistake of those who refer to it.
-    let strange = root.iter().filter(|(key, _)| !SECTIONS.contains(key));
+    let strange = root.iter().filter(|(key, _)| !sections.contains(key));
     let below = strange.filter_map(|(_, section)| section.value.as_table());
     let mut broken: Vec<String> = below.flat_map(Table::keys).map(str::to_owned).collect();
     let sets = sets::declare(root.get("sets"), &broken, diagnostics);

@@ -156,11 +156,11 @@ fn a_range_is_given_in_the_unit_of_its_signal() {
 #[test]
 fn deployment_sections_are_handed_on_as_they_stand() {
     let graph = graph(
-        "model = \"m.json\"\n[sources.b]\nx = 1\n[sinks.a]\ny = 2\n[alarms]\nz = 3\n[[tests]]\nname = \"t\"",
+        "model = \"m.json\"\n[sources.b]\nx = 1\n[sinks.a]\ny = 2\n[retrain]\nz = 3\n[[tests]]\nname = \"t\"",
     );
     assert_eq!(
         graph.deployment.keys().collect::<Vec<_>>(),
-        ["sources", "sinks", "model", "alarms"]
+        ["sources", "sinks", "model", "retrain"]
     );
     assert_eq!(
         graph.tests.map(|tests| tests.to_json()),
@@ -260,5 +260,26 @@ fn each_mistake_in_a_table_is_reported_at_its_place() {
         ),
     ] {
         assert_eq!(mistakes(&format!("[table]\n{text}")), expected, "{text}");
+    }
+}
+
+#[test]
+fn a_section_that_nothing_reads_is_refused_by_its_name() {
+    let refused = |section: &str| {
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let text = format!("schema = 1\n[{section}]\nport = \"many\"\n");
+        let path = Path::new("a.toml");
+        let document = load_text(path, text, &Memory::new(), &mut sources, &mut diagnostics);
+        document.and_then(|document| declare(document, &mut diagnostics));
+        diagnostics.render(&sources, false, 120)
+    };
+    for section in ["page", "alarms", "alarm"] {
+        let text = refused(section);
+        let words = format!("a graph file has no key \"{section}\"");
+        assert!(text.contains(&words), "{text}");
+        assert!(!text.replace(&words, "").contains("alarms\""), "{text}");
+    }
+    for section in ["control", "retrain", "runtime"] {
+        assert_eq!(refused(section), "");
     }
 }

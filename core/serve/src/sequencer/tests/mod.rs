@@ -3,8 +3,11 @@
 mod allocation;
 mod any_order;
 mod clocks;
+mod commands;
+mod future;
 mod rules;
 mod settling;
+mod sources;
 
 use super::*;
 
@@ -56,7 +59,9 @@ pub(super) enum Decided {
     Tick(Instant, Vec<Option<f64>>),
     Beat(Instant, Vec<Option<f64>>),
     Break,
+    Back(Instant, Instant),
     Shift(Duration),
+    Lag(Duration),
     Sample(Admission),
 }
 
@@ -70,14 +75,23 @@ impl Decided {
             Decision::Tick { at, row: of } => Self::Tick(at, row(of)),
             Decision::Beat { at, row: of } => Self::Beat(at, row(of)),
             Decision::Break => Self::Break,
+            Decision::Back { last, to } => Self::Back(last, to),
+            Decision::Lag { least, .. } => Self::Lag(least),
             Decision::Shift { offset, .. } => Self::Shift(offset),
             Decision::Sample(admission) => Self::Sample(admission),
         }
     }
 }
 
-/// Lets time pass up to a moment, as a caller does that wakes whenever something is due.
+/// Lets time pass up to a moment, as a caller does that wakes whenever something is due. Lags are left out.
 pub(super) fn pass(sequencer: &mut Sequencer, until: Moment) -> Vec<(Moment, Decided)> {
+    let mut all = pass_all(sequencer, until);
+    all.retain(|(_, decided)| !matches!(decided, Decided::Lag(_)));
+    all
+}
+
+/// The same with lags.
+pub(super) fn pass_all(sequencer: &mut Sequencer, until: Moment) -> Vec<(Moment, Decided)> {
     let mut decided = Vec::new();
     let mut now = Moment::START;
     while let Some(due) = sequencer.due().filter(|due| *due <= until) {
