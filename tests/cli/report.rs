@@ -361,10 +361,17 @@ fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
 fn a_week_fits_on_a_page_of_three_megabytes() {
     let scratch = Scratch::new("a_week_fits_on_a_page");
     let model = fitted(&scratch, "die-tester-control", "die-tester");
-    let week = simulated(&scratch, "week.csv", "die-tester", 7.0, 2);
-    let page = report(&model, &week, &[&"-o", &"-"]).out;
+    // Of a week the page has a quarter more than of two days: what is drawn is thinned.
+    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
+    let (days, bound) = if is_long {
+        (7.0, 3_000_000)
+    } else {
+        (2.0, 2_400_000)
+    };
+    let data = simulated(&scratch, "days.csv", "die-tester", days, 2);
+    let page = report(&model, &data, &[&"-o", &"-"]).out;
     assert!(page.ends_with("</html>"));
-    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    assert!(page.len() < bound, "{} bytes", page.len());
 }
 
 #[test]

@@ -259,16 +259,36 @@ fn the_ticks_of_a_simulated_live_hour_are_those_of_its_replay_its_evaluation_and
 
 #[test]
 fn a_service_that_is_killed_at_random_instants_loses_no_row_and_puts_none_out_twice() {
-    killed("kills", SERVICE, 200);
+    killed("kills", SERVICE, 30);
 }
 
 #[test]
 fn a_service_that_is_killed_while_its_sink_changes_files_has_each_row_once_over_all_of_them() {
+    killed_while_rotating("kills-rotated", 15);
+}
+
+#[test]
+#[ignore = "runs alone, for a minute: `cargo test --test cli often_killed -- --ignored`"]
+fn an_often_killed_service_loses_no_row_and_puts_none_out_twice() {
+    killed("often-killed", SERVICE, often(200));
+    killed_while_rotating("often-killed-rotated", often(100));
+}
+
+/// So many kills, or ten times as many in the long mode.
+fn often(kills: usize) -> usize {
+    match std::env::var_os("ATHERMAL_LONG") {
+        Some(_) => 10 * kills,
+        None => kills,
+    }
+}
+
+/// A service whose log has a new file each few rows.
+fn killed_while_rotating(name: &str, kills: usize) {
     let rotated = SERVICE.replace("history.csv\"", "history.csv\"\nrotate = \"2 kB\"");
-    let scratch = killed("kills-rotated", &rotated, 100);
+    let scratch = killed(name, &rotated, kills);
     let full = all_of(&scratch).len() - 1;
     println!("{full} files were full");
-    assert!(full > 200, "{full}");
+    assert!(full > 2 * kills, "{full}");
 }
 
 /// The files of a sink, in order, the one that is written last.
@@ -305,8 +325,6 @@ fn whole_history(scratch: &Scratch) -> String {
 
 /// Kills a service so often, and compares all that it wrote with what a run writes.
 fn killed(name: &str, service: &str, kills: usize) -> Scratch {
-    let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
-    let kills = if is_long { 10 * kills } else { kills };
     let scratch = desk(name, service);
     let log = scratch.path("log.csv");
     let lines = |scratch: &Scratch| all_of(scratch).iter().map(|of| lines(of)).sum::<usize>();

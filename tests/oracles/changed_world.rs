@@ -1,8 +1,9 @@
 //! A die tester whose world changes after the fit: a door stands open, a lamp shines on a stage, two sensors come loose. What was
 //! learned is then hardly worse than no model, and the sensors that contradict the others are named.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, OnceLock};
 
 use crate::workbench::{Read, data, graph};
 use athermal::Engine;
@@ -28,11 +29,6 @@ fn changed_world() -> Option<PathBuf> {
 
 fn dataset(file: PathBuf) -> Dataset {
     Dataset::new(vec![file], Options::default())
-}
-
-fn fitted(plan: &Arc<Plan>, file: PathBuf) -> Fitted {
-    let options = FitOptions::default();
-    fit(plan, &dataset(file), &options, &mut |_| {}).unwrap().0
 }
 
 /// What happens, by name, from and to which second.
@@ -78,14 +74,37 @@ fn plan(extends: &str, more: &str) -> Arc<Plan> {
     Arc::new(plan.unwrap_or_else(|| panic!("{}", read.told())))
 }
 
+/// By what a graph extends, what it has besides, and the file that it is fitted on.
+type Fits = BTreeMap<(String, String, PathBuf), Arc<OnceLock<Arc<(Arc<Plan>, Fitted)>>>>;
+
+/// The plan of a graph file and what it is fitted to: once for all tests.
+fn fitted(extends: &str, more: &str, file: PathBuf) -> Arc<(Arc<Plan>, Fitted)> {
+    static FITS: Mutex<Fits> = Mutex::new(BTreeMap::new());
+    let key = (extends.to_owned(), more.to_owned(), file.clone());
+    let cell = Arc::clone(FITS.lock().unwrap().entry(key).or_default());
+    let found = cell.get_or_init(|| {
+        let plan = plan(extends, more);
+        let options = FitOptions::default();
+        let (fitted, _) = fit(&plan, &dataset(file), &options, &mut |_| {}).unwrap();
+        Arc::new((plan, fitted))
+    });
+    Arc::clone(found)
+}
+
+/// The virtual sensor of the die tester, with its uncertainty.
+const SENSOR: (&str, &str) = (
+    "die-tester-virtual-sensor",
+    "deviation = \"sensor:std_dev\"\n",
+);
+
 /// The instant, the truth and the error of each prediction of an axis of which there is a truth below the limit.
 type Errors = [Vec<(f64, f64, f64)>; 6];
 
 fn errors(name: &str, train: PathBuf, test: &Table, limit: f64, of: &str, more: &str) -> Errors {
-    let plan = plan(name, more);
-    let fitted = fitted(&plan, train);
+    let found = fitted(name, more, train);
+    let (plan, fitted) = &*found;
     let mut errors = Errors::default();
-    run(&plan, &fitted, test, |now, output| {
+    run(plan, fitted, test, |now, output| {
         for (errors, axis) in errors.iter_mut().zip(AXES) {
             let truth = output(&format!("drift.{axis}"));
             let error = output(&format!("{of}.{axis}")) - truth;
@@ -109,14 +128,8 @@ fn reference_what_was_learned_is_hardly_worse_than_no_model_whatever_becomes_of_
     let train = || folder.with_file_name("data").join("die-tester/train.csv");
     let plain = plan("die-tester-sensor", "");
     let test = Table::read(&dataset(folder.join("test.csv")), &plain).unwrap();
-    let of_sensor = errors(
-        "die-tester-virtual-sensor",
-        train(),
-        &test,
-        LIMIT,
-        "predicted",
-        "",
-    );
+    let (name, more) = SENSOR;
+    let of_sensor = errors(name, train(), &test, LIMIT, "predicted", more);
     let of_vote = errors("die-tester-sensor", train(), &test, LIMIT, "predicted", "");
     let mut wrong = Vec::new();
     for ((axis, own), vote) in AXES.iter().zip(&of_sensor).zip(&of_vote) {
@@ -251,11 +264,11 @@ fn named(
         ahead = "0s"
         "#
     );
-    let plan = plan(graph, &more);
-    let fitted = fitted(&plan, train);
-    let test = Table::read(&dataset(test), &plan).unwrap();
+    let found = fitted(graph, &more, train);
+    let (plan, fitted) = &*found;
+    let test = Table::read(&dataset(test), plan).unwrap();
     let (mut found, mut before) = (Vec::new(), vec![0.0; channels.len()]);
-    run(&plan, &fitted, &test, |now, output| {
+    run(plan, fitted, &test, |now, output| {
         for (channel, before) in channels.iter().zip(&mut before) {
             let reason = output(&format!("why.{channel}"));
             if reason == 1.0 && *before == 0.0 {
@@ -340,14 +353,12 @@ fn reference_no_sensor_is_named_on_undisturbed_days() {
 fn covered(train: PathBuf, test: PathBuf, events: &[(String, f64, f64)]) -> Vec<(String, f64)> {
     /// Half of an interval that holds 90 % of what is normally distributed, in standard deviations.
     const HALF: f64 = 1.644_853_626_951_472_7;
-    let plan = plan(
-        "die-tester-virtual-sensor",
-        "deviation = \"sensor:std_dev\"\n",
-    );
-    let fitted = fitted(&plan, train);
-    let test = Table::read(&dataset(test), &plan).unwrap();
+    let (name, more) = SENSOR;
+    let sensor = fitted(name, more, train);
+    let (plan, fitted) = &*sensor;
+    let test = Table::read(&dataset(test), plan).unwrap();
     let mut found: Vec<Vec<(f64, bool)>> = vec![Vec::new(); AXES.len()];
-    run(&plan, &fitted, &test, |now, output| {
+    run(plan, fitted, &test, |now, output| {
         for (found, axis) in found.iter_mut().zip(AXES) {
             let of = |output: &dyn Fn(&str) -> f64, name: &str| output(&format!("{name}.{axis}"));
             let (truth, predicted) = (of(output, "drift"), of(output, "predicted"));
@@ -430,7 +441,7 @@ fn reference_the_picture_of_a_day_with_a_loose_sensor_is_that_of_the_guide() {
         return;
     };
     let train = || folder.with_file_name("data").join("die-tester/train.csv");
-    let (name, all) = ("die-tester-virtual-sensor", f64::INFINITY);
+    let ((name, more), all) = (SENSOR, f64::INFINITY);
     let test = Table::read(&dataset(folder.join("test.csv")), &plan(name, "")).unwrap();
     let day = |more: &str| -> (Vec<f64>, Vec<f64>) {
         let axis = errors(name, train(), &test, all, "predicted", more)[2].clone();
@@ -439,7 +450,7 @@ fn reference_the_picture_of_a_day_with_a_loose_sensor_is_that_of_the_guide() {
             .filter(|(at, ..)| (20.0..37.5).contains(&(at / 3600.0)));
         of_day.map(|(at, _, error)| (*at, *error)).unzip()
     };
-    let ((at, with), (at_without, without)) = (day(""), day(UNAWARE));
+    let ((at, with), (at_without, without)) = (day(more), day(UNAWARE));
     let loose = events(&folder)
         .into_iter()
         .find(|(event, ..)| event == "loose holder1");

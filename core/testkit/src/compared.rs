@@ -86,7 +86,7 @@ impl Course {
         for (nth, ((now, one), (_, two))) in ticks {
             for (number, (one, two)) in one.iter().zip(two).enumerate() {
                 let slot = fixture.slots().start + number;
-                if counts(slot) && !alike(*one, *two) {
+                if !alike(*one, *two) && counts(slot) {
                     return Some(format!(
                         "at tick {nth} ({now} s) `{}` is {} in one run and {} in the other",
                         fixture.plan.channels[slot].name,
