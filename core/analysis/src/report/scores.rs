@@ -131,7 +131,7 @@ fn interval(score: &Score) -> Option<Vec<String>> {
 }
 
 /// How much of a truth is explained, 1 being all of it. What is far off is not written out.
-fn share(value: f64) -> String {
+pub(super) fn share(value: f64) -> String {
     if value.abs() < 1e3 {
         format!("{value:.3}")
     } else {

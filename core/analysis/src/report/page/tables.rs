@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use athermal_run::model::EstimatorCard;
 use athermal_run::score::Score;
 
+use super::super::scores::share;
 use super::super::{
     Compared, Departure, Effect, Excursion, Hours, Light, SensorFacts, figure, spelled,
 };
@@ -40,7 +41,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
             score.no_model_is.remark(),
             persistence(score),
             figure(score.truth_noise),
-            figure(score.r2_zero),
+            score.r2_zero.map_or_else(|| "–".to_owned(), share),
             figure(score.bias),
             figure(score.max_abs),
             count(score.n),
