@@ -28,6 +28,7 @@ mod fit_json;
 mod fleet;
 mod forms_of_logs;
 mod graph_file_page;
+mod idle;
 mod init_refuses;
 mod init_warnings;
 mod json_messages;

@@ -11,6 +11,9 @@ use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
 use crate::folder::FolderError;
 use crate::journal::Progress;
 
+/// How often is looked whether a checkpoint has been saved, or can be.
+const LOOK: Wait = Wait::from_millis(100);
+
 /// Takes checkpoints from the replica, so that the engine thread never serialises.
 #[derive(Debug)]
 pub struct Keeper {
@@ -68,6 +71,15 @@ impl Keeper {
         }
         self.save()?;
         Ok(notices)
+    }
+
+    /// How long nothing is due for [`pump`](Self::pump), where nothing is stepped.
+    #[must_use]
+    pub fn due(&self) -> Wait {
+        match self.waiting.is_none() && self.saving.is_free() {
+            true => self.every.saturating_sub(self.taken.elapsed()),
+            false => LOOK,
+        }
     }
 
     /// Lets the staged graph take over before the next tick. It is saved as it is, so that a replay lets the same take over.

@@ -37,6 +37,7 @@ macro_rules! from {
 }
 
 mod aside;
+pub mod bell;
 pub mod checkpoint;
 pub mod companion;
 pub mod connector;

@@ -20,6 +20,7 @@ use std::sync::mpsc::channel;
 use std::thread;
 use std::time::{Duration as Wait, Instant as Clock};
 
+use crate::bell::{Bell, Mailbox};
 use crate::connector::{
     Arrival, OutRow, Outlet, Remarks, Sink, SinkWiring, Source, SourceLink, SourceWiring, Stop,
     WiredChannel, WiredOutput, link,
@@ -126,7 +127,7 @@ impl<'a> SourceTrial<'a> {
             *after = given.stamp.max(*after);
         }
         let places: Vec<u32> = (0..).take(wiring.channels.len()).collect();
-        let remarks = Remarks::new("it", &channel().0);
+        let remarks = Remarks::new("it", &Mailbox::new(channel().0, &Bell::here()));
         let engine = (thread::current(), Arc::<Progress>::default(), remarks);
         let stamps = self.source.stamps();
         let (mut out, link) = link(room, &wiring.channels, &places, stamps, engine);

@@ -8,6 +8,9 @@ use crate::moment::Moment;
 use crate::sequencer::{Admission, Decision, Sample, Sequencer};
 use crate::time::{Duration, Instant};
 
+/// So many records are worth waking the journal thread for, without a tick.
+const FEW: u64 = 8;
+
 /// The engine thread's work. The thread sleeps until something arrives or [`due`](Self::due).
 #[derive(Debug)]
 pub struct Worker {
@@ -71,10 +74,12 @@ impl Worker {
     /// # Errors
     /// When the rules have other channels than the graph.
     pub fn pass(&mut self, now: Moment, put: impl FnMut(&Output<'_>)) -> Result<(), EngineError> {
-        self.pass_while(now, |_| true, put)
+        self.pass_while(now, |_| true, put)?;
+        self.recorder.wake();
+        Ok(())
     }
 
-    /// The same for as long as `goes_on`: what is due then stays so.
+    /// The same for as long as `goes_on`: what is due then stays so. The journal thread is not woken for what is few.
     ///
     /// # Errors
     /// As [`pass`](Self::pass).
@@ -84,10 +89,18 @@ impl Worker {
         mut goes_on: impl FnMut(&Self) -> bool,
         mut put: impl FnMut(&Output<'_>),
     ) -> Result<(), EngineError> {
+        let before = self.recorder.happenings();
         while goes_on(self) && self.decide(now, false, &mut put)?.is_some() {}
-        self.recorder.wake();
+        if self.recorder.happenings() != before || self.recorder.new_records() >= FEW {
+            self.recorder.wake();
+        }
         self.recorder.mend(self.sequencer.timeline());
         Ok(())
+    }
+
+    /// Wakes the journal thread, for a time in which nothing is due.
+    pub fn rest(&mut self) {
+        self.recorder.wake();
     }
 
     /// Where another segment began because the last tick was of the future: that tick, and a stamp of the time that it is. Once.

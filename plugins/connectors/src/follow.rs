@@ -3,12 +3,12 @@
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek};
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use athermal_serve::connector::Stop;
 
-/// How long the end of a file is left alone before it is looked at again.
-const PAUSE: Duration = Duration::from_millis(50);
+/// How long the end of a file is left alone before it is looked at again, at least and at most: for twice as long as nothing has come.
+const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_millis(300));
 
 /// Reads a file to its end and waits there for more. Ends where the file was replaced or cut short, after what still stood in it, or
 /// where it is to stop.
@@ -18,6 +18,8 @@ pub(crate) struct Follow {
     stop: Stop,
     /// Whether the file was found to be another one, so that what is left of this one is the last.
     is_replaced: bool,
+    /// When something came.
+    came: Instant,
 }
 
 impl Follow {
@@ -28,6 +30,7 @@ impl Follow {
             path,
             stop,
             is_replaced: false,
+            came: Instant::now(),
         })
     }
 
@@ -59,6 +62,7 @@ impl Read for Follow {
         loop {
             let read = self.file.read(into)?;
             if read > 0 || self.is_replaced {
+                self.came = Instant::now();
                 return Ok(read);
             }
             if self.looks_replaced()? {
@@ -66,7 +70,10 @@ impl Read for Follow {
                 self.is_replaced = true;
                 continue;
             }
-            if !self.stop.wait(PAUSE) {
+            if !self
+                .stop
+                .wait((2 * self.came.elapsed()).clamp(PAUSES.0, PAUSES.1))
+            {
                 return Ok(0);
             }
         }

@@ -1,16 +1,17 @@
 //! Standard input as something that can be waited for no longer than until the end is asked for.
 
 use std::io::{self, Read};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Mutex, OnceLock, PoisonError};
-use std::time::Duration;
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
+use athermal_serve::bell::Bell;
 use athermal_serve::connector::Stop;
 
-/// How long nothing may come until it is looked whether it is to stop.
-const PAUSE: Duration = Duration::from_millis(50);
 /// How many pieces of how many bytes wait; beyond, whoever writes into the pipe waits.
 const PIECES: (usize, usize) = (16, 1 << 14);
+
+/// Wakes whoever waits for a piece.
+static READER: Mutex<Option<Bell>> = Mutex::new(None);
 
 /// Standard input, read by a thread of its own, which nothing can wake while nothing comes. It lives as long as the program.
 pub(crate) struct Pipe {
@@ -21,12 +22,19 @@ pub(crate) struct Pipe {
 
 impl Pipe {
     pub(crate) fn new(stop: &Stop) -> Self {
+        let bell = Bell::here();
+        stop.wakes(&bell);
+        *reader() = Some(bell);
         Self {
             stop: stop.clone(),
             piece: Vec::new(),
             read: 0,
         }
     }
+}
+
+fn reader() -> MutexGuard<'static, Option<Bell>> {
+    READER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn pieces() -> &'static Mutex<Receiver<io::Result<Vec<u8>>>> {
@@ -42,7 +50,11 @@ fn pieces() -> &'static Mutex<Receiver<io::Result<Vec<u8>>>> {
                     piece
                 });
                 let is_over = read.as_ref().map_or(true, Vec::is_empty);
-                if give.send(read).is_err() || is_over {
+                let is_given = give.send(read).is_ok();
+                if let Some(bell) = &*reader() {
+                    bell.ring();
+                }
+                if is_over || !is_given {
                     return;
                 }
             }
@@ -55,9 +67,13 @@ impl Read for Pipe {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         while self.read == self.piece.len() {
             let pieces = pieces().lock().unwrap_or_else(PoisonError::into_inner);
-            match pieces.recv_timeout(PAUSE) {
+            match pieces.try_recv() {
                 Ok(piece) => (self.piece, self.read) = (piece?, 0),
-                Err(RecvTimeoutError::Timeout) if !self.stop.is_asked() => continue,
+                Err(TryRecvError::Empty) if !self.stop.is_asked() => {
+                    drop(pieces);
+                    std::thread::park();
+                    continue;
+                }
                 Err(_) => return Ok(0),
             }
             if self.piece.is_empty() {

@@ -15,6 +15,11 @@ impl Acknowledgements {
         self.waiting.push_back((samples, packet));
     }
 
+    /// Whether any message waits for its acknowledgement.
+    pub fn are_due(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
     /// So many samples are safe: sends what may be acknowledged, until the sender takes no more.
     pub fn send(&mut self, safe: u64, mut send: impl FnMut(u16) -> bool) {
         while let Some(&(samples, packet)) = self.waiting.front() {

@@ -256,9 +256,12 @@ impl Work {
                 Ended::Version(words) | Ended::Closed(words) | Ended::Other(words) => words,
             };
             self.ended(words);
-            let until = Clock::now() + back_off.after(lasted);
-            while Clock::now() < until && !self.stop.is_asked() {
-                tokio::time::sleep(Wait::from_millis(20)).await;
+            let mut left = back_off.after(lasted);
+            let until = Clock::now() + left;
+            while !left.is_zero() && !self.stop.is_asked() {
+                // Rows that come meanwhile wait.
+                let _ = timeout(left, self.shared.came.notified()).await;
+                left = until.saturating_duration_since(Clock::now());
             }
         }
     }

@@ -3,11 +3,15 @@
 
 use std::collections::{HashMap, VecDeque};
 use std::pin::pin;
-use std::time::{Duration as Wait, SystemTime, UNIX_EPOCH};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration as Wait, Instant as Clock, SystemTime, UNIX_EPOCH};
 
 use athermal_core::time::Instant;
+use athermal_serve::bell::Bell;
 use athermal_serve::connector::{Outflow, Stop};
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::sync::Notify;
+use tokio::time::{sleep, timeout};
 
 use crate::acknowledgements::Acknowledgements;
 use crate::client::{Connection, Ended, Event, Message, Sender};
@@ -15,8 +19,12 @@ use crate::gap::Gap;
 use crate::payload::{Reading, Reason};
 use crate::source::{Ack, MqttInlet, Retained};
 
-/// How often is looked at what may be acknowledged.
+/// What may be acknowledged is looked at no more often, and whether there is room as often where there was none.
 const LOOK: Wait = Wait::from_millis(2);
+/// The same where nobody rings for it, of acknowledgements and of subscriptions without an answer.
+const AGAIN: (Wait, Wait) = (Wait::from_millis(250), Wait::from_secs(1));
+/// How long nothing may be due.
+const LONGEST: Wait = Wait::from_secs(3600);
 /// How long is waited for the broker at the end.
 const LEAVE: Wait = Wait::from_millis(200);
 /// How many messages wait for the engine at most. Then the connection is given up, and the broker sends them again.
@@ -33,6 +41,8 @@ pub(crate) struct Session<'a> {
     /// Messages that the engine has not taken.
     waiting: VecDeque<Waiting>,
     acknowledgements: Acknowledgements,
+    /// Whether any of them is to come.
+    awaits: Arc<AtomicBool>,
     /// By topic: which routes mean it.
     meant: HashMap<String, Vec<usize>>,
     values: Vec<f64>,
@@ -57,6 +67,7 @@ impl<'a> Session<'a> {
             was_connected: false,
             waiting: VecDeque::new(),
             acknowledgements: Acknowledgements::default(),
+            awaits: Arc::default(),
             meant: HashMap::new(),
         }
     }
@@ -65,15 +76,33 @@ impl<'a> Session<'a> {
     pub(crate) async fn run(&mut self) -> Result<(), Ended> {
         let mut connection = Connection::new(&self.inlet.settings).map_err(Ended::Other)?;
         let sender = connection.sender();
-        let mut looks = interval(LOOK);
-        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let rung = Arc::new(Notify::new());
+        let [to_stop, to_look] = [(); 2].map(|()| Arc::clone(&rung));
+        let (stops, awaits) = (
+            Bell::new(move || to_stop.notify_one()),
+            Arc::clone(&self.awaits),
+        );
+        let looks = Bell::new(move || {
+            if awaits.load(Ordering::Acquire) {
+                to_look.notify_one();
+            }
+        });
+        self.stop.wakes(&stops);
+        self.out.wakes(&looks);
+        let (mut is_rung, mut looked) = (true, Clock::now());
         loop {
             // A connection that is being made takes longer than a look: it is not to be given up for one.
             let mut next = pin!(connection.next());
             let event = loop {
+                let due = match is_rung {
+                    true => LOOK.saturating_sub(looked.elapsed()),
+                    false => self.due(),
+                };
                 tokio::select! {
                     event = &mut next => break Some(event?),
-                    _ = looks.tick() => {
+                    () = rung.notified(), if !is_rung => is_rung = true,
+                    () = sleep(due) => {
+                        (is_rung, looked) = (false, Clock::now());
                         self.look(&sender);
                         if self.stop.is_asked() {
                             break None;
@@ -105,6 +134,17 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// How long until is to be looked again, if nobody rings.
+    fn due(&self) -> Wait {
+        let is_asking = self.was_connected && !self.inlet.subscriptions.is_done();
+        match (!self.waiting.is_empty(), self.acknowledgements.are_due()) {
+            (true, _) => LOOK,
+            (false, true) => AGAIN.0,
+            (false, false) if is_asking => AGAIN.1,
+            (false, false) => LONGEST,
+        }
+    }
+
     fn look(&mut self, sender: &Sender) {
         self.give();
         self.acknowledge(sender);
@@ -120,6 +160,8 @@ impl<'a> Session<'a> {
         };
         let send = |packet| sender.acknowledge(packet);
         self.acknowledgements.send(safe, send);
+        let are_due = self.acknowledgements.are_due() || !self.waiting.is_empty();
+        self.awaits.store(are_due, Ordering::Release);
     }
 
     fn handle(&mut self, event: Event, sender: &Sender) -> Result<(), Ended> {
@@ -170,6 +212,8 @@ impl<'a> Session<'a> {
         } else {
             self.read(&topic, &payload, &mut readings);
         }
+        // Before they are given: what they wait for is not missed.
+        self.awaits.store(true, Ordering::Release);
         // Each instant is given as a whole.
         readings.sort_by_key(|of: &Reading| of.stamp);
         self.waiting.push_back(Waiting {
@@ -253,11 +297,7 @@ impl<'a> Session<'a> {
                     return;
                 }
             }
-            let given = self
-                .out
-                .counts()
-                .given
-                .load(std::sync::atomic::Ordering::Relaxed);
+            let given = self.out.counts().given.load(Ordering::Relaxed);
             if let Some(packet) = waiting.packet {
                 self.acknowledgements.given(given, packet);
             }

@@ -25,7 +25,7 @@ type Piece = io::Result<Vec<u8>>;
 /// may send several. Where there are no signals it is as it was.
 pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     let (give, pieces) = sync_channel(WAITING);
-    if !listen(give.clone(), true) {
+    if !listen(give.clone(), true, || ()) {
         return input;
     }
     // The thread may wait for an input that gives nothing more, and goes with the program.
@@ -33,15 +33,15 @@ pub fn until_stopped(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     Box::new(Pieces::new(pieces))
 }
 
-/// Notes SIGINT and SIGTERM, for whoever looks at [`is_stopped`]. A second one ends the program at once.
+/// Notes SIGINT and SIGTERM, for whoever looks at [`is_stopped`], and wakes this thread. A second one ends the program at once.
 pub fn listen_for_the_end() {
-    let (give, _) = sync_channel(1);
-    let _ = listen(give, false);
+    let (thread, (give, _)) = (std::thread::current(), sync_channel(1));
+    let _ = listen(give, false, move || thread.unpark());
 }
 
 /// Ends the input at the first signal; whether signals can be listened to.
 #[cfg(unix)]
-fn listen(give: SyncSender<Piece>, hangs_up: bool) -> bool {
+fn listen(give: SyncSender<Piece>, hangs_up: bool, wake: impl Fn() + Send + 'static) -> bool {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
@@ -55,6 +55,7 @@ fn listen(give: SyncSender<Piece>, hangs_up: bool) -> bool {
             if STOPPED.swap(true, Ordering::Relaxed) && signal != SIGHUP {
                 let _ = emulate_default_handler(signal);
             }
+            wake();
             // There may be no room yet, and the second signal is listened to meanwhile.
             let give = give.clone();
             std::thread::spawn(move || give.send(Ok(Vec::new())));
@@ -74,7 +75,7 @@ fn ends_at_a_hangup() -> bool {
 }
 
 #[cfg(not(unix))]
-fn listen(_give: SyncSender<Piece>, _hangs_up: bool) -> bool {
+fn listen(_give: SyncSender<Piece>, _hangs_up: bool, _wake: impl Fn()) -> bool {
     false
 }
 

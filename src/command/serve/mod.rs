@@ -3,7 +3,6 @@
 pub(super) mod events;
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
@@ -18,9 +17,6 @@ use super::run::stop;
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Terminal};
 use athermal_analysis::figures::counted;
-
-/// How often is looked at what happened.
-const LOOK: Duration = Duration::from_millis(50);
 
 /// Run a machine file as a service: sources in, corrections out, nothing lost
 ///
@@ -73,7 +69,7 @@ impl Serve {
             for event in service.pump() {
                 reports.report(event);
             }
-            std::thread::sleep(LOOK);
+            service.wait();
         }
         let sinks = service.sinks().to_vec();
         let (ended, events) = service.stop().map_err(refused)?;

@@ -70,7 +70,7 @@ pub trait Outlet: Send {
     /// is no room for them they are made again from the journal.
     fn put(&mut self, row: &OutRow<'_>) -> Result<(), ConnectorError>;
 
-    /// Whether what it has taken can leave; otherwise why not. What waits is kept meanwhile. Asked after each row, and ten times a second.
+    /// Whether what it has taken can leave; otherwise why not. What waits is kept meanwhile. Asked after each row, and every two seconds.
     ///
     /// # Errors
     /// Why it cannot leave at the moment.

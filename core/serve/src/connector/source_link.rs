@@ -3,13 +3,13 @@
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::Sender;
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::{Stamps, Stop, WiredChannel};
+use crate::bell::{Bell, Mailbox};
 use crate::journal::Progress;
 use crate::sequencer::Sample;
 use crate::time::Instant;
@@ -31,12 +31,12 @@ pub(crate) enum Arrival {
 #[derive(Debug, Clone)]
 pub struct Remarks {
     source: String,
-    to: Sender<(String, String)>,
+    to: Mailbox<(String, String)>,
 }
 
 impl Remarks {
     /// Those of a source.
-    pub(crate) fn new(source: &str, to: &Sender<(String, String)>) -> Self {
+    pub(crate) fn new(source: &str, to: &Mailbox<(String, String)>) -> Self {
         Self {
             source: source.to_owned(),
             to: to.clone(),
@@ -45,8 +45,7 @@ impl Remarks {
 
     /// Reports something that does not stop the source: what was left out and why, once of each kind.
     pub fn report(&self, words: impl fmt::Display) {
-        // Nobody listens any more where the service has ended.
-        let _ = self.to.send((self.source.clone(), words.to_string()));
+        self.to.send((self.source.clone(), words.to_string()));
     }
 }
 
@@ -132,11 +131,14 @@ struct Safe {
 impl Safe {
     /// Looks again, where so many records are safe.
     fn after(&mut self, safe: u64, counts: &SourceCounts) -> u64 {
-        let (taken, records) = self.look;
-        if safe >= records {
-            self.samples = taken;
-            let taken = counts.taken.load(Ordering::Acquire);
-            self.look = (taken, counts.records.load(Ordering::Acquire));
+        // What is looked at anew may be safe already.
+        for _ in 0..2 {
+            let (taken, records) = self.look;
+            if safe >= records {
+                self.samples = taken;
+                let taken = counts.taken.load(Ordering::Acquire);
+                self.look = (taken, counts.records.load(Ordering::Acquire));
+            }
         }
         self.samples
     }
@@ -294,6 +296,11 @@ impl Outflow {
     pub fn synced(&mut self) -> u64 {
         let synced = self.while_journalled(self.progress.synced());
         self.synced.after(synced, &self.counts)
+    }
+
+    /// From now on it rings where more of what was given may be [written](Self::written) or [synced](Self::synced).
+    pub fn wakes(&self, bell: &Bell) {
+        self.progress.wakes(bell);
     }
 
     /// Where the disk has failed the service goes on without its journal: a broker is not to wait for what will not be written.

@@ -4,25 +4,38 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Whether a source or a sink is to end. It looks here at least ten times a second.
+use crate::bell::{Bell, Bells};
+
+/// Whether a source or a sink is to end. It looks here at least ten times a second, or is [woken](Self::wakes).
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
-    asked: Arc<AtomicBool>,
+    asked: Arc<Flag>,
     /// Of one run of a source, after which it may run again.
-    run: Option<Arc<AtomicBool>>,
+    run: Option<Arc<Flag>>,
+}
+
+#[derive(Debug, Default)]
+struct Flag {
+    is_up: AtomicBool,
+    bells: Bells,
 }
 
 impl Stop {
     /// Whether it is to end.
     #[must_use]
     pub fn is_asked(&self) -> bool {
-        let is_asked = |of: &Arc<AtomicBool>| of.load(Ordering::Acquire);
-        is_asked(&self.asked) || self.run.as_ref().is_some_and(is_asked)
+        self.flags().any(|of| of.is_up.load(Ordering::Acquire))
     }
 
     /// Asks for it.
     pub fn ask(&self) {
-        self.asked.store(true, Ordering::Release);
+        self.asked.is_up.store(true, Ordering::Release);
+        self.asked.bells.ring();
+    }
+
+    /// From now on it rings where it is to end.
+    pub fn wakes(&self, bell: &Bell) {
+        self.flags().for_each(|of| of.bells.add(bell));
     }
 
     /// One that another asks for as well.
@@ -35,13 +48,14 @@ impl Stop {
 
     /// It is no longer asked for.
     pub(crate) fn withdraw(&self) {
-        self.asked.store(false, Ordering::Release);
+        self.asked.is_up.store(false, Ordering::Release);
     }
 
     /// Waits for so long, but no longer than until the end is asked for: false then.
     #[must_use]
     pub fn wait(&self, duration: Duration) -> bool {
         let until = Instant::now() + duration;
+        self.wakes(&Bell::here());
         loop {
             if self.is_asked() {
                 return false;
@@ -50,7 +64,30 @@ impl Stop {
             if left.is_zero() {
                 return true;
             }
-            std::thread::sleep(left.min(Duration::from_millis(20)));
+            std::thread::park_timeout(left);
+        }
+    }
+
+    fn flags(&self) -> impl Iterator<Item = &Flag> {
+        std::iter::once(&*self.asked).chain(self.run.as_deref())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_waits_is_woken_by_either_end() {
+        for nth in 0..2 {
+            let (all, run) = (Stop::default(), Stop::default());
+            let either = all.or(&run);
+            let waits = std::thread::spawn(move || either.wait(Duration::from_secs(60)));
+            std::thread::sleep(Duration::from_millis(20));
+            let began = Instant::now();
+            [all, run][nth].ask();
+            assert!(!waits.join().unwrap());
+            assert!(began.elapsed() < Duration::from_secs(5));
         }
     }
 }

@@ -4,6 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant as Clock};
 
+use crate::bell::{Bell, Bells};
+
 /// How far the journal is. Shared by all threads.
 #[derive(Debug, Default)]
 pub struct Progress {
@@ -19,6 +21,8 @@ pub struct Progress {
     /// Whether somebody waited in vain, and nothing has been written since.
     is_stuck: AtomicBool,
     error: Mutex<Option<String>>,
+    /// Of those who wait for more to be written.
+    bells: Bells,
 }
 
 /// How the journal is, for a status.
@@ -67,20 +71,33 @@ impl Progress {
     /// they are not written. While the disk fails or hangs, nobody waits again.
     #[must_use]
     pub fn wait_written(&self, below: u64, patience: Duration) -> bool {
-        let began = Clock::now();
-        loop {
-            if self.written() >= below {
-                return true;
-            }
-            if self.is_degraded() {
-                return false;
-            }
-            if began.elapsed() >= patience {
-                self.is_stuck.store(true, Ordering::Release);
-                return false;
-            }
-            std::thread::sleep(Duration::from_micros(50));
+        if self.written() >= below {
+            return true;
         }
+        let (until, bell) = (Clock::now() + patience, Bell::here());
+        self.bells.add(&bell);
+        let is_written = loop {
+            if self.written() >= below || self.is_degraded() {
+                break self.written() >= below;
+            }
+            let left = until.saturating_duration_since(Clock::now());
+            if left.is_zero() {
+                self.is_stuck.store(true, Ordering::Release);
+                break false;
+            }
+            std::thread::park_timeout(left);
+        };
+        self.bells.remove(&bell);
+        is_written
+    }
+
+    /// From now on it rings where more is written, on the disk, or will not be. Rung by the journal thread.
+    pub fn wakes(&self, bell: &Bell) {
+        self.bells.add(bell);
+    }
+
+    pub(super) fn ring(&self) {
+        self.bells.ring();
     }
 
     /// How the journal is.

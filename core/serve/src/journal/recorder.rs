@@ -13,6 +13,8 @@ use super::{Begin, JournalError, Progress, Record};
 use crate::sequencer::{Sample, Timeline};
 use crate::time::{Duration, Instant};
 
+/// The journal thread is woken at the latest after so many records, so that what comes of a long pass need not wait for its end.
+const EARLY: u64 = 64;
 /// How long writing and syncing the rest may take.
 const ENDS: Wait = Wait::from_secs(3);
 
@@ -79,6 +81,8 @@ pub struct Recorder {
     has_gap: bool,
     /// How many failures of the disk have been noticed here.
     failures: u64,
+    /// How much was handed over since the journal thread was woken.
+    new: u64,
 }
 
 impl Recorder {
@@ -128,6 +132,7 @@ impl Recorder {
             frozen,
             has_gap: false,
             failures: 0,
+            new: 0,
         })
     }
 
@@ -149,14 +154,26 @@ impl Recorder {
             self.progress.lose(1);
         }
         self.event += 1;
+        self.new += 1;
+        if self.new >= EARLY {
+            self.wake();
+        }
         self.event
     }
 
-    /// Wakes the journal thread. After a tick, so that its outputs may leave.
-    pub fn wake(&self) {
-        if let Some(thread) = &self.thread {
+    /// Wakes the journal thread, where it has something to write. After a tick, so that its outputs may leave.
+    pub fn wake(&mut self) {
+        if std::mem::take(&mut self.new) > 0
+            && let Some(thread) = &self.thread
+        {
             thread.thread().unpark();
         }
+    }
+
+    /// How much was handed over since the journal thread was [woken](Self::wake).
+    #[must_use]
+    pub fn new_records(&self) -> u64 {
+        self.new
     }
 
     /// Ends a gap where that is possible: the journal goes on from where the log is now. Between two decisions.
@@ -199,7 +216,7 @@ impl Recorder {
                 return;
             }
         }
-        (self.has_gap, self.failures) = (false, failures);
+        (self.has_gap, self.failures, self.new) = (false, failures, 1);
         self.wake();
     }
 
@@ -245,6 +262,7 @@ impl Drop for Recorder {
         // The journal thread ends once the ring is abandoned and empty.
         let (queue, _) = RingBuffer::new(1);
         drop(std::mem::replace(&mut self.queue, queue));
+        self.new = 1;
         self.wake();
         // A disk that hangs does not keep the program from ending.
         let began = Clock::now();

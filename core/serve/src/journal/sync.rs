@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::thread::JoinHandle;
+use std::thread::{JoinHandle, Thread};
 
 /// What is to be synced: all of a file up to a place, which is all records below a number.
 #[derive(Debug, Clone, Copy)]
@@ -14,10 +14,13 @@ pub(super) struct Mark {
     pub(super) happenings: u64,
 }
 
+/// What is to be synced, and who waits for it.
+type Request = (File, Mark, Thread);
+
 /// The other end of the thread that syncs.
 #[derive(Debug)]
 pub(super) struct Syncer {
-    requests: Option<SyncSender<(File, Mark)>>,
+    requests: Option<SyncSender<Request>>,
     results: Receiver<(Mark, io::Result<()>)>,
     thread: Option<JoinHandle<()>>,
     is_busy: bool,
@@ -25,14 +28,15 @@ pub(super) struct Syncer {
 
 impl Syncer {
     pub(super) fn start() -> io::Result<Self> {
-        let (requests, todo) = sync_channel::<(File, Mark)>(1);
+        let (requests, todo) = sync_channel::<Request>(1);
         let (done, results) = sync_channel(1);
         let thread = std::thread::Builder::new().name("journal-sync".to_owned());
         let thread = thread.spawn(move || {
-            for (file, mark) in todo {
+            for (file, mark, asks) in todo {
                 if done.send((mark, file.sync_data())).is_err() {
                     return;
                 }
+                asks.unpark();
             }
         })?;
         Ok(Self {
@@ -43,13 +47,19 @@ impl Syncer {
         })
     }
 
-    /// Asks for a sync, unless one is under way.
+    /// Whether one is under way.
+    pub(super) fn is_busy(&self) -> bool {
+        self.is_busy
+    }
+
+    /// Asks for a sync, unless one is under way. This thread is woken by its end.
     pub(super) fn ask(&mut self, file: &File, mark: Mark) -> io::Result<bool> {
         if self.is_busy {
             return Ok(false);
         }
         let second = file.try_clone()?;
-        let sent = self.requests.as_ref().map(|of| of.try_send((second, mark)));
+        let request = (second, mark, std::thread::current());
+        let sent = self.requests.as_ref().map(|of| of.try_send(request));
         self.is_busy = matches!(sent, Some(Ok(())));
         Ok(self.is_busy)
     }

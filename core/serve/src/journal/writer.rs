@@ -19,8 +19,8 @@ use crate::time::Instant;
 
 /// How many bytes are written at once at most, so that a long queue is not kept back.
 const BATCH: usize = 256 << 10;
-/// How long the thread sleeps where nobody wakes it.
-const IDLE: Wait = Wait::from_millis(20);
+/// How long the thread sleeps at most where nothing is due and nobody wakes it.
+const IDLE: Wait = Wait::from_secs(10);
 static ZEROS: [u8; 64 << 10] = [0; 64 << 10];
 
 /// What prepares the folder.
@@ -95,6 +95,7 @@ impl Writer {
 
     /// Writes until the other end is gone and all of it has been written.
     pub(super) fn run(mut self) {
+        let mut is_woken = false;
         loop {
             let is_abandoned = self.messages.is_abandoned();
             let is_idle = self.take() == 0;
@@ -108,13 +109,30 @@ impl Writer {
             if is_idle && is_abandoned {
                 break;
             }
+            // Whose samples were written before may know so only now.
+            if !is_idle || is_woken {
+                self.progress.ring();
+            }
+            is_woken = is_idle;
             if is_idle {
-                std::thread::park_timeout(IDLE.min(self.options.sync));
+                std::thread::park_timeout(self.due());
             }
         }
         if let Err(error) = self.seal() {
             self.progress.fail(&error);
         }
+        self.progress.ring();
+    }
+
+    /// How long until something is due.
+    fn due(&self) -> Wait {
+        let left = |whole: Wait, since: Clock| whole.saturating_sub(since.elapsed());
+        let is_unsynced = |of: &Open| of.asked < self.begin.event;
+        let syncs = self.file.as_ref().is_some_and(is_unsynced) && !self.syncer.is_busy();
+        let sync = syncs.then(|| left(self.options.sync, self.asked));
+        let failed = self.progress.failed();
+        let retry = failed.then(|| left(self.options.retry, self.failed));
+        sync.into_iter().chain(retry).fold(IDLE, Wait::min)
     }
 
     /// Takes what has come, and encodes it. Returns how many messages there were.
@@ -183,6 +201,7 @@ impl Writer {
         let is_full = open.at >= self.options.file;
         self.progress.set_written(self.begin.event);
         if is_full {
+            self.progress.ring();
             self.seal()?;
             self.begin.after_failure = false;
             self.open_next()?;
@@ -202,7 +221,7 @@ impl Writer {
         let event = self.begin.event;
         if let Some(open) = &mut self.file
             && open.asked < event
-            && self.asked.elapsed() >= self.options.sync
+            && self.asked.elapsed() >= self.options.sync * 9 / 10
         {
             let mark = Mark {
                 file: open.number,

@@ -28,9 +28,10 @@ impl Service {
         &self.folder
     }
 
-    /// How often the engine thread has gone round: it lives for as long as this grows.
+    /// How often the engine thread has gone round: it lives for as long as this grows from one call to the next.
     #[must_use]
     pub fn beat(&self) -> u64 {
+        self.engine.thread().unpark();
         self.shared.beat.load(Ordering::Relaxed)
     }
 

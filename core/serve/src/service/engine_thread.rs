@@ -4,7 +4,6 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Sender;
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
@@ -13,6 +12,7 @@ use rtrb::{Consumer, Producer};
 use super::ServiceEvent;
 use super::frames::FrameSender;
 use super::status::{Shared, Snapshot};
+use crate::bell::{Bell, Mailbox};
 use crate::compile::Plan;
 use crate::connector::{Arrival, SourceLink};
 use crate::diagnostic::panic_text;
@@ -24,8 +24,10 @@ use crate::worker::{Output, Worker};
 
 /// How many arrivals of a source are taken before time is looked at again.
 const BATCH: usize = 256;
-/// The longest sleep, so that a beat shows that the thread lives.
-const NAP: Wait = Wait::from_millis(100);
+/// Where a tick is due so soon, samples go into the journal together with it.
+const SOON: Wait = Wait::from_millis(250);
+/// The longest sleep while the journal has a gap, which is to end soon.
+const GAP: Wait = Wait::from_millis(100);
 /// The longest sleep where sources are held back until the journal thread or the replica has caught up.
 const HOLD: Wait = Wait::from_millis(1);
 /// For how long the replica is waited for at most: the thread that has it may hang.
@@ -60,7 +62,9 @@ pub(super) struct EngineThread {
     pub(super) orders: Consumer<Order>,
     pub(super) remarks: Producer<Remark>,
     pub(super) shared: Arc<Shared>,
-    pub(super) events: Sender<ServiceEvent>,
+    pub(super) events: Mailbox<ServiceEvent>,
+    /// Of the control thread.
+    pub(super) control: Bell,
 }
 
 /// Where rows go.
@@ -102,6 +106,14 @@ impl Sinks {
         }
     }
 
+    /// No more will come.
+    fn end(&mut self) {
+        for SinkEnd { sender, thread, .. } in self.all.drain(..) {
+            drop(sender);
+            thread.unpark();
+        }
+    }
+
     /// Looks up where the columns stand among the outputs of a graph that has taken over.
     fn wire(&mut self, plan: &Plan) {
         for sink in &mut self.all {
@@ -121,9 +133,12 @@ impl EngineThread {
             Err(panic) => Some(panic_text(&*panic)),
         };
         if let Some(failure) = failure {
-            let _ = self.events.send(ServiceEvent::EngineFailed(failure));
+            self.events.send(ServiceEvent::EngineFailed(failure));
         }
         self.publish();
+        self.sinks.end();
+        self.shared.has_ended.store(true, Ordering::Release);
+        self.control.ring();
         self.worker
     }
 
@@ -134,6 +149,7 @@ impl EngineThread {
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
             let was_stopped = is_stopped;
+            let before = self.worker.recorder().happenings();
             while let Ok(order) = self.orders.pop() {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
@@ -167,12 +183,15 @@ impl EngineThread {
             if let Some((last, to)) = self.worker.went_back() {
                 let _ = self.remarks.push(Remark::WentBack(last, to));
             }
+            if self.worker.recorder().happenings() != before {
+                self.control.ring();
+            }
             let is_over = is_stopped || left == 0;
             let put = |output: &Output<'_>| sinks.put(output);
             if is_over && self.worker.finish_while(now, goes_on, put)? {
                 return Ok(());
             }
-            if now - published >= Shared::EVERY {
+            if now - published >= Shared::EVERY.0 {
                 published = now;
                 self.publish();
             }
@@ -181,14 +200,19 @@ impl EngineThread {
             }
             // What is due waits for the replica, and sources for what is due.
             let is_held = is_crowded || self.worker.is_crowded();
-            let longest = if is_held || is_full { HOLD } else { NAP };
+            let longest = match (is_held || is_full, self.worker.recorder().has_gap()) {
+                (true, _) => HOLD,
+                (false, true) => GAP,
+                (false, false) => until(published + Shared::EVERY.1, self.clock.now()),
+            };
             let due = self.worker.due().filter(|_| !is_held);
-            let nap = due.map_or(longest, |due| {
-                let ns = (due - self.clock.now()).as_ns();
-                Wait::from_nanos(ns.max(0) as u64).min(longest)
-            });
+            let now = self.clock.now();
+            let nap = due.map_or(longest, |due| until(due, now).min(longest));
             if !nap.is_zero() && !is_held {
                 self.worker.mirror_again();
+            }
+            if nap > SOON || is_held {
+                self.worker.rest();
             }
             if !nap.is_zero() {
                 std::thread::park_timeout(nap);
@@ -252,6 +276,7 @@ impl EngineThread {
             let leader = self.worker.sequencer().leader(admission, self.clock.now());
             let remark = Remark::NotAccepted(admission, count, leader);
             let _ = self.remarks.push(remark);
+            self.control.ring();
         }
     }
 
@@ -280,4 +305,9 @@ impl EngineThread {
             snapshot.happenings = self.worker.recorder().happenings();
         }
     }
+}
+
+/// How long until a moment.
+fn until(moment: Moment, now: Moment) -> Wait {
+    Wait::from_nanos((moment - now).as_ns().max(0) as u64)
 }

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::time::Duration as Wait;
 
 use super::Service;
+use crate::bell::Bell;
 
 /// How many may wait for the control thread.
 const WAITING: usize = 64;
@@ -14,7 +15,7 @@ pub(super) type Work = Box<dyn FnOnce(&mut Service) + Send>;
 /// Asks a running service, from any thread: what is handed over is done by the thread that owns the service, at its next
 /// [`pump`](Service::pump). What runs does not notice.
 #[derive(Debug, Clone)]
-pub struct ServiceHandle(SyncSender<Work>);
+pub struct ServiceHandle(SyncSender<Work>, Bell);
 
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +31,7 @@ pub enum NoAnswer {
 impl ServiceHandle {
     pub(super) fn new() -> (Self, Receiver<Work>) {
         let (queue, asked) = sync_channel(WAITING);
-        (Self(queue), asked)
+        (Self(queue, Bell::here()), asked)
     }
 
     /// Has something done to the service, and waits for what comes of it.
@@ -53,6 +54,7 @@ impl ServiceHandle {
                 TrySendError::Full(_) => NoAnswer::Busy,
                 TrySendError::Disconnected(_) => NoAnswer::Ended,
             })?;
+        self.1.ring();
         answer.recv_timeout(patience).map_err(|error| match error {
             RecvTimeoutError::Timeout => NoAnswer::TooLate,
             RecvTimeoutError::Disconnected => NoAnswer::Ended,

@@ -9,6 +9,7 @@
 
 mod asked;
 mod command;
+mod ending;
 mod engine_thread;
 mod error;
 mod event;
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, channel};
-use std::thread::{Builder, JoinHandle};
+use std::thread::{Builder, JoinHandle, Thread};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
@@ -40,6 +41,7 @@ use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::CommitError;
+pub use ending::Ended;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
@@ -48,6 +50,7 @@ pub use observer::Observer;
 pub use status::Snapshot;
 
 use crate::aside::{Aside, within};
+use crate::bell::{Bell, Mailbox};
 use crate::checkpoint::Checkpoints;
 use crate::companion::Beside;
 use crate::compile::Plan;
@@ -55,9 +58,7 @@ use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
 use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
-use crate::journal::{
-    FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
-};
+use crate::journal::{FeedNames, JournalOptions, Keep, Progress, Recorder, oldest, retire};
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
@@ -76,8 +77,6 @@ use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
-/// How long the threads may take to end.
-const ENDS: Wait = Wait::from_secs(5);
 
 /// How a service is run.
 #[derive(Debug, Clone)]
@@ -150,21 +149,10 @@ pub struct Service {
     /// How many rows were put out or made again when that was looked at, and since when there are as many.
     put: (u64, Clock),
     began: Clock,
-}
-
-/// What is left of a service that has ended.
-#[derive(Debug)]
-pub struct Ended {
-    /// What became of the samples of each channel.
-    pub channels: Vec<(String, crate::sequencer::Counts)>,
-    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
-    pub happenings: u64,
-    /// How many ticks were cut early because too many samples waited.
-    pub hurried: u64,
-    /// How the journal is.
-    pub journal: JournalStatus,
-    /// Whether the engine could not go on.
-    pub has_failed: bool,
+    /// The thread that started it, which is woken by what happens.
+    control: Thread,
+    /// When it last waited.
+    waited: Clock,
 }
 
 impl Service {
@@ -255,6 +243,7 @@ impl Service {
         let (to_engine, orders) = RingBuffer::new(64);
         let (remarks, from_engine) = RingBuffer::new(256);
         let (tell, events) = channel();
+        let tell = Mailbox::new(tell, &Bell::here());
         let shared = Arc::new(Shared::new(feed.len()));
         let (stop_sources, stop_sinks) = (Stop::default(), Stop::default());
         // Sinks first: nothing that comes is put out into nowhere.
@@ -264,7 +253,7 @@ impl Service {
         // The engine thread waits for the links of sources, which need to know it.
         let (hand_over, links) = channel();
         let engine_thread = {
-            let (shared, tell) = (Arc::clone(&shared), tell.clone());
+            let (shared, tell, control) = (Arc::clone(&shared), tell.clone(), Bell::here());
             spawn("engine", move || {
                 let sources = links.recv().unwrap_or_default();
                 let thread = EngineThread {
@@ -276,6 +265,7 @@ impl Service {
                     remarks,
                     shared,
                     events: tell,
+                    control,
                 };
                 thread.run()
             })?
@@ -325,6 +315,8 @@ impl Service {
             has_failed: false,
             put: (0, Clock::now()),
             began: Clock::now(),
+            control: std::thread::current(),
+            waited: Clock::now(),
         };
         service.own.extend(service.host.first());
         if differs {
@@ -352,7 +344,7 @@ impl Service {
         Ok((service, recovered.report))
     }
 
-    /// What happened since the last call. Call it ten times a second: it also takes checkpoints.
+    /// What happened since the last call. Call it ten times a second, or after [`wait`](Self::wait): it also takes checkpoints.
     pub fn pump(&mut self) -> Vec<ServiceEvent> {
         let mut events = std::mem::take(&mut self.own);
         let sinks = self.sinks.iter().map(|(_, of)| of);
@@ -439,21 +431,6 @@ impl Service {
         events
     }
 
-    /// Whether all sources have come to their ends and their rows are put out, the engine cannot go on, or the end was asked for. A
-    /// sink that does not get on is not waited for; it has its rows at the next start.
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        let is_put = || self.sink_threads.iter().all(JoinHandle::is_finished);
-        self.is_asked_to_end
-            || self.engine.is_finished() && (is_put() || self.put.1.elapsed() >= ENDS)
-    }
-
-    /// Asks for the end: whoever runs the service stops it.
-    pub fn ask_to_end(&mut self, by: &str) {
-        self.note(&format!("{by}: asked for the end"));
-        self.is_asked_to_end = true;
-    }
-
     /// Reports something that happened, as if it had happened here.
     pub fn report(&mut self, event: ServiceEvent) {
         self.own.push(event);
@@ -485,53 +462,6 @@ impl Service {
     /// Writes a remark into the journal.
     pub fn note(&mut self, text: &str) {
         self.order(Order::Note(text.into()));
-    }
-
-    /// Ends: what waits is stepped, rows are put out, the journal is synced, and a checkpoint is taken.
-    ///
-    /// # Errors
-    /// When the last checkpoint cannot be written. Everything is in the journal all the same.
-    pub fn stop(mut self) -> Result<(Ended, Vec<ServiceEvent>), ServiceError> {
-        // Whoever still asks is answered that it has ended.
-        drop(std::mem::replace(&mut self.asked, ServiceHandle::new().1));
-        self.companions.clear();
-        self.stop_sources.ask();
-        self.order(Order::Stop);
-        let mut events = Vec::new();
-        let began = Clock::now();
-        while !self.engine.is_finished() && began.elapsed() < ENDS {
-            events.extend(self.pump());
-            std::thread::sleep(Wait::from_millis(2));
-        }
-        // What came last, where the engine ended before anybody looked.
-        events.extend(self.pump());
-        let worker = self.engine.is_finished().then(|| self.engine.join());
-        let mut has_failed = self.has_failed;
-        if let Some(Ok(worker)) = worker {
-            worker.into_parts().2.finish();
-        } else {
-            has_failed = true;
-        }
-        let ended = |thread: &JoinHandle<()>| thread.is_finished();
-        while !self.sink_threads.iter().all(ended) && began.elapsed() < ENDS {
-            std::thread::sleep(Wait::from_millis(2));
-        }
-        self.stop_sinks.ask();
-        let snapshot = self.shared.read();
-        events.extend(self.events.try_iter());
-        let ended = Ended {
-            channels: self.channels.into_iter().zip(snapshot.counts).collect(),
-            happenings: snapshot.happenings,
-            hurried: snapshot.hurried,
-            journal: self.progress.status(),
-            has_failed,
-        };
-        if !has_failed {
-            self.keeper.finish()?;
-        }
-        // A source that does not stop does not keep the program from ending.
-        drop(self.source_threads);
-        Ok((ended, events))
     }
 
     fn order(&mut self, order: Order) {

@@ -7,7 +7,6 @@ use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Sender;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use super::ServiceEvent;
@@ -16,6 +15,7 @@ use super::frames::{FrameReceiver, SinkCounts};
 use super::position::{Position, PositionFile};
 use super::sinks::made_again;
 use crate::aside::Aside;
+use crate::bell::{Bell, Mailbox};
 use crate::connector::{ConnectorError, OutRow, Outlet, Place, Sink, SinkWiring, Stop};
 use crate::diagnostic::panic_message;
 use crate::folder::StatePaths;
@@ -29,6 +29,8 @@ const AGAIN: Wait = Wait::from_millis(500);
 /// How often the position of a log is kept, and that of a command, which goes on from there.
 const KEEP: (Wait, Wait) = (Wait::from_secs(5), Wait::from_secs(1));
 
+/// How often is looked whether what was taken can leave, where nothing comes.
+const LOOK: Wait = Wait::from_secs(2);
 /// How long the end waits for a disk that hangs.
 const ENDS: Wait = Wait::from_secs(2);
 
@@ -90,6 +92,8 @@ impl SinkThread {
             return;
         }
         let mut is_dirty = self.was.is_some();
+        let bell = Bell::here();
+        self.port.stop.wakes(&bell);
         self.go_on();
         while !self.port.stop.is_asked() {
             let is_taken = self.frames.take();
@@ -113,7 +117,7 @@ impl SinkThread {
                 return;
             }
             if is_idle {
-                std::thread::park_timeout(Wait::from_millis(100));
+                std::thread::park_timeout(LOOK);
             }
         }
     }
@@ -355,7 +359,7 @@ impl Port {
 #[derive(Debug)]
 pub(super) struct Health {
     pub(super) sink: String,
-    pub(super) events: Sender<ServiceEvent>,
+    pub(super) events: Mailbox<ServiceEvent>,
     pub(super) counts: Arc<SinkCounts>,
     /// Whether what it did last failed.
     pub(super) has_failed: bool,
@@ -386,7 +390,7 @@ impl Health {
         if let Ok(mut error) = self.counts.error.lock() {
             *error = words;
         }
-        let _ = self.events.send(event);
+        self.events.send(event);
     }
 }
 

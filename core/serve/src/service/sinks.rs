@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Sender;
 use std::thread::JoinHandle;
 use std::time::Instant as Clock;
 
@@ -13,6 +12,7 @@ use super::position::{Position, PositionFile};
 use super::sink_thread::{Health, Opening, Port, Shut, SinkThread};
 use super::{ServiceError, ServiceEvent, spawn};
 use crate::aside::Aside;
+use crate::bell::Mailbox;
 use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
 use crate::deployment::DeclaredSink;
 use crate::engine::Engine;
@@ -113,7 +113,7 @@ pub(super) fn start(
     sinks: Vec<OpenSink>,
     is_dry: bool,
     (folder, happenings): (&StatePaths, u64),
-    (progress, stop, events): (&Arc<Progress>, &Stop, &Sender<ServiceEvent>),
+    (progress, stop, events): (&Arc<Progress>, &Stop, &Mailbox<ServiceEvent>),
 ) -> Result<Running, ServiceError> {
     let (mut out, mut threads, mut counts) = (Sinks::default(), Vec::new(), Vec::new());
     for sink in sinks {
@@ -137,7 +137,7 @@ impl OpenSink {
         (folder, happenings): (&StatePaths, u64),
         progress: &Arc<Progress>,
         stop: &Stop,
-        events: &Sender<ServiceEvent>,
+        events: &Mailbox<ServiceEvent>,
     ) -> SinkThread {
         let is_command = self.outlet.is_some();
         let gate = is_command.then(|| {

@@ -2,10 +2,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Sender;
 use std::time::Instant as Clock;
 
 use super::ServiceEvent;
+use crate::bell::Mailbox;
 use crate::connector::{BackOff, ConnectorError, Inlet, Outflow, Stop};
 use crate::diagnostic::panic_message;
 use crate::time::Duration;
@@ -23,7 +23,7 @@ pub(super) struct SourceThread {
 
 impl SourceThread {
     /// Runs the source until it ends or is to stop.
-    pub(super) fn run(self, stop: &Stop, events: &Sender<ServiceEvent>) {
+    pub(super) fn run(self, stop: &Stop, events: &Mailbox<ServiceEvent>) {
         let Self {
             name,
             mut inlet,
@@ -50,7 +50,7 @@ impl SourceThread {
                 Ok(Ok(())) => {
                     if !stop.is_asked() {
                         let source = name.clone();
-                        let _ = events.send(ServiceEvent::SourceEnded { source });
+                        events.send(ServiceEvent::SourceEnded { source });
                     }
                     out.end();
                     return;
@@ -64,7 +64,7 @@ impl SourceThread {
             out.away();
             out.counts().restarts.fetch_add(1, Ordering::Relaxed);
             let again = back_off.after(began.elapsed());
-            let _ = events.send(ServiceEvent::SourceFailed {
+            events.send(ServiceEvent::SourceFailed {
                 source: name.clone(),
                 error,
                 again_s: again.as_secs_f64(),

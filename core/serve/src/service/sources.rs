@@ -11,6 +11,7 @@ use athermal_run::model::Model;
 use super::source_thread::SourceThread;
 use super::watch::Watch;
 use super::{ServiceError, wait};
+use crate::bell::{Bell, Mailbox};
 use crate::connector::{Remarks, SourceCounts, SourceLink, Stop, link};
 use crate::deployment::DeclaredSource;
 use crate::journal::Progress;
@@ -38,6 +39,7 @@ pub(super) fn open(
     (engine, progress): (&Thread, &Arc<Progress>),
 ) -> Result<OpenSources, ServiceError> {
     let (tell, heard) = channel();
+    let tell = Mailbox::new(tell, &Bell::here());
     let mut open = OpenSources {
         inlets: Vec::new(),
         links: Vec::new(),

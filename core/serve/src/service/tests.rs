@@ -10,6 +10,7 @@ use rtrb::RingBuffer;
 use super::engine_thread::{EngineThread, Sinks};
 use super::frames::{SinkCounts, frames};
 use super::status::Shared;
+use crate::bell::{Bell, Mailbox};
 use crate::connector::{Remarks, Stamps, WiredChannel, link};
 use crate::journal::{Begin, JournalOptions, Recorder};
 use crate::moment::MonotonicClock;
@@ -79,7 +80,7 @@ fn work(rows: usize) -> Work {
         (
             std::thread::current(),
             progress,
-            Remarks::new("it", &channel().0),
+            Remarks::new("it", &Mailbox::new(channel().0, &Bell::here())),
         ),
     );
     out.connected();
@@ -112,7 +113,8 @@ fn work(rows: usize) -> Work {
         orders,
         remarks,
         shared: Arc::clone(&shared),
-        events,
+        events: Mailbox::new(events, &Bell::here()),
+        control: Bell::here(),
     };
     // Somebody asks for its status all the time.
     let is_over = Arc::new(AtomicBool::new(false));

@@ -26,7 +26,12 @@ impl Watch {
         }
     }
 
-    /// Looks. Ten times a second is often enough.
+    /// How often it is to look.
+    pub(super) fn every(&self) -> Wait {
+        self.silent / 8
+    }
+
+    /// Looks; each [`every`](Self::every) is often enough.
     pub(super) fn look(&mut self, now: Clock) {
         let signs = self.counts.signs();
         if signs != self.seen.0 || !self.counts.is_connected() {

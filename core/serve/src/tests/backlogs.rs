@@ -111,7 +111,12 @@ fn caught_up(rows: i64, clock: bool) {
     let out = bench.out();
     assert!(
         out.keys().copied().eq(1..=ended.happenings as i64),
-        "each row once"
+        "each row once: {} of {}, {:?} to {:?}; {:?}",
+        out.len(),
+        ended.happenings,
+        out.keys().next(),
+        out.keys().next_back(),
+        ended
     );
     assert!(bench.check_replay() as i64 > rows);
 }
