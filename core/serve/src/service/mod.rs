@@ -16,6 +16,7 @@ mod frames;
 mod handle;
 mod host_clock;
 mod observer;
+mod options;
 mod position;
 mod replacing;
 mod sink_thread;
@@ -40,11 +41,13 @@ use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::CommitError;
+pub use asked::ChannelSamples;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
+pub use options::{Ended, ServiceOptions};
 pub use status::Snapshot;
 
 use crate::aside::{Aside, within};
@@ -55,14 +58,12 @@ use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
 use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
-use crate::journal::{
-    FeedNames, JournalOptions, JournalStatus, Keep, Progress, Recorder, oldest, retire,
-};
+use crate::journal::{FeedNames, JournalOptions, Keep, Progress, Recorder, oldest, retire};
 use crate::keeper::Keeper;
-use crate::moment::MonotonicClock;
+use crate::moment::{Moment, MonotonicClock};
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Leader, Sequencer};
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
@@ -78,35 +79,6 @@ use wiring::{fed, keep, outputs, rules};
 const RETIRE: Wait = Wait::from_secs(60);
 /// How long the threads may take to end.
 const ENDS: Wait = Wait::from_secs(5);
-
-/// How a service is run.
-#[derive(Debug, Clone)]
-pub struct ServiceOptions {
-    /// The state folder.
-    pub state: PathBuf,
-    /// Whether commands are not put out.
-    pub is_dry: bool,
-    /// Whether estimators learn nothing.
-    pub frozen: bool,
-    /// The machine file.
-    pub machine: PathBuf,
-    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
-    pub host_time: fn() -> Option<Instant>,
-}
-
-impl ServiceOptions {
-    /// A service that puts everything out and learns, with its state in a folder.
-    #[must_use]
-    pub fn new(state: PathBuf) -> Self {
-        Self {
-            state,
-            is_dry: false,
-            frozen: false,
-            machine: PathBuf::new(),
-            host_time: host::synchronised,
-        }
-    }
-}
 
 /// A service at work.
 pub struct Service {
@@ -150,21 +122,6 @@ pub struct Service {
     /// How many rows were put out or made again when that was looked at, and since when there are as many.
     put: (u64, Clock),
     began: Clock,
-}
-
-/// What is left of a service that has ended.
-#[derive(Debug)]
-pub struct Ended {
-    /// What became of the samples of each channel.
-    pub channels: Vec<(String, crate::sequencer::Counts)>,
-    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
-    pub happenings: u64,
-    /// How many ticks were cut early because too many samples waited.
-    pub hurried: u64,
-    /// How the journal is.
-    pub journal: JournalStatus,
-    /// Whether the engine could not go on.
-    pub has_failed: bool,
 }
 
 impl Service {
@@ -238,6 +195,7 @@ impl Service {
         let was_frozen = recovered.engine.frozen();
         let (stepper, mut control) = pair_from(recovered.engine, live)?;
         let observers = Observers::default();
+        control.watch(recovered.model.sample_ranges());
         let looking = observers.clone();
         control.look_on(move |at, engine| looking.tick(at, engine));
         let every = wait(runtime.checkpoint);
@@ -370,6 +328,7 @@ impl Service {
             Ok(notices) => events.extend(notices.into_iter().map(ServiceEvent::Swap)),
             Err(error) => events.push(ServiceEvent::NoCheckpoint(error)),
         }
+        events.extend(self.found());
         while let Ok(work) = self.asked.try_recv() {
             work(self);
         }
@@ -505,9 +464,15 @@ impl Service {
         }
         // What came last, where the engine ended before anybody looked.
         events.extend(self.pump());
+        self.keeper.control().end_watch();
+        let found: Vec<_> = self.found().collect();
+        self.observers.events(&found);
+        events.extend(found);
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
+        let mut snapshot = self.shared.read();
         if let Some(Ok(worker)) = worker {
+            worker.publish(&mut snapshot, Moment::START);
             worker.into_parts().2.finish();
         } else {
             has_failed = true;
@@ -517,10 +482,11 @@ impl Service {
             std::thread::sleep(Wait::from_millis(2));
         }
         self.stop_sinks.ask();
-        let snapshot = self.shared.read();
         events.extend(self.events.try_iter());
         let ended = Ended {
             channels: self.channels.into_iter().zip(snapshot.counts).collect(),
+            outside: snapshot.outside,
+            ticks: snapshot.ticks,
             happenings: snapshot.happenings,
             hurried: snapshot.hurried,
             journal: self.progress.status(),
@@ -532,6 +498,11 @@ impl Service {
         // A source that does not stop does not keep the program from ending.
         drop(self.source_threads);
         Ok((ended, events))
+    }
+
+    fn found(&mut self) -> impl Iterator<Item = ServiceEvent> {
+        let found = self.keeper.control().found().into_iter();
+        found.map(|(at, finding)| ServiceEvent::Found(at, finding))
     }
 
     fn order(&mut self, order: Order) {
