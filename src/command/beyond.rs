@@ -8,12 +8,7 @@ use serde_json::json;
 use crate::message::Message;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::apart;
-
-/// So many widths beyond, another unit is more likely than another day.
-const ANOTHER_UNIT: f64 = 10.0;
-
-/// The event for samples outside of those of the fit.
-const OUTSIDE: &str = "outside_fit";
+use athermal_command::findings::{OUTSIDE_FIT, doubt};
 
 /// A channel whose samples lie far outside of what a fit saw.
 #[derive(Debug, Serialize)]
@@ -44,7 +39,6 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 }
 
 /// Warns of them.
-/// Warns of them.
 pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
     for of in all {
         let all = [of.lowest, of.highest, of.lowest_in_fit, of.highest_in_fit];
@@ -53,35 +47,6 @@ pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
             "{} is between {lowest} and {highest}, and was between {lowest_in_fit} and {highest_in_fit} in the data of the fit: {}",
             of.channel, of.doubt
         );
-        terminal.warning(Message::new(OUTSIDE, json!(of), words));
-    }
-}
-
-/// Warns of the first such sample of a channel.
-pub fn warn_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
-    if let Some(doubt) = doubt(usual, sample, sample) {
-        let [found, lowest, highest] = apart([sample, usual.lowest, usual.highest]);
-        let words = format!(
-            "{} at {time}: {found}, and was between {lowest} and {highest} in the data of the fit: {doubt}",
-            usual.channel
-        );
-        let facts = json!({
-            "channel": usual.channel,
-            "time": time,
-            "value": sample,
-            "lowest_in_fit": usual.lowest,
-            "highest_in_fit": usual.highest,
-        });
-        terminal.warning(Message::new(OUTSIDE, facts, words));
-    }
-}
-
-/// What to think of samples that lie far outside; none where they do not.
-fn doubt(usual: &SampleRange, lowest: f64, highest: f64) -> Option<&'static str> {
-    if usual.exceeded_by(lowest, highest) > ANOTHER_UNIT {
-        Some("is it in the unit of the fit? The fit learned nothing of values so far outside")
-    } else {
-        let far = usual.is_far_from(lowest, highest);
-        far.then_some("the fit learned nothing of values so far outside")
+        terminal.warning(Message::new(OUTSIDE_FIT, json!(of), words));
     }
 }

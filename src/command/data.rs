@@ -22,6 +22,7 @@ use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
+use athermal_command::findings;
 use athermal_fleet::RowsId;
 use athermal_fleet::job::Times;
 
@@ -425,9 +426,6 @@ pub fn warn_of(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Re
     }
 }
 
-/// The event for samples that do not count.
-pub const REJECTED: &str = "rejected_samples";
-
 /// The warnings about data, but for dates without a zone.
 #[must_use]
 pub fn doubts(
@@ -448,19 +446,8 @@ pub fn doubts(
         messages.push(Message::new(refused::ROWS, facts, words));
     }
     let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
-    messages.extend(rejected.iter().map(|(channel, n)| {
-        let samples = counted(*n, "sample");
-        let words = match *n {
-            most if 2 * most > rows && most > 1 => format!(
-                "{channel}: {}{samples} are infinite or out of range, taken as missing; is its unit that of the log?",
-                if most == rows { "all " } else { "" }
-            ),
-            1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
-            _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
-        };
-        let facts = json!({ "channel": channel, "samples": n });
-        Message::new(REJECTED, facts, words)
-    }));
+    let rejected = rejected.iter();
+    messages.extend(rejected.map(|(channel, n)| findings::rejected(channel, *n, rows)));
     messages
 }
 

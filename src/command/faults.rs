@@ -1,6 +1,6 @@
 //! Warnings about faulty sensors.
 
-pub use athermal::diagnosis::watch::{ChannelFaults, ChannelWatch, FaultWatch, Purpose, facts};
+pub use athermal::diagnosis::watch::{ChannelFaults, ChannelWatch, FaultWatch, Purpose};
 
 use athermal::diagnosis::leap::Leaps;
 use athermal::run::live::monitor::silence::Silence;
@@ -9,8 +9,8 @@ use serde_json::Value;
 use crate::message::Message;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{apart, count, counted, exact, instant};
+use athermal_command::findings::of_standstill;
 
-/// Warns of them.
 /// Warns of them.
 pub fn warn(terminal: &Terminal, all: &[ChannelFaults]) {
     for message in messages(all) {
@@ -108,21 +108,4 @@ fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
         "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {lowest} and {highest}",
         faulty.channel.split('.').next().unwrap_or_default()
     )
-}
-
-/// What to think of a standstill.
-pub fn of_standstill(of_truth: bool, purpose: Purpose) -> &'static str {
-    match (of_truth, purpose) {
-        (true, Purpose::Fit) => {
-            "is its measurement stuck? That is learned as no drift: leave these rows out"
-        }
-        (true, Purpose::Scores) => "is its measurement stuck? That counts as no drift",
-        (true, Purpose::Run) => "is its measurement stuck? That is taken for no drift",
-        (false, Purpose::Fit) => {
-            "is the sensor stuck? That is learned too: leave these rows out, or have a `health` node take them out"
-        }
-        (false, Purpose::Scores | Purpose::Run) => {
-            "is the sensor stuck? Predictions from that mean little; a `health` node takes such samples out"
-        }
-    }
 }

@@ -9,10 +9,10 @@ use athermal::serve::recovery::Recovered;
 use clap::Args;
 use serde_json::json;
 
-use super::serve::events::damaged;
+use super::serve::events::{damaged, steps};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Terminal};
-use athermal_analysis::figures::{counted, instant, seconds};
+use athermal_analysis::figures::{instant, seconds};
 
 /// Step the journal of a service again, to the same bits
 ///
@@ -59,16 +59,16 @@ impl Replay {
             writer.finish()?;
         }
         damaged(terminal, &found.report);
-        let (ticks, differs) = (found.report.stepped, found.report.difference);
+        let (steps, differs) = (steps(&found.report), found.report.difference);
         let facts = json!({
-            "ticks": ticks,
+            "ticks": found.report.stepped - found.report.beats,
+            "beats": found.report.beats,
             "first_difference_s": differs.map(|of| seconds(of.at)),
         });
         let words = match differs {
-            None => format!("{} stepped again, to the same bits", counted(ticks, "tick")),
+            None => format!("{steps} stepped again, to the same bits"),
             Some(of) => format!(
-                "{} stepped again; the first that differs is at {}",
-                counted(ticks, "tick"),
+                "{steps} stepped again; the first that differs is at {}",
                 instant(seconds(of.at))
             ),
         };

@@ -49,6 +49,8 @@ mod report;
 mod report_graphs;
 mod report_novelty;
 mod restarted_pipes;
+#[cfg(unix)]
+mod same_warnings;
 mod schema;
 mod services;
 mod several_loggers;

@@ -27,6 +27,7 @@
 //! ```
 
 pub mod collect;
+pub mod findings;
 pub mod message;
 pub mod numbers;
 #[macro_use]

@@ -89,6 +89,14 @@ impl Terminal {
         self.write("warning", Some("\x1b[1;33m"), &message.into());
     }
 
+    /// Warns of a fault, and notes what is none.
+    pub fn report(&self, (is_fault, message): (bool, Message)) {
+        match is_fault {
+            true => self.warning(message),
+            false => self.note(message),
+        }
+    }
+
     /// Shows a report that was collected.
     pub fn pass_on(&self, report: &Collected) {
         match report.level {

@@ -47,6 +47,7 @@ pub mod host;
 pub mod journal;
 pub mod keeper;
 pub mod moment;
+mod outside;
 pub mod recovery;
 pub mod replay;
 pub mod sequencer;

@@ -42,6 +42,8 @@ pub struct RecoveryReport {
     pub refused: Vec<CheckpointError>,
     /// How many ticks and beats were stepped again.
     pub stepped: u64,
+    /// How many of those were beats.
+    pub beats: u64,
     /// The damaged end of the journal, which has been cut off.
     pub torn: Option<Torn>,
     /// What was never written.
@@ -298,7 +300,7 @@ impl Recovered {
             };
         report.ahead = from.saturating_sub(seen);
         report.torn = log.torn().cloned();
-        report.stepped = replay.stepped();
+        (report.stepped, report.beats) = (replay.stepped(), replay.beats());
         report.difference = replay.difference();
         let engine = replay.engine();
         let feed = feed(engine.plan());

@@ -18,6 +18,7 @@ pub struct Replay {
     timeline: Timeline,
     feed: FeedNames,
     stepped: u64,
+    beats: u64,
     difference: Option<Difference>,
 }
 
@@ -77,6 +78,7 @@ impl Replay {
             timeline: begin.timeline(),
             feed: begin.feed.clone(),
             stepped: 0,
+            beats: 0,
             difference: None,
         }
     }
@@ -112,6 +114,7 @@ impl Replay {
                     self.difference = Some(Difference { event, at: *at });
                 }
                 self.stepped += 1;
+                self.beats += u64::from(matches!(record, Record::Beat { .. }));
                 return Ok(true);
             }
             Record::Break { .. } => self.all().for_each(|fed| fed.engine.segment()),
@@ -132,6 +135,12 @@ impl Replay {
     #[must_use]
     pub fn stepped(&self) -> u64 {
         self.stepped
+    }
+
+    /// How many of those were beats.
+    #[must_use]
+    pub fn beats(&self) -> u64 {
+        self.beats
     }
 
     /// The engine.

@@ -5,7 +5,9 @@ use athermal_run::live::{Stepped, Stepper};
 use crate::engine::EngineError;
 use crate::journal::{Record, Recorder, output_hash};
 use crate::moment::Moment;
+use crate::outside::Outside;
 use crate::sequencer::{Admission, Decision, Sample, Sequencer};
+use crate::service::Snapshot;
 use crate::time::{Duration, Instant};
 
 /// So many records are worth waking the journal thread for, without a tick.
@@ -20,6 +22,9 @@ pub struct Worker {
     generation: u64,
     /// The last tick and a stamp, where another segment began because the tick was of the future.
     went_back: Option<(Instant, Instant)>,
+    outside: Outside,
+    ticks: u64,
+    beats: u64,
 }
 
 /// What came of a tick.
@@ -46,11 +51,14 @@ impl Worker {
     #[must_use]
     pub fn new(sequencer: Sequencer, stepper: Stepper, recorder: Recorder) -> Self {
         Self {
+            outside: Outside::new(stepper.feed(), stepper.engine().plan()),
             sequencer,
             stepper,
             recorder,
             generation: 0,
             went_back: None,
+            ticks: 0,
+            beats: 0,
         }
     }
 
@@ -183,6 +191,21 @@ impl Worker {
         self.stepper.is_crowded()
     }
 
+    /// Writes down what is known now.
+    pub fn publish(&self, snapshot: &mut Snapshot, now: Moment) {
+        let (sequencer, timeline) = (&self.sequencer, self.sequencer.timeline());
+        snapshot.counts.clone_from_slice(sequencer.counts());
+        snapshot.stamps.copy_from_slice(timeline.stamps());
+        snapshot.outside.copy_from_slice(self.outside.counts());
+        snapshot.hurried = sequencer.hurried();
+        snapshot.waiting = timeline.waiting().len();
+        snapshot.last = timeline.last();
+        snapshot.newest = sequencer.newest(now);
+        snapshot.is_synchronised = sequencer.is_synchronised();
+        snapshot.happenings = self.recorder.happenings();
+        (snapshot.ticks, snapshot.beats) = (self.ticks, self.beats);
+    }
+
     /// What is left when the work ends.
     #[must_use]
     pub fn into_parts(self) -> (Sequencer, Stepper, Recorder) {
@@ -236,10 +259,17 @@ impl Worker {
         let stepped = self.stepper.step(at, row)?;
         if stepped.generation != self.generation {
             self.generation = stepped.generation;
+            self.outside.follow(stepped.plan);
             if let Ok(revision) = u64::from_str_radix(stepped.revision, 16) {
                 self.recorder.record(Record::Swap { revision });
             }
         }
+        self.outside.look(row);
+        *if is_beat {
+            &mut self.beats
+        } else {
+            &mut self.ticks
+        } += 1;
         let hash = output_hash(stepped.outputs);
         let records = self.recorder.record(if is_beat {
             Record::Beat { at, hash }

@@ -4,8 +4,12 @@ use std::io::Read;
 use std::path::Path;
 
 use athermal_core::time::Instant;
-use athermal_files::{ChannelColumn, FileError, Format, Layout, Options, Reader, Row, TimeColumn};
-use athermal_serve::connector::{ConnectorError, Outflow, SourceWiring, Stop, WiredChannel};
+use athermal_files::{
+    ChannelColumn, FileError, Format, Layout, Options, Reader, Report, Row, TimeColumn,
+};
+use athermal_serve::connector::{
+    ConnectorError, LeftOut, Outflow, SourceWiring, Stop, WiredChannel,
+};
 
 /// What is read of a table: the columns that the channels have there.
 pub(crate) fn layout(wiring: &SourceWiring) -> Layout {
@@ -64,7 +68,13 @@ pub(crate) fn pass(
     mut before: impl FnMut(Instant) -> bool,
 ) -> Result<Option<Instant>, ConnectorError> {
     let (mut row, mut last) = (Row::default(), None);
-    while reader.next_into(&mut row).map_err(ConnectorError::new)? {
+    let mut counted = Counted::default();
+    loop {
+        let is_row = reader.next_into(&mut row);
+        counted.count(reader.report(), out);
+        if !is_row.map_err(ConnectorError::new)? {
+            break;
+        }
         if row.begins_segment {
             out.segment();
         }
@@ -75,6 +85,39 @@ pub(crate) fn pass(
         last = Some(at);
     }
     Ok(last)
+}
+
+/// What a reader left out, as far as it has been counted.
+#[derive(Default)]
+struct Counted {
+    /// Rows and cells.
+    all: u64,
+    rows: [u64; 3],
+    cells: Vec<u64>,
+}
+
+impl Counted {
+    fn count(&mut self, report: &Report, out: &Outflow) {
+        let rows = [
+            (&report.refused_rows, LeftOut::Unreadable),
+            (&report.refused_time, LeftOut::OutOfOrder),
+            (&report.repeated_time, LeftOut::Repeated),
+        ];
+        let all = report.bad_cells.count + rows.iter().map(|(of, _)| of.count).sum::<u64>();
+        if std::mem::replace(&mut self.all, all) == all {
+            return;
+        }
+        for (known, (of, reason)) in self.rows.iter_mut().zip(rows) {
+            let new = of.count - std::mem::replace(known, of.count);
+            out.left_out(None, reason, new);
+        }
+        self.cells.resize(report.bad_cells_of.len(), 0);
+        let cells = self.cells.iter_mut().zip(&report.bad_cells_of);
+        for (channel, (known, of)) in cells.enumerate() {
+            let new = of.count - std::mem::replace(known, of.count);
+            out.left_out(Some(channel), LeftOut::NoNumber, new);
+        }
+    }
 }
 
 /// A path as a machine file gives it, from the folder of that file.

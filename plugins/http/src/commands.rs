@@ -260,7 +260,7 @@ orders! {
     Thaw "thaw" "/v1/thaw" |_| "learning goes on before the next tick".to_owned();
     /// Let a running service take a checkpoint
     Snapshot "snapshot" "/v1/snapshot"
-        |done| format!("a checkpoint after {} ticks, saved once the journal is on the disk", done["happenings"]);
+        |done| format!("a checkpoint after {} ticks, beats, breaks and freezes, saved once the journal is on the disk", done["happenings"]);
     /// End a running service: what waits is stepped, and everything is kept
     Stop "stop" "/v1/stop" |_| "the service ends".to_owned();
 }

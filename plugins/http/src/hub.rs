@@ -62,7 +62,6 @@ struct Inner {
 /// What is counted, and what happened last.
 #[derive(Default, Clone)]
 pub struct Known {
-    pub ticks: u64,
     pub swaps: u64,
     pub missed: u64,
     pub source_failures: u64,
@@ -137,7 +136,6 @@ pub struct Looker(pub Arc<Hub>, pub Vec<String>);
 
 impl Observer for Looker {
     fn event(&mut self, event: &ServiceEvent) {
-        let (_, message) = described(event, &self.1);
         let mut inner = self.0.inner();
         let known = &mut inner.known;
         match event {
@@ -151,19 +149,21 @@ impl Observer for Looker {
         }
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let at_s = now.map_or(0.0, |of| of.as_secs_f64());
-        let (name, facts, words) = (message.name(), message.facts(), message.to_string());
-        let event = json!({ "event": name, "host_time_s": at_s, "message": words, "facts": facts });
-        if known.recent.len() == RECENT {
-            known.recent.pop_front();
+        for (_, message) in described(event, &self.1, false) {
+            let (name, facts, words) = (message.name(), message.facts(), message.to_string());
+            let event =
+                json!({ "event": name, "host_time_s": at_s, "message": words, "facts": facts });
+            if inner.known.recent.len() == RECENT {
+                inner.known.recent.pop_front();
+            }
+            inner.known.recent.push_back(event.clone());
+            inner.send(|| Item::Event(event));
         }
-        known.recent.push_back(event.clone());
-        inner.send(|| Item::Event(event));
     }
 
     fn tick(&mut self, at: Instant, engine: &Engine) {
         let mut inner = self.0.inner();
         let known = &mut inner.known;
-        known.ticks += 1;
         known.errors.look(at, engine);
         look_at_novelty(&mut known.novelty, engine);
         inner.send(|| {

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
 
 use athermal_core::engine::Engine;
-use athermal_serve::service::Service;
+use athermal_serve::connector::LeftOut;
+use athermal_serve::service::{ChannelSamples, Service};
 
 use crate::hub::Known;
 use crate::status::{age_s, behind_s};
@@ -83,6 +84,7 @@ pub fn text(
     ticks(&mut page, service, known);
     channels(&mut page, service);
     connectors(&mut page, service);
+    watched(&mut page, service);
     predictions(&mut page, known);
     kept(&mut page, service, known);
     model(&mut page, service, known, created);
@@ -113,8 +115,18 @@ fn ticks(page: &mut Page, service: &Service, known: &Known) {
     );
     page.counter(
         "athermal_ticks_total",
-        "Ticks since the service started.",
-        known.ticks,
+        "Ticks that samples made since the service started.",
+        snapshot.ticks,
+    );
+    page.counter(
+        "athermal_beats_total",
+        "Ticks that time alone made since the service started.",
+        snapshot.beats,
+    );
+    page.gauge(
+        "athermal_undecided_samples",
+        "Samples that are far ahead, and wait until it is known what time it is.",
+        Some(snapshot.waiting as f64),
     );
     page.counter(
         "athermal_missed_ticks_total",
@@ -139,39 +151,92 @@ fn ticks(page: &mut Page, service: &Service, known: &Known) {
 }
 
 fn channels(page: &mut Page, service: &Service) {
-    let snapshot = service.snapshot();
-    let names = || service.channels().iter().map(String::as_str);
-    let accepted = names().zip(&snapshot.counts);
+    let (newest, all) = (service.snapshot().newest, service.samples());
+    fn labels(of: &ChannelSamples) -> Vec<(&'static str, &str)> {
+        let source = of.source.as_deref().map(|name| ("source", name));
+        source
+            .into_iter()
+            .chain([("channel", &*of.channel)])
+            .collect()
+    }
     page.family(
         "athermal_samples_total",
         "counter",
         "Samples that were accepted.",
-        accepted.map(|(name, of)| (vec![("channel", name)], Some(of.accepted as f64))),
+        all.iter().map(|of| (labels(of), Some(of.accepted as f64))),
     );
-    let left_out = names().zip(&snapshot.counts).flat_map(|(name, of)| {
-        let reasons = [
-            ("late", of.late),
-            ("repeated", of.twice),
-            ("future", of.future),
-            ("clock", of.clock),
-        ];
-        reasons.map(|(reason, count)| {
-            let labels = vec![("channel", name), ("reason", reason)];
+    let left_out = all.iter().flat_map(|of| {
+        of.left_out.map(|(reason, count)| {
+            let mut labels = labels(of);
+            labels.push(("reason", reason.name()));
+            (labels, Some(count as f64))
+        })
+    });
+    let unknown = service.sources().iter().flat_map(|(name, of)| {
+        let counts = LeftOut::ALL.map(|reason| (reason, of.left_out.of(None, reason)));
+        let some = counts.into_iter().filter(|(_, count)| *count > 0);
+        some.map(|(reason, count)| {
+            let labels = vec![("source", name.as_str()), ("reason", reason.name())];
             (labels, Some(count as f64))
         })
     });
     page.family(
         "athermal_dropped_samples_total",
         "counter",
-        "Samples that were left out, by reason.",
-        left_out,
+        "Samples that were left out, by reason; without a channel where none is known. What is out_of_range was accepted, and is absent.",
+        left_out.chain(unknown),
     );
-    let ages = names().zip(&snapshot.stamps);
     page.family(
         "athermal_channel_age_seconds",
         "gauge",
         "How old the newest sample is that was stepped.",
-        ages.map(|(name, stamp)| (vec![("channel", name)], age_s(snapshot.newest, *stamp))),
+        all.iter().map(|of| (labels(of), age_s(newest, of.stamp))),
+    );
+}
+
+/// What monitors have found, as a run reports it.
+fn watched(page: &mut Page, service: &Service) {
+    let Some(watch) = service.watched() else {
+        return;
+    };
+    page.family(
+        "athermal_warnings_total",
+        "counter",
+        "Warnings about the data and the graph, as the log has them.",
+        watch.warnings().map(|(kind, channel, count)| {
+            let channel = channel.map(|name| ("channel", name));
+            let labels = [("kind", kind)].into_iter().chain(channel).collect();
+            (labels, Some(count as f64))
+        }),
+    );
+    page.family(
+        "athermal_sensor_fault",
+        "gauge",
+        "1 while a sensor is stuck or silent.",
+        watch.faults().map(|(channel, fault)| {
+            let labels = vec![("channel", channel), ("fault", fault.kind())];
+            (labels, Some(1.0))
+        }),
+    );
+    page.family(
+        "athermal_outside_fit_samples_total",
+        "counter",
+        "Samples far outside of those of the fit.",
+        watch.outside_fit().map(|of| {
+            let labels = vec![("channel", of.usual.channel.as_str())];
+            (labels, Some(of.samples as f64))
+        }),
+    );
+    let none = service.running().map(|of| watch.no_output(of).is_some());
+    page.gauge(
+        "athermal_no_output",
+        "1 while there were ticks and no output has had a value.",
+        none.map(|of| f64::from(u8::from(of))),
+    );
+    page.gauge(
+        "athermal_fed_back_channels",
+        "Channels that the correction moves and goes by.",
+        Some(watch.fed_back().len() as f64),
     );
 }
 
@@ -256,6 +321,22 @@ fn connectors(page: &mut Page, service: &Service) {
         "counter",
         "Commands that were not sent because they were too old.",
         |of: &Sink| of.behind.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_superseded_commands_total",
+        "counter",
+        "Commands that were not sent because a newer one was due at the same time.",
+        |of: &Sink| of.superseded.load(Ordering::Relaxed)
+    );
+    each!(
+        sinks,
+        "sink",
+        "athermal_sink_spooled_rows",
+        "gauge",
+        "Rows of a log that the journal has and that have not left.",
+        |of: &Sink| of.spooled()
     );
     each!(
         sinks,

@@ -3,6 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use athermal_analysis::figures::{apart, instant};
+use athermal_run::live::monitor::feedback;
+use athermal_serve::connector::LeftOut;
 use serde_json::Value;
 
 fn text(value: &Value) -> String {
@@ -30,12 +33,23 @@ pub fn status(of: &Value) -> String {
     );
     let _ = writeln!(
         all,
-        "{} ticks since the start, the last one {} behind; checkpoint after {} of {}",
+        "{} ticks{} since the start, the last one {} behind; checkpoint after {} of {} ticks, beats, breaks and freezes",
         of["ticks"],
+        match of["beats"].as_u64() {
+            None | Some(0) => String::new(),
+            Some(beats) => format!(" and {beats} beats"),
+        },
         seconds(&of["behind_s"]),
         of["last_checkpoint"],
         of["happenings"]
     );
+    if of["undecided"] != 0 {
+        let _ = writeln!(
+            all,
+            "{} samples are far ahead, and wait until it is known what time it is",
+            of["undecided"]
+        );
+    }
     if of["frozen"] == true {
         all += "learning is frozen\n";
     }
@@ -76,13 +90,15 @@ pub fn status(of: &Value) -> String {
         let _ = writeln!(all, "given up: {}", text(panic));
     }
     for source in of["sources"].as_array().into_iter().flatten() {
+        let left_out = source["left_out"].as_object().into_iter().flatten();
+        let left_out = counts(left_out.map(|(why, count)| (why.as_str(), count)));
         let _ = writeln!(
             all,
-            "source {}: {}, {} samples, {} wait, {} dropped, {} restarts",
+            "source {}: {}, {} samples, {} wait, {} dropped, {} restarts{left_out}",
             text(&source["source"]),
-            match source["connected"] == true {
-                true => "connected",
-                false => "away",
+            match source["connection"].as_str() {
+                Some("never") => "never connected",
+                other => other.unwrap_or("away"),
             },
             source["given"],
             source["waiting"],
@@ -93,12 +109,14 @@ pub fn status(of: &Value) -> String {
     for sink in of["sinks"].as_array().into_iter().flatten() {
         let _ = writeln!(
             all,
-            "sink {}: {} rows, {} wait, {} dropped, {} too old, {} failures",
+            "sink {}: {} rows, {} wait, {} in the spool, {} dropped, {} too old, {} superseded, {} failures",
             text(&sink["sink"]),
             sink["put"],
             sink["waiting"],
+            sink["spooled"],
             sink["dropped"],
             sink["behind"],
+            sink["superseded"],
             sink["failures"]
         );
         if let Some(error) = sink["error"].as_str() {
@@ -106,28 +124,70 @@ pub fn status(of: &Value) -> String {
         }
     }
     for channel in of["channels"].as_array().into_iter().flatten() {
-        let left_out = ["late", "repeated", "future", "clock"];
-        let left_out = left_out.iter().filter(|why| channel[**why] != 0);
-        let left_out: Vec<_> = left_out
-            .map(|why| format!("{} {why}", channel[*why]))
-            .collect();
-        let _ = write!(
+        let reasons = LeftOut::ALL.map(LeftOut::name);
+        let _ = writeln!(
             all,
-            "{}: {} samples, age {}",
+            "{} of {}: {} samples, age {}{}",
             text(&channel["channel"]),
+            text(&channel["source"]),
             channel["accepted"],
-            seconds(&channel["age_s"])
+            seconds(&channel["age_s"]),
+            counts(reasons.into_iter().map(|why| (why, &channel[why])))
         );
-        match left_out.is_empty() {
-            true => all += "\n",
-            false => _ = writeln!(all, ", left out {}", left_out.join(", ")),
-        }
     }
+    watched(&of["watched"], &mut all);
     let events = of["events"].as_array().into_iter().flatten();
     for event in events.rev().take(5) {
         let _ = writeln!(all, "lately: {}", text(&event["message"]));
     }
     all
+}
+
+/// What was left out, by reason; nothing where nothing was.
+fn counts<'a>(all: impl Iterator<Item = (&'a str, &'a Value)>) -> String {
+    let some = all.filter(|(_, count)| count.as_u64() > Some(0));
+    let some: Vec<_> = some
+        .map(|(why, count)| format!("{count} {}", why.replace('_', " ")))
+        .collect();
+    match some.is_empty() {
+        true => String::new(),
+        false => format!(", left out {}", some.join(", ")),
+    }
+}
+
+/// What monitors have found.
+fn watched(of: &Value, all: &mut String) {
+    for fault in of["faults"].as_array().into_iter().flatten() {
+        let what = match fault["value"].as_f64() {
+            Some(value) => format!("stuck at {value}"),
+            None => "no sample".to_owned(),
+        };
+        let since = instant(fault["since_s"].as_f64().unwrap_or(f64::NAN));
+        let _ = writeln!(all, "{}: {what} since {since}", text(&fault["channel"]));
+    }
+    for outside in of["outside_fit"].as_array().into_iter().flatten() {
+        let keys = ["lowest", "highest", "lowest_in_fit", "highest_in_fit"];
+        let values = keys.map(|key| outside[key].as_f64().unwrap_or(f64::NAN));
+        let [lowest, highest, lowest_in_fit, highest_in_fit] = apart(values);
+        let _ = writeln!(
+            all,
+            "{}: {} samples far outside of the fit, {lowest} to {highest}; there {lowest_in_fit} to {highest_in_fit}",
+            text(&outside["channel"]),
+            outside["samples"]
+        );
+    }
+    if let Some(node) = of["no_output"]["first_silent"].as_str() {
+        let _ = writeln!(
+            all,
+            "no output has had a value in {} ticks and beats; the first to lack one is {node}",
+            of["no_output"]["ticks"]
+        );
+    }
+    let fed_back = of["feeds_back"].as_array().map_or(&[][..], Vec::as_slice);
+    let fed_back: Vec<_> = fed_back.iter().map(text).collect();
+    if let Some(words) = feedback::words(&fed_back) {
+        let _ = writeln!(all, "{words}");
+    }
 }
 
 /// A tick or an event of a stream, on a line.

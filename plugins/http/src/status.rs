@@ -4,8 +4,10 @@ use std::sync::atomic::Ordering;
 
 use athermal_core::engine::Engine;
 use athermal_core::time::Instant;
-use athermal_serve::service::Service;
-use serde_json::{Value, json};
+use athermal_run::live::monitor::{OutsideFit, SensorFault};
+use athermal_serve::connector::{Connection, LeftOut, LeftOutCounts};
+use athermal_serve::service::{ChannelSamples, Service};
+use serde_json::{Map, Value, json};
 
 use crate::hub::Known;
 
@@ -19,7 +21,8 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
         .iter()
         .map(ToString::to_string)
         .collect();
-    let is_degraded = journal.is_degraded || !panics.is_empty() || running.is_none();
+    let is_whole = service.lacking().is_empty() && panics.is_empty() && running.is_some();
+    let is_degraded = journal.is_degraded || !is_whole;
     let state = if is_degraded { "degraded" } else { "running" };
     let staged = service
         .staged()
@@ -35,7 +38,9 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
         "verdict": service.verdict(),
         "frozen": running.map(Engine::frozen),
         "happenings": snapshot.happenings,
-        "ticks": known.ticks,
+        "ticks": snapshot.ticks,
+        "beats": snapshot.beats,
+        "undecided": snapshot.waiting,
         "last_s": time(Some(snapshot.last)),
         "behind_s": behind_s(snapshot.newest, snapshot.last),
         "hurried": snapshot.hurried,
@@ -52,29 +57,64 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
         },
         "sources": sources(service),
         "sinks": sinks(service),
+        "watched": watched(service),
         "given_up": panics,
         "events": known.recent,
     })
 }
 
-/// The channels: what became of their samples, and how old the newest one is.
+/// The channels: what became of their samples, by reason, and how old the newest one is.
 pub fn channels(service: &mut Service) -> Value {
-    let snapshot = service.snapshot();
-    let counts = snapshot.counts.iter().zip(&snapshot.stamps);
-    let channel =
-        |(name, (of, stamp)): (&String, (&athermal_serve::sequencer::Counts, &Instant))| {
-            json!({
-                "channel": name,
-                "accepted": of.accepted,
-                "late": of.late,
-                "repeated": of.twice,
-                "future": of.future,
-                "clock": of.clock,
-                "age_s": age_s(snapshot.newest, *stamp),
-            })
-        };
-    let all: Vec<_> = service.channels().iter().zip(counts).map(channel).collect();
+    let newest = service.snapshot().newest;
+    let channel = |of: ChannelSamples| {
+        let mut row = json!({
+            "source": of.source,
+            "channel": of.channel,
+            "accepted": of.accepted,
+            "age_s": age_s(newest, of.stamp),
+        });
+        for (reason, count) in of.left_out {
+            row[reason.name()] = json!(count);
+        }
+        row
+    };
+    let all: Vec<_> = service.samples().into_iter().map(channel).collect();
     json!({ "channels": all })
+}
+
+/// What monitors have found of the graph that runs; the same as a run reports.
+fn watched(service: &Service) -> Value {
+    let Some(watch) = service.watched() else {
+        return Value::Null;
+    };
+    let warnings = watch.warnings();
+    let warnings = warnings
+        .map(|(kind, channel, count)| json!({ "kind": kind, "channel": channel, "count": count }));
+    let fault = |(channel, fault): (&str, SensorFault)| {
+        let (since_s, value) = match fault {
+            SensorFault::Silent { from_s } => (from_s, None),
+            SensorFault::Stuck(of) => (of.from_s, Some(of.value)),
+        };
+        json!({ "channel": channel, "fault": fault.kind(), "since_s": since_s, "value": value })
+    };
+    let outside = |of: &OutsideFit| {
+        json!({
+            "channel": of.usual.channel,
+            "samples": of.samples,
+            "lowest": of.lowest,
+            "highest": of.highest,
+            "lowest_in_fit": of.usual.lowest,
+            "highest_in_fit": of.usual.highest,
+        })
+    };
+    let none = service.running().and_then(|of| watch.no_output(of));
+    json!({
+        "warnings": warnings.collect::<Vec<_>>(),
+        "faults": watch.faults().map(fault).collect::<Vec<_>>(),
+        "outside_fit": watch.outside_fit().map(outside).collect::<Vec<_>>(),
+        "no_output": none.map(|of| json!({ "ticks": of.rows, "first_silent": of.first_silent })),
+        "feeds_back": watch.fed_back(),
+    })
 }
 
 /// The outputs of what runs, with their values after the last tick that was taken in.
@@ -137,11 +177,31 @@ fn sources(service: &Service) -> Vec<Value> {
             "given": of.given.load(Ordering::Relaxed),
             "dropped": of.dropped.load(Ordering::Relaxed),
             "connected": of.is_connected(),
+            "connection": connection(of.connection()),
             "restarts": of.restarts.load(Ordering::Relaxed),
             "waiting": of.waiting(),
+            "left_out": left_out(&of.left_out),
         })
     };
     service.sources().iter().map(source).collect()
+}
+
+fn connection(of: Connection) -> &'static str {
+    match of {
+        Connection::Never => "never",
+        Connection::Connected => "connected",
+        Connection::Away => "away",
+        Connection::Ended => "ended",
+    }
+}
+
+/// What a source left out of which it knows no channel, by reason.
+fn left_out(of: &LeftOutCounts) -> Value {
+    let all = LeftOut::ALL.map(|reason| (reason.name(), of.of(None, reason)));
+    let some = all.into_iter().filter(|(_, count)| *count > 0);
+    some.map(|(name, count)| (name.to_owned(), json!(count)))
+        .collect::<Map<_, _>>()
+        .into()
 }
 
 fn sinks(service: &Service) -> Vec<Value> {
@@ -151,9 +211,11 @@ fn sinks(service: &Service) -> Vec<Value> {
             "put": of.put.load(Ordering::Relaxed),
             "dropped": of.dropped.load(Ordering::Relaxed),
             "behind": of.behind.load(Ordering::Relaxed),
+            "superseded": of.superseded.load(Ordering::Relaxed),
             "failures": of.failures.load(Ordering::Relaxed),
             "error": of.error(),
             "waiting": of.waiting(),
+            "spooled": of.spooled(),
         })
     };
     service.sinks().iter().map(sink).collect()

@@ -1,19 +1,35 @@
 //! What a service reports: its name and its facts for programs, a sentence for people. The terminal and the control interface say the same.
 
 use athermal_analysis::figures::{instant, seconds};
-use athermal_command::Message;
+use athermal_command::{Message, findings};
 use athermal_core::diagnostic::{count, counted};
 use athermal_run::live::Notice;
 use athermal_serve::sequencer::{Admission, Leader, Refusal};
 use athermal_serve::service::ServiceEvent;
 use serde_json::{Value, json};
 
-/// An event of a service with these channels, and whether it is a fault.
+/// An event of a service with these channels, and whether it is a fault. Sensors that fail `together` are one for people, and programs
+/// take one for each.
 #[must_use]
-pub fn described(event: &ServiceEvent, channels: &[String]) -> (bool, Message) {
+pub fn described(
+    event: &ServiceEvent,
+    channels: &[String],
+    together: bool,
+) -> Vec<(bool, Message)> {
+    match event {
+        ServiceEvent::Found(at, finding) => {
+            let at_s = seconds(*at);
+            findings::messages(finding, (&instant(at_s), at_s), together)
+        }
+        other => one(other, channels).into_iter().collect(),
+    }
+}
+
+fn one(event: &ServiceEvent, channels: &[String]) -> Option<(bool, Message)> {
     let of_source = |source| json!({ "source": source });
     let of_sink = |sink| json!({ "sink": sink });
-    match event {
+    Some(match event {
+        ServiceEvent::Found(..) => return None,
         ServiceEvent::SourceFailed {
             source,
             error,
@@ -127,7 +143,7 @@ pub fn described(event: &ServiceEvent, channels: &[String]) -> (bool, Message) {
             Value::Null,
             format!("the engine cannot go on: {reason}"),
         ),
-    }
+    })
 }
 
 /// What happened at a hand-over, and whether it is a fault.

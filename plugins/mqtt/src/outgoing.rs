@@ -12,6 +12,8 @@ pub struct Outgoing {
     pub topic: String,
     /// What it says.
     pub payload: Vec<u8>,
+    /// Whether it is the last of its tick.
+    pub ends_row: bool,
 }
 
 /// How outputs become messages.
@@ -43,6 +45,13 @@ impl Form {
 
     /// The messages of a tick. An output that is absent is in none: a message that has nothing else is left out.
     pub fn messages(&self, row: &OutRow<'_>, into: &mut Vec<Outgoing>) {
+        self.add_messages(row, into);
+        if let Some(last) = into.last_mut() {
+            last.ends_row = true;
+        }
+    }
+
+    fn add_messages(&self, row: &OutRow<'_>, into: &mut Vec<Outgoing>) {
         let facts = json!({
             "time": shown(row.at),
             "time_ns": row.at.as_ns(),
@@ -84,6 +93,7 @@ fn outgoing(topic: &str, message: Map<String, Value>) -> Outgoing {
     Outgoing {
         topic: topic.to_owned(),
         payload: Value::Object(message).to_string().into_bytes(),
+        ends_row: false,
     }
 }
 

@@ -136,6 +136,8 @@ pub struct LeftOut {
     pub reason: Reason,
     /// What, cut short.
     pub what: String,
+    /// The number of the channel that lacks it; none where it is not known, or all of a message do.
+    pub channel: Option<usize>,
 }
 
 impl LeftOut {
@@ -146,7 +148,18 @@ impl LeftOut {
             shown.push('…');
         }
         let what = shown.escape_debug().to_string();
-        Self { reason, what }
+        Self {
+            reason,
+            what,
+            channel: None,
+        }
+    }
+
+    fn of(channel: usize) -> impl Fn(Self) -> Self {
+        move |of| Self {
+            channel: Some(channel),
+            ..of
+        }
     }
 }
 
@@ -164,6 +177,16 @@ pub struct Readings {
 }
 
 impl Form {
+    /// The channels that every message gives; none where it names them.
+    #[must_use]
+    pub fn channels(&self) -> Vec<usize> {
+        match &self.values {
+            Values::Plain(channel) | Values::One(_, channel) => vec![*channel],
+            Values::Fields(fields) => fields.iter().map(|(_, channel)| *channel).collect(),
+            Values::Each { .. } => Vec::new(),
+        }
+    }
+
     /// What a payload says that came at some instant.
     #[must_use]
     pub fn read(&self, payload: &[u8], arrival: Instant) -> Readings {
@@ -286,9 +309,10 @@ impl Form {
         let Some(&channel) = found else {
             return Err(LeftOut::new(Reason::UnknownName, named));
         };
-        let stamp = self.stamp(item, message, arrival)?;
+        let of_channel = LeftOut::of(channel);
+        let stamp = self.stamp(item, message, arrival).map_err(&of_channel)?;
         *newest = (*newest).max(Some(stamp));
-        self.is_good(item, message)?;
+        self.is_good(item, message).map_err(&of_channel)?;
         let value = self.value_at(item, value, channel)?;
         Ok(value.map(|value| Reading {
             channel,
@@ -300,6 +324,11 @@ impl Form {
     /// The value of a channel in a part of a message. An instant from which on a planned value applies may be missing: it then applies
     /// at once.
     fn value_at(&self, part: &Value, at: &str, channel: usize) -> Result<Option<f64>, LeftOut> {
+        let value = self.any_value_at(part, at, channel);
+        value.map_err(LeftOut::of(channel))
+    }
+
+    fn any_value_at(&self, part: &Value, at: &str, channel: usize) -> Result<Option<f64>, LeftOut> {
         if !self.instants.contains(&channel) {
             let value = match part.pointer(at) {
                 Some(Value::Bool(is)) => self.truth(*is, channel),

@@ -46,6 +46,8 @@ pub struct Manner {
 struct Spool {
     waiting: VecDeque<Outgoing>,
     bytes: u64,
+    /// Of how many ticks they are.
+    rows: u64,
     /// How many of them, from the front on, are sent and not answered.
     sent: usize,
     /// How many messages the broker has.
@@ -154,11 +156,17 @@ impl Publisher {
         spool.ticks += 1;
         for message in messages.drain(..) {
             spool.bytes += size(&message);
+            spool.rows += u64::from(message.ends_row);
             spool.waiting.push_back(message);
         }
         drop(spool);
         self.shared.came.notify_one();
         Ok(())
+    }
+
+    /// Of how many ticks something waits.
+    pub fn rows(&self) -> u64 {
+        self.shared.lock().rows
     }
 
     /// Whether there is a connection, and the broker takes what is published.
@@ -273,7 +281,7 @@ impl Work {
         spool.sent = 0;
         if self.manner.is_command {
             spool.waiting.clear();
-            spool.bytes = 0;
+            (spool.bytes, spool.rows) = (0, 0);
         }
     }
 
@@ -371,6 +379,7 @@ impl Work {
         spool.refused = taken.err().or(spool.refused.take());
         if let Some(message) = spool.waiting.pop_front() {
             spool.bytes = spool.bytes.saturating_sub(size(&message));
+            spool.rows -= u64::from(message.ends_row);
             spool.sent = spool.sent.saturating_sub(1);
             spool.published += 1;
         }

@@ -208,7 +208,7 @@ impl<'a> Session<'a> {
         } = message;
         let mut readings = Vec::new();
         if is_retained && self.inlet.retained == Retained::Ignore {
-            self.leave_out(Reason::Retained, &topic, "");
+            self.leave_out((&[], Reason::Retained), &topic, "");
         } else {
             self.read(&topic, &payload, &mut readings);
         }
@@ -240,14 +240,18 @@ impl<'a> Session<'a> {
         let arrival = arrival();
         let read: Vec<_> = meant
             .iter()
-            .map(|nth| self.inlet.routes[*nth].form.read(payload, arrival))
+            .map(|nth| (*nth, self.inlet.routes[*nth].form.read(payload, arrival)))
             .collect();
         if read.is_empty() {
-            self.leave_out(Reason::NoMapping, topic, "");
+            self.leave_out((&[], Reason::NoMapping), topic, "");
         }
-        for of in read {
+        for (nth, of) in read {
             for left_out in &of.left_out {
-                self.leave_out(left_out.reason, topic, &left_out.what);
+                let channels = match left_out.channel {
+                    Some(channel) => vec![channel],
+                    None => self.inlet.routes[nth].form.channels(),
+                };
+                self.leave_out((&channels, left_out.reason), topic, &left_out.what);
             }
             let gap = self.inlet.gaps.seen(topic, of.newest, of.sequence, arrival);
             self.report(topic, gap);
@@ -270,9 +274,8 @@ impl<'a> Session<'a> {
             .report(format_args!("gap from {from} to {to}: {what}"));
     }
 
-    fn leave_out(&mut self, reason: Reason, topic: &str, what: &str) {
-        let remarks = self.out.remarks();
-        self.inlet.left_out.count(reason, topic, &what, remarks);
+    fn leave_out(&mut self, of: (&[usize], Reason), topic: &str, what: &str) {
+        self.inlet.left_out.count(of, topic, &what, self.out);
     }
 
     /// Gives the engine what it has room for.

@@ -181,6 +181,10 @@ impl Outlet for MqttOutlet {
         self.publisher.state()
     }
 
+    fn held(&self) -> u64 {
+        self.publisher.rows()
+    }
+
     fn kept(&mut self) -> Option<&mut dyn Kept> {
         self.publisher.keeps().then_some(self)
     }

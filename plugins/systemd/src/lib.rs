@@ -150,5 +150,5 @@ fn line(service: &Service) -> String {
         true => ", without a journal",
         false => "",
     };
-    format!("{} ticks, graph {revision}{journal}", snapshot.happenings)
+    format!("{} ticks, graph {revision}{journal}", snapshot.ticks)
 }

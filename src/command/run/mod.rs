@@ -1,7 +1,6 @@
 //! `athermal run`: rows in, the graph's outputs out.
 
 mod reports;
-mod sensor_words;
 pub(super) mod stop;
 mod swap;
 pub(super) mod swap_words;
@@ -12,12 +11,11 @@ use std::sync::Arc;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
-use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
     layout,
 };
-use athermal::run::live::monitor::{RangeMonitor, SensorMonitor};
+use athermal::run::live::monitor::{Finding, Watch};
 use athermal::run::live::session::WatchedGraph;
 use athermal::run::live::store::{FileLock, OutputIdentity};
 use athermal::run::live::{Session, SessionOptions, Sink, StateStore};
@@ -88,9 +86,6 @@ impl Run {
         let (model, watched) = self.load(&terminal, state.as_ref())?;
         warn_unfitted(&terminal, &model, &self.model);
         warn_without_novelty(&terminal, &model, &self.model);
-        if let Some(words) = feedback::in_words(&model.plan) {
-            terminal.warning(words);
-        }
         let options = SessionOptions {
             state,
             frozen: self.frozen,
@@ -108,15 +103,14 @@ impl Run {
             self.widen(&mut columns);
         }
         let usual = model.sample_ranges().to_vec();
-        let mut range = RangeMonitor::new(&read.sources, &usual);
-        let mut sensors = SensorMonitor::new(&model.plan);
+        let mut watch = Watch::new(&model.plan, &read.sources, &usual);
+        reports.found(&watch.begin());
         let mut looks = ChannelWatch::at(&model.plan);
         let mut session = Session::begin(model, options, &reports)?;
         if ends {
             session.watch(&mut looks);
         } else {
-            session.watch(&mut range);
-            session.watch(&mut sensors);
+            session.watch(&mut watch);
         }
         let writer = self.writer(&reports, &session, reader.layout(), &columns)?;
         session.watch_output(OutputIdentity::of(&self.output));
@@ -131,9 +125,8 @@ impl Run {
             Box::new(writer)
         };
         session.run(&mut reader, &mut *sink)?;
-        if let Some(none) = session.output().none(session.engine()) {
-            reports.no_output(&none);
-        }
+        let none = session.output().none(session.engine());
+        reports.found(none.filter(|_| ends).map(Finding::NoOutput).as_slice());
         let (engine, ticks) = (session.engine(), session.output().rows());
         let (plan, ranges) = (Arc::clone(engine.plan()), engine.sample_ranges());
         let (refused, rejected) = (engine.refused(), engine.rejected_channels());

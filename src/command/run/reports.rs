@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
+use athermal::run::live::monitor::Finding;
 use athermal::run::live::{Report, Reporter};
 use athermal::{Duration, Instant};
 use serde_json::json;
 
-use super::{sensor_words, swap_words};
-use crate::command::beyond;
-use crate::command::data::REJECTED;
+use super::swap_words;
 use crate::command::model::{few, warn_nodes_unfitted};
 use crate::message::Message;
 use crate::terminal::Terminal;
-use athermal_analysis::figures::{apart, count, counted, instant, length, seconds, time};
+use athermal_analysis::figures::{count, instant, length, seconds};
+use athermal_command::findings;
 
 /// What to do where a clock was ahead.
 const BEGIN_COLD: &str =
@@ -46,23 +46,11 @@ impl Reporter for Reports {
                  there now; end the run before it is moved, or copy it and cut it to nothing",
                 path.display()
             )),
-            Report::Rejected {
-                channel,
-                time,
-                value,
-            } => {
-                let words = format!(
-                    "{} at {time}: {}, taken as missing; others like it are counted",
-                    channel.name,
-                    why_rejected(value, channel.range)
-                );
-                let facts = json!({ "channel": channel.name, "time": time, "value": value });
-                terminal.warning(Message::new(REJECTED, facts, words));
+            Report::Found { finding, at, time } => {
+                let together = !terminal.events;
+                let all = findings::messages(finding, (time, seconds(at)), together);
+                all.into_iter().for_each(|of| terminal.report(of));
             }
-            Report::OutsideFit { usual, time, value } => {
-                beyond::warn_first(terminal, usual, time, value);
-            }
-            Report::Sensors { changes, at_s } => sensor_words::changes(terminal, changes, at_s),
             Report::Swap(notice) => swap_words::notice(terminal, &notice),
             Report::Doubts { doubts, sources } => terminal.doubts(doubts, sources),
             Report::FitsKept { path, nodes } => terminal.warning(format_args!(
@@ -103,6 +91,15 @@ impl Reporter for Reports {
 }
 
 impl Reports {
+    /// Reports what is found of a graph, and not at a row.
+    pub fn found(&self, all: &[Finding]) {
+        let (at, time) = (Instant::MIN, "");
+        let found = all
+            .iter()
+            .map(|finding| Report::Found { finding, at, time });
+        found.for_each(|of| self.report(of));
+    }
+
     fn skipped(&self, rows: u64, newest: &str, before: Duration) {
         let facts = json!({ "count": rows, "time": newest });
         let message = |words: String| Message::new("passed_over", facts, words);
@@ -163,34 +160,5 @@ impl Reports {
             )),
             _ => {}
         }
-    }
-
-    /// That nothing came out, with the first node that gives nothing.
-    pub fn no_output(&self, of: &athermal::run::live::monitor::NoOutput) {
-        let pace = match of.apart_s > 0.0 {
-            true => format!(", which are {} apart", time(of.apart_s)),
-            false => String::new(),
-        };
-        let words = format!(
-            "no output has a value in any of {}{pace}; the first to lack one is {}",
-            counted(of.rows, "row"),
-            of.first_silent
-        );
-        let facts = json!({ "ticks": of.rows, "first_silent": of.first_silent });
-        self.terminal
-            .warning(Message::new("no_output", facts, words));
-    }
-}
-
-/// What is wrong with a sample.
-fn why_rejected(value: f64, (lowest, highest): (f64, f64)) -> String {
-    if value.is_infinite() {
-        "an infinite sample".to_owned()
-    } else if value < lowest {
-        let [value, lowest] = apart([value, lowest]);
-        format!("{value} is below the lowest of its range, {lowest}")
-    } else {
-        let [value, highest] = apart([value, highest]);
-        format!("{value} is above the highest of its range, {highest}")
     }
 }

@@ -21,14 +21,12 @@ pub struct Events<'a> {
 impl Events<'_> {
     /// Reports an event.
     pub fn report(&self, event: ServiceEvent) {
-        let (is_fault, message) = match &event {
-            ServiceEvent::Compared { verdict, .. } => (false, swap_words::shadow(verdict)),
-            event => described(event, self.channels),
+        let together = !self.terminal.events;
+        let all = match &event {
+            ServiceEvent::Compared { verdict, .. } => vec![(false, swap_words::shadow(verdict))],
+            event => described(event, self.channels, together),
         };
-        match is_fault {
-            true => self.terminal.warning(message),
-            false => self.terminal.note(message),
-        }
+        all.into_iter().for_each(|of| self.terminal.report(of));
         if let ServiceEvent::Staged { carry, .. } = &event {
             swap_words::carry(&self.terminal, carry);
         }
@@ -44,7 +42,7 @@ pub fn recovered(terminal: &Terminal, state: &Path, report: &RecoveryReport) {
         }
         Start::Beginning | Start::Checkpoint(_) => terminal.note(format_args!(
             "{shown}: goes on where it ended; {} stepped again",
-            counted(report.stepped, "tick")
+            steps(report)
         )),
         Start::Cold => terminal.warning(format_args!(
             "{shown}: no checkpoint can be used, and the journal does not go back to the beginning: the service begins cold at its oldest tick"
@@ -56,6 +54,15 @@ pub fn recovered(terminal: &Terminal, state: &Path, report: &RecoveryReport) {
             "the tick at {} does not give the bits that were written, on this processor or by this release",
             instant(seconds(difference.at))
         ));
+    }
+}
+
+/// How much was stepped again.
+pub fn steps(report: &RecoveryReport) -> String {
+    let ticks = counted(report.stepped - report.beats, "tick");
+    match report.beats {
+        0 => ticks,
+        beats => format!("{ticks} and {}", counted(beats, "beat")),
     }
 }
 
@@ -87,8 +94,9 @@ pub fn sinks(terminal: &Terminal, sinks: &[(String, Arc<SinkCounts>)]) {
         }
         let behind = counts.behind.load(Ordering::Relaxed);
         if behind > 0 {
+            let were = if behind == 1 { "it was" } else { "they were" };
             terminal.note(format_args!(
-                "sink `{sink}`: {} not sent, because they were too old",
+                "sink `{sink}`: {} not sent, because {were} too old",
                 counted(behind, "command")
             ));
         }

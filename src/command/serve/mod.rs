@@ -17,6 +17,7 @@ use super::run::stop;
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Terminal};
 use athermal_analysis::figures::counted;
+use athermal_command::findings;
 
 /// Run a machine file as a service: sources in, corrections out, nothing lost
 ///
@@ -133,6 +134,11 @@ fn summary(terminal: &Terminal, ended: &Ended) {
             ));
         }
     }
+    for ((channel, _), &samples) in ended.channels.iter().zip(&ended.outside) {
+        if samples > 0 {
+            terminal.warning(findings::rejected(channel, samples, ended.ticks));
+        }
+    }
     if ended.hurried > 0 {
         terminal.warning(format_args!(
             "{} cut before `wait` was over, because too many samples waited",
@@ -146,10 +152,11 @@ fn summary(terminal: &Terminal, ended: &Ended) {
         ));
     }
     let facts = json!({
+        "ticks": ended.ticks,
         "happenings": ended.happenings,
         "records_lost": ended.journal.lost,
         "hurried": ended.hurried,
     });
-    let words = format!("{} so far", counted(ended.happenings, "tick"));
+    let words = format!("{} so far", counted(ended.ticks, "tick"));
     terminal.note(Message::new("ended", facts, words));
 }

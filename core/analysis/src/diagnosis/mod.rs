@@ -5,7 +5,6 @@
 
 pub mod comparison;
 pub mod day;
-pub mod feedback;
 mod gap;
 pub mod lag;
 pub mod leap;
@@ -30,7 +29,9 @@ pub(crate) use plot::{
 };
 pub use rest::SilentNode;
 
-use athermal_core::compile::origins::{inputs, of_truths, slots, upstream};
+pub use athermal_run::live::monitor::feedback;
+
+use athermal_core::compile::origins::{inputs, of_truths, upstream};
 use athermal_core::time::Duration;
 use athermal_run::fit::FitError;
 use athermal_run::model::Model;

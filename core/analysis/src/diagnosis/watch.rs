@@ -6,10 +6,10 @@ use athermal_core::compile::origins::{health_reasons, of_truths};
 use athermal_core::compile::{Plan, SourceChannel};
 use athermal_core::engine::SampleRange;
 use athermal_core::time::Instant;
+use athermal_run::live::Feed;
 use athermal_run::live::monitor::silence::{self, Silence};
 use athermal_run::live::monitor::standstill::{self, Standstill};
-use athermal_run::live::monitor::{Monitor, places};
-use athermal_run::live::{Feed, Reporter};
+use athermal_run::live::monitor::{Finding, Monitor, places};
 use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -192,10 +192,10 @@ impl ChannelWatch {
 }
 
 impl Monitor for ChannelWatch {
-    fn row(&mut self, now: Instant, samples: &Samples, _reporter: &dyn Reporter) {
+    fn row(&mut self, now: Instant, values: &[f64], _: &mut Vec<Finding>) {
         let at_s = seconds(now);
         for (of, place) in self.channels.iter_mut().zip(&self.places) {
-            if let Some(&value) = place.and_then(|place| samples.values.get(place)) {
+            if let Some(&value) = place.and_then(|place| values.get(place)) {
                 of.row(at_s, value);
             }
         }
@@ -205,7 +205,7 @@ impl Monitor for ChannelWatch {
         self.channels.iter_mut().for_each(WatchedChannel::interrupt);
     }
 
-    fn follow(&mut self, plan: &Plan, feed: &[Feed], _usual: &[SampleRange]) {
+    fn follow(&mut self, plan: &Plan, feed: &[Feed], _: &[SampleRange], _: &mut Vec<Finding>) {
         let mut before = std::mem::take(&mut self.places);
         let mut added = Vec::new();
         for (new, place) in Self::at(plan).channels.into_iter().zip(places(plan, feed)) {
@@ -282,7 +282,7 @@ impl Source for Looking<'_> {
         let event = self.rows.next(samples)?;
         if let State::Read(looks) = &mut *self.state.borrow_mut() {
             match event {
-                Some(Event::Row(now)) => looks.row(now, samples, &()),
+                Some(Event::Row(now)) => looks.row(now, &samples.values, &mut Vec::new()),
                 Some(Event::Segment) => looks.segment(),
                 None => {}
             }

@@ -1,6 +1,7 @@
 //! Decides the course of a replacement on the control thread: stage, shadow, commit, roll back.
 
 mod copy;
+mod watching;
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,6 +19,7 @@ use crate::diagnostic::panic_text;
 use crate::engine::{Engine, NodeCarry, StateTransfer};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
+use watching::Watching;
 
 /// Engines that may be on their way in either direction.
 const ON_THE_WAY: usize = 4;
@@ -51,6 +53,7 @@ pub struct Control {
     /// What happened and has not been reported yet.
     notices: Vec<Notice>,
     look: Option<Look>,
+    watching: Watching,
 }
 
 type Look = Box<dyn FnMut(Instant, &Engine) + Send>;
@@ -138,6 +141,7 @@ pub(super) fn pair(
         row: vec![f64::NAN; record],
         notices: Vec::new(),
         look: None,
+        watching: Watching::default(),
         replica: Some(seat(replica)),
         running,
         options,
@@ -242,6 +246,7 @@ impl Control {
             None => cold(&live.engine, warmed),
         };
         live.event = self.event;
+        live.usual = model.sample_ranges().to_vec();
         Ok(Staged {
             live,
             carry,
@@ -421,6 +426,7 @@ impl Control {
     fn segment(&mut self) {
         self.last = None;
         self.retained.segment();
+        self.watching.segment();
         self.for_all(LiveEngine::segment);
         if let Some(shadow) = self
             .staged
@@ -439,6 +445,7 @@ impl Control {
     fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {
         let elapsed = self.last.map_or(Duration::ZERO, |last| time - last);
         self.last = Some(time);
+        self.watching.row(time, samples);
         if let Some(previous) = &mut self.previous {
             previous.left -= elapsed;
             if previous.left < Duration::ZERO {
@@ -454,8 +461,11 @@ impl Control {
             let _ = live.step(time, samples);
         });
         self.retained.push(time, samples);
-        if let (Some(look), Some(replica)) = (&mut self.look, &self.replica) {
-            look(time, &replica.engine);
+        if let Some(replica) = &self.replica {
+            self.watching.stepped(time, replica);
+            if let Some(look) = &mut self.look {
+                look(time, &replica.engine);
+            }
         }
         if let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica)
             && let Some(shadow) = &mut staged.shadow
@@ -512,6 +522,7 @@ impl Control {
                 left: self.options.keep_warm,
             });
         }
+        self.watch_on(time);
     }
 
     /// Takes what the engine thread has sent back; it is freed here.

@@ -1,7 +1,7 @@
 //! Decides what passes between the engine thread and the control thread: ticks one way, engines both ways.
 
 use crate::compile::{Plan, SourceChannel};
-use crate::engine::Engine;
+use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
 
 /// A channel that samples are given for.
@@ -45,6 +45,8 @@ pub(super) struct LiveEngine {
     pub(super) outputs: Vec<Option<usize>>,
     /// The number of the event up to which the engine has been taken.
     pub(super) event: u64,
+    /// Where samples lay in its fit, as far as the control thread knows it.
+    pub(super) usual: Vec<SampleRange>,
     /// Whether it was sent back without having taken over.
     pub(super) refused: bool,
     /// Whether it is a copy of what runs, for the control thread, which had missed something.
@@ -71,6 +73,7 @@ impl LiveEngine {
             places: places.into_iter().flatten().collect(),
             outputs: vec![None; engine.plan().outputs.len()],
             event,
+            usual: Vec::new(),
             refused: false,
             is_replica: false,
             engine,

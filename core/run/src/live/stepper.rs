@@ -109,6 +109,7 @@ impl Stepper {
             places: places.clone(),
             outputs: self.live.outputs.clone(),
             event: self.event,
+            usual: Vec::new(),
             refused: false,
             is_replica: true,
             engine,

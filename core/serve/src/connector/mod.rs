@@ -8,6 +8,7 @@ mod back_off;
 mod error;
 mod inlet;
 mod kind;
+mod left_out;
 mod outlet;
 mod source_link;
 mod stop;
@@ -23,7 +24,8 @@ pub use kind::{
 pub(crate) use kind::{Kinds, all_sinks, all_sources};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
+pub use left_out::{LeftOut, LeftOutCounts};
 pub use outlet::{Kept, OutRow, Outlet, Place, Purpose, Sink, SinkWiring, WiredOutput};
 pub(crate) use source_link::{Arrival, SourceLink, link};
-pub use source_link::{Outflow, Remarks, SourceCounts};
+pub use source_link::{Connection, Outflow, Remarks, SourceCounts};
 pub use stop::Stop;

@@ -86,6 +86,11 @@ pub trait Outlet: Send {
         Ok(())
     }
 
+    /// How many rows it took that have not left, where it is a log.
+    fn held(&self) -> u64 {
+        0
+    }
+
     /// The rows that it keeps, where it can be asked for them after a start: then each is put out exactly once.
     fn kept(&mut self) -> Option<&mut dyn Kept> {
         None

@@ -8,7 +8,7 @@ use std::time::Duration as Wait;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{Stamps, Stop, WiredChannel};
+use super::{LeftOut, LeftOutCounts, Stamps, Stop, WiredChannel};
 use crate::bell::{Bell, Mailbox};
 use crate::journal::Progress;
 use crate::sequencer::Sample;
@@ -61,6 +61,12 @@ pub struct SourceCounts {
     /// How often it said that it is connected to something that lives.
     alive: AtomicU64,
     is_connected: AtomicBool,
+    was_connected: AtomicBool,
+    has_ended: AtomicBool,
+    /// What it left out, by its channels.
+    pub left_out: LeftOutCounts,
+    /// The places of its channels in the feed.
+    places: Vec<u32>,
     /// So many samples have been taken by the engine thread…
     taken: AtomicU64,
     /// …and stand in the journal once it has so many records.
@@ -81,9 +87,27 @@ impl SourceCounts {
         self.is_connected.load(Ordering::Relaxed)
     }
 
+    /// How its connection is.
+    #[must_use]
+    pub fn connection(&self) -> Connection {
+        let is = |of: &AtomicBool| of.load(Ordering::Relaxed);
+        match () {
+            () if is(&self.has_ended) => Connection::Ended,
+            () if self.is_connected() => Connection::Connected,
+            () if is(&self.was_connected) => Connection::Away,
+            () => Connection::Never,
+        }
+    }
+
     /// Notes whether it is connected.
     pub(crate) fn set_connected(&self, is_connected: bool) {
+        self.was_connected.fetch_or(is_connected, Ordering::Relaxed);
         self.is_connected.store(is_connected, Ordering::Relaxed);
+    }
+
+    /// The number of a channel of the feed among those of the source.
+    pub(crate) fn channel(&self, place: usize) -> Option<usize> {
+        self.places.iter().position(|of| *of as usize == place)
     }
 
     /// Grows with every sign of life.
@@ -93,6 +117,19 @@ impl SourceCounts {
             .map(|count| count.load(Ordering::Relaxed))
             .sum()
     }
+}
+
+/// How the connection of a source is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Connection {
+    /// It has not been connected since the service started.
+    Never,
+    /// It is connected.
+    Connected,
+    /// It was connected, and is not any more.
+    Away,
+    /// It has come to its end.
+    Ended,
 }
 
 /// Where the samples of a channel go.
@@ -163,7 +200,11 @@ pub(crate) fn link(
     (engine, progress, remarks): (Thread, Arc<Progress>, Remarks),
 ) -> (Outflow, SourceLink) {
     let (ring, arrivals) = RingBuffer::new(room);
-    let counts = Arc::new(SourceCounts::default());
+    let counts = Arc::new(SourceCounts {
+        left_out: LeftOutCounts::new(channels.len()),
+        places: places.to_vec(),
+        ..SourceCounts::default()
+    });
     let wired = channels.iter().zip(places);
     let outflow = Outflow {
         ring,
@@ -230,6 +271,7 @@ impl Outflow {
         let counts = if is_given {
             &self.counts.given
         } else {
+            self.left_out(Some(channel), LeftOut::NoRoom, 1);
             &self.counts.dropped
         };
         counts.fetch_add(1, Ordering::Relaxed);
@@ -272,6 +314,11 @@ impl Outflow {
         self.counts.given.fetch_add(count as u64, Ordering::Relaxed);
         self.engine.unpark();
         true
+    }
+
+    /// Counts samples that the source leaves out: the channel by its number, none where it is not known.
+    pub fn left_out(&self, channel: Option<usize>, reason: LeftOut, samples: u64) {
+        self.counts.left_out.count(channel, reason, samples);
     }
 
     /// Where it reports what it leaves out.
@@ -319,6 +366,7 @@ impl Outflow {
     }
 
     pub(crate) fn end(&mut self) {
+        self.counts.has_ended.store(true, Ordering::Relaxed);
         self.send(Arrival::Ended);
     }
 

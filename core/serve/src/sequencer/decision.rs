@@ -106,7 +106,7 @@ pub struct Leader {
 /// What became of the samples of a channel so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Those that were accepted.
+    /// Those that were accepted, but for those that say that there is no value.
     pub accepted: u64,
     /// Those that came after their tick.
     pub late: u64,
@@ -135,7 +135,7 @@ impl Counts {
 
     pub(super) fn count(&mut self, admission: Admission) {
         match admission {
-            Admission::Accepted(_) => self.accepted += 1,
+            Admission::Accepted(of) => self.accepted += u64::from(!of.value.is_nan()),
             Admission::Late(_) => self.late += 1,
             Admission::Twice(_) => self.twice += 1,
             Admission::Refused(_, Refusal::Future { .. }) => self.future += 1,

@@ -4,10 +4,28 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration as Wait;
 
+use athermal_run::live::monitor::Watch;
+
 use super::{Service, SinkCounts, Snapshot};
-use crate::connector::SourceCounts;
+use crate::connector::{Connection, LeftOut, SourceCounts};
 use crate::folder::StateFolder;
 use crate::journal::JournalStatus;
+use crate::time::Instant;
+
+/// What became of the samples of a channel since the start.
+#[derive(Debug, Clone)]
+pub struct ChannelSamples {
+    /// The channel.
+    pub channel: String,
+    /// Its source; none where the machine file names none.
+    pub source: Option<String>,
+    /// How many were accepted.
+    pub accepted: u64,
+    /// How many were left out, by reason. Those that are out of range were accepted, and are absent at their ticks.
+    pub left_out: [(LeftOut, u64); LeftOut::ALL.len()],
+    /// The stamp of the newest that was stepped; [`Instant::MIN`] before the first.
+    pub stamp: Instant,
+}
 
 impl Service {
     /// How long it has been running.
@@ -51,6 +69,60 @@ impl Service {
     #[must_use]
     pub fn sources(&self) -> &[(String, Arc<SourceCounts>)] {
         &self.sources
+    }
+
+    /// The samples of each channel, in the order of [`channels`](Self::channels): what became of them.
+    #[must_use]
+    pub fn samples(&self) -> Vec<ChannelSamples> {
+        let known = self.snapshot();
+        let channel = |(place, name): (usize, &String)| {
+            let source = self
+                .sources
+                .iter()
+                .find_map(|(name, of)| Some((name, of, of.channel(place)?)));
+            let counts = known.counts[place];
+            let left_out = |reason: LeftOut| {
+                let by_source = source.map_or(0, |(_, of, nth)| of.left_out.of(Some(nth), reason));
+                by_source
+                    + match reason {
+                        LeftOut::Late => counts.late,
+                        LeftOut::Repeated => counts.twice,
+                        LeftOut::Future => counts.future,
+                        LeftOut::Clock => counts.clock,
+                        LeftOut::OutOfRange => known.outside[place],
+                        _ => 0,
+                    }
+            };
+            ChannelSamples {
+                channel: name.clone(),
+                source: source.map(|(name, ..)| name.clone()),
+                accepted: counts.accepted,
+                left_out: LeftOut::ALL.map(|reason| (reason, left_out(reason))),
+                stamp: known.stamps[place],
+            }
+        };
+        self.channels.iter().enumerate().map(channel).collect()
+    }
+
+    /// The sources without which the service is not whole: those that have not been connected since it started, and all that are away
+    /// where none is connected. It changes nothing of what is put out.
+    #[must_use]
+    pub fn lacking(&self) -> Vec<&str> {
+        let connections = self
+            .sources
+            .iter()
+            .map(|(name, of)| (name, of.connection()));
+        let is_fed = |of| matches!(of, Connection::Connected | Connection::Ended);
+        let is_none_there = !connections.clone().any(|(_, of)| is_fed(of));
+        let lacks = |of| of == Connection::Never || is_none_there && of == Connection::Away;
+        let lacking = connections.filter(|(_, of)| lacks(*of));
+        lacking.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// What is watched of the graph that runs, and what was found.
+    #[must_use]
+    pub fn watched(&self) -> Option<&Watch> {
+        self.keeper.look().watched()
     }
 
     /// The sinks, and what each counts.

@@ -6,8 +6,8 @@ use std::time::{Duration as Wait, Instant as Clock};
 
 use super::engine_thread::Order;
 use super::watch::Watch;
-use super::{Service, ServiceError, ServiceEvent, ServiceHandle};
-use crate::journal::JournalStatus;
+use super::{Ended, Service, ServiceError, ServiceEvent, ServiceHandle};
+use crate::moment::Moment;
 
 /// What comes within so long is taken in together.
 const TOGETHER: Wait = Wait::from_millis(50);
@@ -15,21 +15,6 @@ const TOGETHER: Wait = Wait::from_millis(50);
 const LOOK: Wait = Wait::from_secs(1);
 /// How long the threads may take to end.
 const ENDS: Wait = Wait::from_secs(5);
-
-/// What is left of a service that has ended.
-#[derive(Debug)]
-pub struct Ended {
-    /// What became of the samples of each channel.
-    pub channels: Vec<(String, crate::sequencer::Counts)>,
-    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
-    pub happenings: u64,
-    /// How many ticks were cut early because too many samples waited.
-    pub hurried: u64,
-    /// How the journal is.
-    pub journal: JournalStatus,
-    /// Whether the engine could not go on.
-    pub has_failed: bool,
-}
 
 impl Service {
     /// Waits until [`pump`](Self::pump) has something to do. For the thread that started the service, which others may unpark; any other
@@ -81,9 +66,15 @@ impl Service {
         }
         // What came last, where the engine ended before anybody looked.
         events.extend(self.pump());
+        self.keeper.control().end_watch();
+        let found: Vec<_> = self.found().collect();
+        self.observers.events(&found);
+        events.extend(found);
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
+        let mut snapshot = self.shared.read();
         if let Some(Ok(worker)) = worker {
+            worker.publish(&mut snapshot, Moment::START);
             worker.into_parts().2.finish();
         } else {
             has_failed = true;
@@ -93,10 +84,11 @@ impl Service {
             std::thread::sleep(Wait::from_millis(2));
         }
         self.stop_sinks.ask();
-        let snapshot = self.shared.read();
         events.extend(self.events.try_iter());
         let ended = Ended {
             channels: self.channels.into_iter().zip(snapshot.counts).collect(),
+            outside: snapshot.outside,
+            ticks: snapshot.ticks,
             happenings: snapshot.happenings,
             hurried: snapshot.hurried,
             journal: self.progress.status(),

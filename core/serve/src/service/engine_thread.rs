@@ -11,7 +11,7 @@ use rtrb::{Consumer, Producer};
 
 use super::ServiceEvent;
 use super::frames::FrameSender;
-use super::status::{Shared, Snapshot};
+use super::status::Shared;
 use crate::bell::{Bell, Mailbox};
 use crate::compile::Plan;
 use crate::connector::{Arrival, SourceLink};
@@ -281,28 +281,10 @@ impl EngineThread {
     }
 
     fn publish(&mut self) {
-        let newest = self.worker.sequencer().newest(self.clock.now());
-        let sequencer = self.worker.sequencer();
+        let now = self.clock.now();
         // Whoever reads does so for a moment; otherwise a second later does.
         if let Ok(mut snapshot) = self.shared.snapshot.try_lock() {
-            let Snapshot {
-                counts,
-                hurried,
-                waiting,
-                last,
-                newest: known,
-                stamps,
-                is_synchronised,
-                ..
-            } = &mut *snapshot;
-            counts.clone_from_slice(sequencer.counts());
-            stamps.copy_from_slice(sequencer.timeline().stamps());
-            *hurried = sequencer.hurried();
-            *waiting = sequencer.timeline().waiting().len();
-            *last = sequencer.timeline().last();
-            *known = newest;
-            *is_synchronised = sequencer.is_synchronised();
-            snapshot.happenings = self.worker.recorder().happenings();
+            self.worker.publish(&mut snapshot, now);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What a service reports while it runs. Whoever runs it puts that into words.
 
+use athermal_run::live::monitor::Finding;
 use athermal_run::live::{Notice, Verdict};
 
 use crate::checkpoint::CheckpointError;
@@ -62,6 +63,8 @@ pub enum ServiceEvent {
         /// A stamp of the time that it is.
         to: Instant,
     },
+    /// A monitor has found something at a tick of this instant, or of the graph alone before the first.
+    Found(Instant, Finding),
     /// Something happened at a hand-over.
     Swap(Notice),
     /// Another graph than that of the last checkpoint was given, and takes over.

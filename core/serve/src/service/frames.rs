@@ -35,6 +35,11 @@ pub struct SinkCounts {
     pub(super) missed_records: AtomicU64,
     /// How many ticks were stepped again for it.
     pub(super) again: AtomicU64,
+    /// The newest row of a log is of so many ticks, beats, breaks and freezes, and it has put out those up to so many.
+    pub(super) due: AtomicU64,
+    pub(super) done: AtomicU64,
+    /// Rows that it took and that have not left.
+    pub(super) held: AtomicU64,
     /// A restart needs nothing before so many ticks, beats, breaks and freezes.
     pub(super) safe: AtomicU64,
 }
@@ -46,7 +51,15 @@ impl SinkCounts {
         self.error.lock().map_or(None, |error| error.clone())
     }
 
-    /// How many rows wait.
+    /// How many rows of a log have not left: those that the journal has and it was not given yet, and those that it holds.
+    #[must_use]
+    pub fn spooled(&self) -> u64 {
+        let done = self.done.load(Ordering::Relaxed);
+        let due = self.due.load(Ordering::Relaxed);
+        due.saturating_sub(done) + self.held.load(Ordering::Relaxed)
+    }
+
+    /// How many rows wait for its thread.
     #[must_use]
     pub fn waiting(&self) -> u64 {
         let taken = self.taken.load(Ordering::Acquire);
@@ -128,6 +141,9 @@ impl FrameSender {
         if output.is_superseded && !self.is_log {
             self.counts.superseded.fetch_add(1, Ordering::Relaxed);
             return;
+        }
+        if self.is_log {
+            self.counts.due.store(output.happenings, Ordering::Relaxed);
         }
         let width = HEAD + self.places.len();
         let least = if self.is_missing {

@@ -17,6 +17,7 @@ mod frames;
 mod handle;
 mod host_clock;
 mod observer;
+mod options;
 mod position;
 mod replacing;
 mod sink_thread;
@@ -41,12 +42,13 @@ use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::CommitError;
-pub use ending::Ended;
+pub use asked::ChannelSamples;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
+pub use options::{Ended, ServiceOptions};
 pub use status::Snapshot;
 
 use crate::aside::{Aside, within};
@@ -63,7 +65,7 @@ use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Leader, Sequencer};
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
@@ -77,35 +79,6 @@ use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
-
-/// How a service is run.
-#[derive(Debug, Clone)]
-pub struct ServiceOptions {
-    /// The state folder.
-    pub state: PathBuf,
-    /// Whether commands are not put out.
-    pub is_dry: bool,
-    /// Whether estimators learn nothing.
-    pub frozen: bool,
-    /// The machine file.
-    pub machine: PathBuf,
-    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
-    pub host_time: fn() -> Option<Instant>,
-}
-
-impl ServiceOptions {
-    /// A service that puts everything out and learns, with its state in a folder.
-    #[must_use]
-    pub fn new(state: PathBuf) -> Self {
-        Self {
-            state,
-            is_dry: false,
-            frozen: false,
-            machine: PathBuf::new(),
-            host_time: host::synchronised,
-        }
-    }
-}
 
 /// A service at work.
 pub struct Service {
@@ -226,6 +199,7 @@ impl Service {
         let was_frozen = recovered.engine.frozen();
         let (stepper, mut control) = pair_from(recovered.engine, live)?;
         let observers = Observers::default();
+        control.watch(recovered.model.sample_ranges());
         let looking = observers.clone();
         control.look_on(move |at, engine| looking.tick(at, engine));
         let every = wait(runtime.checkpoint);
@@ -362,6 +336,7 @@ impl Service {
             Ok(notices) => events.extend(notices.into_iter().map(ServiceEvent::Swap)),
             Err(error) => events.push(ServiceEvent::NoCheckpoint(error)),
         }
+        events.extend(self.found());
         while let Ok(work) = self.asked.try_recv() {
             work(self);
         }
@@ -462,6 +437,11 @@ impl Service {
     /// Writes a remark into the journal.
     pub fn note(&mut self, text: &str) {
         self.order(Order::Note(text.into()));
+    }
+
+    fn found(&mut self) -> impl Iterator<Item = ServiceEvent> {
+        let found = self.keeper.control().found().into_iter();
+        found.map(|(at, finding)| ServiceEvent::Found(at, finding))
     }
 
     fn order(&mut self, order: Order) {

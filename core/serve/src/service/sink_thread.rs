@@ -244,6 +244,7 @@ impl SinkThread {
                 if *there > 0 || port.put_at_last(&row) {
                     *there = there.saturating_sub(1);
                     (self.done, looked) = (happenings, looked + 1);
+                    port.counts.done.store(happenings, Ordering::Relaxed);
                     self.keep(false);
                 }
             });
@@ -273,6 +274,11 @@ impl SinkThread {
 
     /// Asks whether what was taken can leave.
     fn look(&mut self) {
+        if self.gate.is_none() {
+            self.port.counts.done.store(self.done, Ordering::Relaxed);
+            let held = guarded(|| Ok(self.port.outlet.held())).unwrap_or(0);
+            self.port.counts.held.store(held, Ordering::Relaxed);
+        }
         if !self.is_dry {
             let state = guarded(|| self.port.outlet.state());
             self.port.health.look(state);

@@ -152,6 +152,11 @@ impl OpenSink {
         let known = was.as_ref().map_or(happenings, |of| of.happenings);
         let safe = if is_command { u64::MAX } else { known };
         self.counts.safe.store(safe, Ordering::Relaxed);
+        if !is_command {
+            self.counts.due.store(happenings, Ordering::Relaxed);
+            let done = known.min(happenings);
+            self.counts.done.store(done, Ordering::Relaxed);
+        }
         SinkThread {
             is_dry: is_dry && is_command,
             opening: (!is_command).then_some(Opening {

@@ -36,6 +36,9 @@ impl Shared {
                 newest: None,
                 stamps: vec![Instant::MIN; channels],
                 is_synchronised: false,
+                outside: vec![0; channels],
+                ticks: 0,
+                beats: 0,
             }),
         }
     }
@@ -56,7 +59,7 @@ pub struct Snapshot {
     pub hurried: u64,
     /// How many samples are too far ahead and not decided on.
     pub waiting: usize,
-    /// How many ticks, beats, breaks and freezes there were.
+    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
     pub happenings: u64,
     /// The last tick.
     pub last: Instant,
@@ -66,4 +69,10 @@ pub struct Snapshot {
     pub stamps: Vec<Instant>,
     /// Whether the host's time is known to be right. Until then clocks of sources are not judged by it.
     pub is_synchronised: bool,
+    /// How many accepted samples of each channel are infinite or outside of the range of their signal, and absent at their ticks.
+    pub outside: Vec<u64>,
+    /// How many ticks were stepped since the start: those that samples made…
+    pub ticks: u64,
+    /// …and those that time alone did.
+    pub beats: u64,
 }

@@ -24,9 +24,16 @@ fn promtool_finds_nothing_wrong_with_the_metrics() {
     if !is_there("promtool") {
         return;
     }
-    let bench = Bench::start(GRAPH, "");
+    let bench = Bench::start(&ranged(), "");
     // What the engine thread knows it gives out once a second.
     bench.until("counts", |of| of["behind_s"].is_number());
+    let rejected = bench.until("a sample out of range", |of| {
+        of["watched"]["warnings"]
+            .as_array()
+            .is_some_and(|of| !of.is_empty())
+    });
+    let wanted = serde_json::json!({ "kind": "rejected_samples", "channel": "temperature.plate", "count": 1 });
+    assert_eq!(rejected["watched"]["warnings"][0], wanted);
     let text = bench.get("/metrics");
     assert_eq!(text.status, 200);
     let mut promtool = Command::new("promtool")
@@ -54,6 +61,13 @@ fn promtool_finds_nothing_wrong_with_the_metrics() {
         "athermal_sink_queue_length",
         "athermal_channel_age_seconds",
         "athermal_dropped_samples_total",
+        "athermal_beats_total",
+        "athermal_undecided_samples",
+        "athermal_warnings_total",
+        "athermal_no_output",
+        "athermal_fed_back_channels",
+        "athermal_sink_spooled_rows",
+        "athermal_sink_superseded_commands_total",
         "athermal_journal_records_total",
         "athermal_checkpoint_behind_ticks",
         "athermal_swaps_total",
@@ -67,6 +81,46 @@ fn promtool_finds_nothing_wrong_with_the_metrics() {
             "{name}\n{text}"
         );
     }
+}
+
+/// The graph with a range that some samples are not in.
+fn ranged() -> String {
+    GRAPH.replace(
+        "[\"plate\", \"room\"]",
+        "[\"plate\", \"room\"], range = [\"20.2 Cel\", \"60 Cel\"]",
+    )
+}
+
+#[test]
+fn what_became_of_samples_is_counted_by_source_channel_and_reason() {
+    let bench = Bench::start(&ranged(), "");
+    let begin = "athermal_dropped_samples_total{machine=\"line\",source=\"log\",channel=\"temperature.plate\",reason=";
+    let accepted =
+        "athermal_samples_total{machine=\"line\",source=\"log\",channel=\"temperature.plate\"}";
+    bench.until("samples", |of| of["ticks"].as_u64() > Some(200));
+    let outside = value(&bench, &format!("{begin}\"out_of_range\"")).unwrap();
+    let accepted = value(&bench, accepted).unwrap();
+    assert!(
+        outside > 20.0 && accepted > 200.0 && outside < accepted / 2.0,
+        "{outside} {accepted}"
+    );
+    for reason in [
+        "late",
+        "repeated",
+        "future",
+        "clock",
+        "no_number",
+        "bad_quality",
+        "no_such_name",
+    ] {
+        assert_eq!(
+            value(&bench, &format!("{begin}\"{reason}\"")),
+            Some(0.0),
+            "{reason}"
+        );
+    }
+    let warnings = "athermal_warnings_total{machine=\"line\",kind=\"rejected_samples\",channel=\"temperature.plate\"}";
+    assert_eq!(value(&bench, warnings), Some(1.0));
 }
 
 /// The value of a metric in the first line that begins so.

@@ -64,6 +64,44 @@ fn plain_numbers_of_a_topic_each_are_read_where_the_source_says_when_they_are() 
 }
 
 #[test]
+fn what_cannot_be_used_is_counted_by_channel_and_reason() {
+    let Some(broker) = Broker::mosquitto(SAFE) else {
+        return;
+    };
+    let folder = Folder::new("reasons");
+    let source = r#"messages = [
+  { topic = "list", each = "/all", name = "/id", value = "/v", quality = { at = "/q", good = ["ok"] }, channels = { plate = "temperature.plate" } },
+  { topic = "plant/all", channels = { "/T/room" = "temperature.room" } },
+]
+"#;
+    let mut service = Running::start(&folder, &machine(broker.port, source, ""));
+    service.settle();
+    let mut peer = Peer::connect(broker.port, "peer", true).unwrap();
+    let list = r#"{"time": 10, "all": [{"id": "plate", "v": 20, "q": "ok"}, {"id": "other", "v": 1, "q": "ok"}, {"id": "plate", "q": "ok"}, {"id": "plate", "v": 3, "q": "bad"}, {"id": "plate", "v": "x", "q": "ok"}]}"#;
+    for (topic, payload) in [
+        ("list", list),
+        ("plant/all", r#"{"time": 20, "T": {"room": null}}"#),
+        ("plant/all", r#"{"T": {"room": 21}}"#),
+        ("plant/all", "no JSON"),
+        ("plant/all", r#"{"time": 30, "T": {"room": 21}}"#),
+    ] {
+        peer.publish_safely(topic, payload.as_bytes(), false);
+    }
+    service.until_given(2);
+    service.settle();
+    let plate = service.left_out(Some("temperature.plate"));
+    assert_eq!(plate, [("no_number", 2), ("bad_quality", 1)]);
+    let room = service.left_out(Some("temperature.room"));
+    assert_eq!(room, [("no_number", 1), ("no_time", 1), ("unreadable", 1)]);
+    assert_eq!(service.left_out(None), [("no_such_name", 1)]);
+    // Each is shown the first time, whatever was left out of other channels.
+    let events = service.stop();
+    let shown = |what: &str| events.iter().filter(|of| of.contains(what)).count();
+    assert_eq!(shown("the value is no number"), 1, "{events:#?}");
+    assert_eq!(shown("the value is null"), 1, "{events:#?}");
+}
+
+#[test]
 fn behaviour_19_a_publisher_that_is_not_on_time_is_no_gap_and_a_restart_is_one_at_most() {
     let Some(broker) = Broker::mosquitto(SAFE) else {
         return;

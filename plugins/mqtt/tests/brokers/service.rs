@@ -11,6 +11,7 @@ use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_features as _;
 use athermal_mqtt as _;
 use athermal_run::model::Model;
+use athermal_serve::connector::LeftOut;
 use athermal_serve::deployment::Deployment;
 use athermal_serve::service::{Service, ServiceEvent, ServiceOptions};
 
@@ -133,6 +134,34 @@ impl Running {
             .1
             .given
             .load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// What was left out of a channel, or of none, as the service counts it.
+    pub fn left_out(&self, channel: Option<&str>) -> Vec<(&'static str, u64)> {
+        let service = self.service.as_ref().unwrap();
+        let all = match channel {
+            None => {
+                let counts = &service.sources()[0].1.left_out;
+                LeftOut::ALL.map(|reason| (reason, counts.of(None, reason)))
+            }
+            Some(name) => {
+                let all = service.samples();
+                all.iter().find(|of| of.channel == name).unwrap().left_out
+            }
+        };
+        let some = all.into_iter().filter(|(_, count)| *count > 0);
+        some.map(|(reason, count)| (reason.name(), count)).collect()
+    }
+
+    /// How many rows of a sink have not left.
+    pub fn spooled(&self, sink: &str) -> u64 {
+        let sinks = self.service.as_ref().unwrap().sinks();
+        sinks
+            .iter()
+            .find(|(name, _)| name == sink)
+            .unwrap()
+            .1
+            .spooled()
     }
 
     /// Whether the source is connected.

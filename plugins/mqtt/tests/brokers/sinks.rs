@@ -168,6 +168,7 @@ fn behaviour_23_a_log_is_stored_while_the_broker_is_away_and_published_in_order_
     service.until("that it is reported", |of| {
         of.heard("SinkFailed") && history(&folder).len() == 60
     });
+    service.until("the spool", |of| of.spooled("out") == 40);
     // The service ends while the broker is away, and comes back before it does.
     service.stop();
     let mut service = Running::start(&folder, &text);
@@ -186,6 +187,7 @@ fn behaviour_23_a_log_is_stored_while_the_broker_is_away_and_published_in_order_
         !missing(&[&first, more].concat())
     }));
     service.until("that it is back", |of| of.heard("SinkBack"));
+    service.until("an empty spool", |of| of.spooled("out") == 0);
     service.stop();
     // At least once, and in order but for what is published again after a start.
     let times = times(&all);

@@ -1,10 +1,17 @@
-//! Whether anything came out of a run.
+//! Whether anything comes out of a graph at work.
 
-use super::super::Frame;
-use crate::engine::Engine;
-use crate::time::Instant;
+use super::{Finding, Monitor};
+use crate::compile::Plan;
+use crate::engine::{Engine, SampleRange};
+use crate::live::Feed;
+use crate::time::{Duration, Instant};
 
-/// Watches what goes into a sink.
+/// A graph is given so long beyond its warm-up until that is reported, as a sensor that has not had a sample yet.
+const PATIENCE: Duration = Duration::from_ns(3_600_000_000_000);
+/// And so many rows.
+const FEWEST: u64 = 20;
+
+/// Watches what is put out.
 #[derive(Debug, Default)]
 pub struct OutputMonitor {
     rows: u64,
@@ -12,6 +19,9 @@ pub struct OutputMonitor {
     any: bool,
     /// The first row and the last.
     times: Option<(Instant, Instant)>,
+    /// How long the graph takes to warm up.
+    warm_up: Duration,
+    is_reported: bool,
 }
 
 /// Rows were put out, and none has a value.
@@ -26,12 +36,21 @@ pub struct NoOutput {
 }
 
 impl OutputMonitor {
-    /// Takes the frame of a tick.
-    pub(crate) fn look(&mut self, frame: &Frame<'_>) {
+    /// Watches the outputs of a plan.
+    #[must_use]
+    pub fn of(plan: &Plan) -> Self {
+        Self {
+            warm_up: plan.warm_up,
+            ..Self::default()
+        }
+    }
+
+    /// Takes the outputs of a tick.
+    pub(crate) fn look(&mut self, now: Instant, outputs: &[f64]) {
         self.rows += 1;
-        self.any = self.any || frame.outputs.iter().any(|value| !value.is_nan());
-        let (first, _) = self.times.unwrap_or((frame.time, frame.time));
-        self.times = Some((first, frame.time));
+        self.any = self.any || outputs.iter().any(|value| !value.is_nan());
+        let (first, _) = self.times.unwrap_or((now, now));
+        self.times = Some((first, now));
     }
 
     /// How many rows were put out.
@@ -50,5 +69,30 @@ impl OutputMonitor {
             apart_s: (last - first).secs() / (self.rows - 1).max(1) as f64,
             first_silent: engine.first_silent(output.slot),
         })
+    }
+}
+
+impl Monitor for OutputMonitor {
+    fn row(&mut self, _: Instant, _: &[f64], _: &mut Vec<Finding>) {}
+
+    fn stepped(&mut self, now: Instant, engine: &Engine, found: &mut Vec<Finding>) {
+        self.look(now, engine.outputs());
+        let is_long = |(first, last)| last - first >= self.warm_up + PATIENCE;
+        if self.rows >= FEWEST && self.times.is_some_and(is_long) {
+            self.end(engine, found);
+        }
+    }
+
+    fn end(&mut self, engine: &Engine, found: &mut Vec<Finding>) {
+        if self.any || self.is_reported {
+            return;
+        }
+        let none = self.none(engine);
+        self.is_reported = none.is_some();
+        found.extend(none.map(Finding::NoOutput));
+    }
+
+    fn follow(&mut self, plan: &Plan, _: &[Feed], _: &[SampleRange], _: &mut Vec<Finding>) {
+        self.warm_up = plan.warm_up;
     }
 }

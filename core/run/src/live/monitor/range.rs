@@ -1,11 +1,10 @@
 //! The first sample of each channel that does not count, or lies far outside of what the fit saw; and the first again after an hour in
 //! order. Which samples count, the graph decides.
 
-use super::super::{Feed, Report, Reporter};
-use super::Monitor;
+use super::super::Feed;
+use super::{Finding, Monitor};
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::SampleRange;
-use crate::recording::Samples;
 use crate::time::{Duration, Instant};
 
 /// A channel that has been in order for so long is reported when it is not again.
@@ -27,6 +26,21 @@ struct Channel {
     rejected: Option<Instant>,
     /// When the last came that counts and is far outside.
     outside: Option<Instant>,
+    /// What is known of those.
+    all_outside: Option<OutsideFit>,
+}
+
+/// The samples of a channel that lay far outside of those of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutsideFit {
+    /// The channel, and where its samples lay in the fit.
+    pub usual: SampleRange,
+    /// How many there were.
+    pub samples: u64,
+    /// The lowest of them.
+    pub lowest: f64,
+    /// The highest of them.
+    pub highest: f64,
 }
 
 impl RangeMonitor {
@@ -42,16 +56,24 @@ impl RangeMonitor {
     }
 }
 
+impl RangeMonitor {
+    /// The channels of which samples lay far outside of those of the fit.
+    pub fn outside_fit(&self) -> impl Iterator<Item = &OutsideFit> {
+        let channels = self.channels.iter().flatten();
+        channels.filter_map(|of| of.all_outside.as_ref())
+    }
+}
+
 impl Monitor for RangeMonitor {
-    fn row(&mut self, now: Instant, samples: &Samples, reporter: &dyn Reporter) {
-        for (channel, &value) in self.channels.iter_mut().zip(&samples.values) {
+    fn row(&mut self, now: Instant, values: &[f64], found: &mut Vec<Finding>) {
+        for (channel, &value) in self.channels.iter_mut().zip(values) {
             if let Some(channel) = channel {
-                channel.sample(now, &samples.time_text, value, reporter);
+                found.extend(channel.sample(now, value));
             }
         }
     }
 
-    fn follow(&mut self, plan: &Plan, feed: &[Feed], usual: &[SampleRange]) {
+    fn follow(&mut self, plan: &Plan, feed: &[Feed], usual: &[SampleRange], _: &mut Vec<Finding>) {
         let mut before = std::mem::take(&mut self.channels);
         before.resize_with(feed.len(), || None);
         let followed = before.into_iter().zip(feed).map(|(before, fed)| {
@@ -59,6 +81,7 @@ impl Monitor for RangeMonitor {
             let mut now = Channel::new(source, usual);
             if let Some(before) = before {
                 (now.rejected, now.outside) = (before.rejected, before.outside);
+                now.all_outside = before.all_outside;
                 // A graph goes by the fits of what ran before.
                 now.usual = now.usual.or(before.usual);
             }
@@ -77,28 +100,35 @@ impl Channel {
                 .cloned(),
             rejected: None,
             outside: None,
+            all_outside: None,
         }
     }
 
-    fn sample(&mut self, now: Instant, time: &str, value: f64, reporter: &dyn Reporter) {
+    fn sample(&mut self, now: Instant, value: f64) -> Option<Finding> {
         if value.is_nan() {
-            return;
+            return None;
         }
-        let Self { source, usual, .. } = self;
-        if !source.admits(value) {
-            if is_news(&mut self.rejected, now) {
-                reporter.report(Report::Rejected {
-                    channel: source,
-                    time,
-                    value,
-                });
-            }
-        } else if let Some(usual) = usual
-            && usual.is_far_from(value, value)
-            && is_news(&mut self.outside, now)
-        {
-            reporter.report(Report::OutsideFit { usual, time, value });
+        if !self.source.admits(value) {
+            return is_news(&mut self.rejected, now).then(|| Finding::Rejected {
+                channel: self.source.name.clone(),
+                range: self.source.range,
+                value,
+            });
         }
+        let usual = self.usual.as_ref();
+        let usual = usual.filter(|usual| usual.is_far_from(value, value))?;
+        let all = self.all_outside.get_or_insert_with(|| OutsideFit {
+            usual: usual.clone(),
+            samples: 0,
+            lowest: value,
+            highest: value,
+        });
+        all.samples += 1;
+        (all.lowest, all.highest) = (all.lowest.min(value), all.highest.max(value));
+        is_news(&mut self.outside, now).then(|| Finding::OutsideFit {
+            usual: usual.clone(),
+            value,
+        })
     }
 }
 

@@ -1,11 +1,10 @@
 //! When a sensor falls silent or freezes, and when it is back. Reported as soon as it is clear.
 
-use super::super::{Feed, Report, Reporter};
-use super::{Monitor, places, silence, standstill};
+use super::super::Feed;
+use super::{Finding, Monitor, places, silence, standstill};
 use crate::compile::origins::{health_reasons, of_truths};
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::SampleRange;
-use crate::recording::Samples;
 use crate::time::Instant;
 
 /// A sensor is silent for so long, in s, before that is reported.
@@ -29,13 +28,19 @@ impl SensorMonitor {
         let sensors = Sensor::of(plan).map(Some).collect();
         Self { sensors }
     }
+
+    /// Those that have been reported and go on failing.
+    pub fn faults(&self) -> impl Iterator<Item = (&str, SensorFault)> {
+        let sensors = self.sensors.iter().flatten();
+        sensors.filter_map(|of| Some((&*of.source.name, of.fault?)))
+    }
 }
 
 impl Monitor for SensorMonitor {
-    fn row(&mut self, now: Instant, samples: &Samples, reporter: &dyn Reporter) {
+    fn row(&mut self, now: Instant, values: &[f64], found: &mut Vec<Finding>) {
         let at_s = now.as_ns() as f64 / 1e9;
         let mut any = false;
-        for (sensor, &value) in self.sensors.iter_mut().zip(&samples.values) {
+        for (sensor, &value) in self.sensors.iter_mut().zip(values) {
             if let Some(sensor) = sensor {
                 any |= sensor.row(at_s, value);
             }
@@ -51,9 +56,7 @@ impl Monitor for SensorMonitor {
                 })
             };
             let sensors = self.sensors.iter().flatten();
-            let changes: Vec<_> = sensors.filter_map(change).collect();
-            let changes = &changes;
-            reporter.report(Report::Sensors { changes, at_s });
+            found.push(Finding::Sensors(sensors.filter_map(change).collect()));
         }
     }
 
@@ -62,7 +65,7 @@ impl Monitor for SensorMonitor {
         sensors.for_each(Sensor::interrupt);
     }
 
-    fn follow(&mut self, plan: &Plan, feed: &[Feed], _usual: &[SampleRange]) {
+    fn follow(&mut self, plan: &Plan, feed: &[Feed], _: &[SampleRange], _: &mut Vec<Finding>) {
         let mut before = std::mem::take(&mut self.sensors);
         before.resize_with(feed.len(), || None);
         self.sensors.resize_with(feed.len(), || None);

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
-use super::monitor::{Monitor, OutputMonitor};
+use super::monitor::{Finding, Monitor, OutputMonitor};
 use super::store::{OutputIdentity, StateStore};
 use super::{Feed, Frame, RunError, Sink};
 use crate::compile::Plan;
@@ -71,6 +71,8 @@ pub struct Session<'a> {
     state: Option<StateStore>,
     restart: Restart,
     monitors: Vec<&'a mut dyn Monitor>,
+    /// What these have found at a row.
+    found: Vec<Finding>,
     output: OutputMonitor,
     identity: Option<OutputIdentity>,
     saved: Clock,
@@ -123,6 +125,7 @@ impl<'a> Session<'a> {
             state: options.state,
             restart,
             monitors: Vec::new(),
+            found: Vec::new(),
             output: OutputMonitor::default(),
             identity: None,
             saved: Clock::now(),
@@ -198,21 +201,24 @@ impl<'a> Session<'a> {
             self.runner.segment();
             return Ok(true);
         };
-        monitors.for_each(|monitor| monitor.row(time, samples, reporter));
         let values = &samples.values;
-        let stepped = self
-            .runner
-            .step(time, values, &mut self.monitors, reporter)?;
-        let Some((revision, outputs)) = stepped else {
+        monitors.for_each(|monitor| monitor.row(time, values, &mut self.found));
+        self.report_found(time, &samples.time_text);
+        let watching = (&mut *self.monitors, &mut self.found);
+        if !self.runner.step(time, values, watching, reporter)? {
             return Ok(false);
-        };
+        }
+        let (engine, monitors) = (self.runner.engine(), self.monitors.iter_mut());
+        monitors.for_each(|monitor| monitor.stepped(time, engine, &mut self.found));
+        self.report_found(time, &samples.time_text);
+        let (revision, outputs) = self.runner.made();
         let frame = Frame {
             time,
             time_text: &samples.time_text,
             revision,
             outputs,
         };
-        self.output.look(&frame);
+        self.output.look(time, frame.outputs);
         sink.put(&frame).map_err(RunError::Sink)?;
         self.save_now_and_then(sink)?;
         Ok(true)
@@ -272,6 +278,10 @@ impl<'a> Session<'a> {
     pub fn finish(&mut self, sink: &mut dyn Sink) -> Result<(), RunError> {
         sink.finish().map_err(RunError::Sink)?;
         self.save_at_the_end(sink)?;
+        let (engine, monitors) = (self.runner.engine(), self.monitors.iter_mut());
+        monitors.for_each(|monitor| monitor.end(engine, &mut self.found));
+        let last = engine.last().unwrap_or(Instant::MIN);
+        self.report_found(last, "");
         self.runner.end(self.reporter);
         Ok(())
     }
@@ -309,6 +319,14 @@ impl<'a> Session<'a> {
             state.save(self.runner.engine(), self.runner.model())?;
         }
         Ok(())
+    }
+
+    fn report_found(&mut self, at: Instant, time: &str) {
+        for finding in &self.found {
+            let found = Report::Found { finding, at, time };
+            self.reporter.report(found);
+        }
+        self.found.clear();
     }
 
     fn look_at_output(&mut self) {

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use super::super::monitor::SensorChange;
+use super::super::monitor::Finding;
 use super::super::store::StateError;
 use super::super::{Notice, StageError, Staged, Verdict};
-use crate::compile::SourceChannel;
 use crate::diagnostic::{Diagnostics, Sources};
-use crate::engine::SampleRange;
 use crate::model::ModelError;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// Takes what a session reports.
 pub trait Reporter {
@@ -50,30 +48,14 @@ pub enum Report<'a> {
     },
     /// The output file was removed, moved or replaced: rows go on into the file that was opened.
     OutputMoved(&'a Path),
-    /// A sample does not count, the first in an hour.
-    Rejected {
-        /// Its channel, with its range.
-        channel: &'a SourceChannel,
-        /// Its instant, as the source wrote it.
+    /// A monitor has found something.
+    Found {
+        /// What.
+        finding: &'a Finding,
+        /// The instant of the row.
+        at: Instant,
+        /// The same, as the source wrote it.
         time: &'a str,
-        /// The sample.
-        value: f64,
-    },
-    /// A sample lies far outside of those of the fit, the first in an hour.
-    OutsideFit {
-        /// The channel, and where its samples lay in the fit.
-        usual: &'a SampleRange,
-        /// Its instant, as the source wrote it.
-        time: &'a str,
-        /// The sample.
-        value: f64,
-    },
-    /// Sensors fail, or are in order again.
-    Sensors {
-        /// Which, and how.
-        changes: &'a [SensorChange],
-        /// The instant of the row, in s.
-        at_s: f64,
     },
     /// Something happened at a hand-over.
     Swap(Notice),

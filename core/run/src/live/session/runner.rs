@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::monitor::Monitor;
+use super::super::monitor::{Finding, Monitor};
 use super::super::{Control, Feed, LiveOptions, RunError, Stepper, pair_from};
 use super::swap_schedule::SwapSchedule;
 use super::{Replacement, Reporter};
@@ -29,8 +29,8 @@ pub(super) struct Replaceable {
     generation: Option<u64>,
 }
 
-/// The revision of the graph that stepped, and its outputs.
-type Made<'a> = (&'a str, &'a [f64]);
+/// The monitors, and what they have found.
+type Watching<'a, 'm> = (&'a mut [&'m mut dyn Monitor], &'a mut Vec<Finding>);
 
 impl Runner {
     pub(super) fn fixed(mut engine: Engine, model: Model, frozen: bool) -> Self {
@@ -116,21 +116,29 @@ impl Runner {
         Ok(())
     }
 
-    /// Steps a row; none where its time is not after the last one.
+    /// Steps a row; false where its time is not after the last one.
     pub(super) fn step(
         &mut self,
         time: Instant,
         samples: &[f64],
-        monitors: &mut [&mut dyn Monitor],
+        watching: Watching<'_, '_>,
         reporter: &dyn Reporter,
-    ) -> Result<Option<Made<'_>>, RunError> {
+    ) -> Result<bool, RunError> {
         match self {
             Self::Fixed(of) => match of.0.step(time, samples) {
-                Ok(_) => Ok(Some((of.0.revision(), of.0.outputs()))),
-                Err(EngineError::NotAfter { .. }) => Ok(None),
+                Ok(_) => Ok(true),
+                Err(EngineError::NotAfter { .. }) => Ok(false),
                 Err(error) => Err(error.into()),
             },
-            Self::Replaceable(of) => of.step(time, samples, monitors, reporter),
+            Self::Replaceable(of) => of.step(time, samples, watching, reporter),
+        }
+    }
+
+    /// The revision of the graph that stepped last, and its outputs.
+    pub(super) fn made(&self) -> (&str, &[f64]) {
+        match self {
+            Self::Fixed(of) => (of.0.revision(), of.0.outputs()),
+            Self::Replaceable(of) => (of.stepper.engine().revision(), &of.shown),
         }
     }
 
@@ -146,13 +154,13 @@ impl Replaceable {
         &mut self,
         time: Instant,
         samples: &[f64],
-        monitors: &mut [&mut dyn Monitor],
+        (monitors, found): Watching<'_, '_>,
         reporter: &dyn Reporter,
-    ) -> Result<Option<Made<'_>>, RunError> {
+    ) -> Result<bool, RunError> {
         self.schedule.before(&mut self.control, time, reporter)?;
         let stepped = match self.stepper.step(time, samples) {
             Ok(stepped) => stepped,
-            Err(EngineError::NotAfter { .. }) => return Ok(None),
+            Err(EngineError::NotAfter { .. }) => return Ok(false),
             Err(error) => return Err(error.into()),
         };
         // Two graphs of one revision may give their outputs in another order.
@@ -167,13 +175,13 @@ impl Replaceable {
                 .extend(self.schedule.columns().iter().map(place));
             let usual = self.schedule.running().sample_ranges();
             for monitor in monitors {
-                monitor.follow(stepped.plan, &self.feed, usual);
+                monitor.follow(stepped.plan, &self.feed, usual, found);
             }
         }
         for (shown, place) in self.shown.iter_mut().zip(&self.places) {
             *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
         }
         self.schedule.count(&self.shown);
-        Ok(Some((stepped.revision, &self.shown)))
+        Ok(true)
     }
 }

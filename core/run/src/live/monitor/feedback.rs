@@ -3,21 +3,20 @@
 //! The rate that is integrated may depend on past truths: by lags, by a vote, or by learning. Where these truths are positions, a
 //! machine under correction shows a drift that is not there. An `uncorrected` node puts back what the correction took away.
 
-use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
-
-use super::{slots, upstream};
+use crate::compile::origins::{of_truths, slots, upstream};
+use crate::compile::{Plan, PlannedNode, PlannedRole};
 
 /// The measured channels that a correction moves and goes by.
 #[must_use]
-pub fn corrected_channels(plan: &Plan) -> Vec<&str> {
+pub fn corrected_channels(plan: &Plan) -> Vec<String> {
     let corrections = plan.nodes.iter().filter(|of| of.kind.name == "compensate");
     let rates = corrections.flat_map(|node| slots(plan, node.role.gathers()));
     let seen = upstream(plan, rates, |node| goes_by(plan, node));
-    let of_truths = super::of_truths(plan);
+    let of_truths = of_truths(plan);
     let moved = plan.sources.iter().enumerate();
     moved
         .filter(|(slot, _)| of_truths[*slot] && seen[*slot])
-        .map(|(_, source)| source.name.as_str())
+        .map(|(_, source)| source.name.clone())
         .collect()
 }
 
@@ -40,14 +39,20 @@ fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
 /// The warning about a graph whose correction goes by what it moves; none for others.
 #[must_use]
 pub fn in_words(plan: &Plan) -> Option<String> {
-    let channels = corrected_channels(plan);
+    words(&corrected_channels(plan))
+}
+
+/// The same, of channels that are known.
+#[must_use]
+pub fn words<S: AsRef<str>>(channels: &[S]) -> Option<String> {
     let (first, more) = channels.split_first()?;
     let more = match more.len() {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
     Some(format!(
-        "the correction goes by past drifts of {first}{more}, which on a machine that is being corrected lack what it took away: put an \
-         `uncorrected` node between, as `athermal nodes uncorrected` tells, or it takes away less than it could"
+        "the correction goes by past drifts of {}{more}, which on a machine that is being corrected lack what it took away: put an \
+         `uncorrected` node between, as `athermal nodes uncorrected` tells, or it takes away less than it could",
+        first.as_ref()
     ))
 }
