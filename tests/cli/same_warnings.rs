@@ -89,7 +89,7 @@ fn reported(finished: &Finished, kinds: &[&str]) -> Vec<Value> {
     let of_kind = lines.filter(|of| kinds.iter().any(|kind| of["event"] == *kind));
     let bare = of_kind.map(|mut of| {
         let keys = of.as_object_mut().unwrap();
-        (keys.remove("time"), keys.remove("message"));
+        keys.retain(|key, _| key != "time" && key != "message");
         of
     });
     bare.collect()

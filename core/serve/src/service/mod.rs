@@ -65,6 +65,7 @@ use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Leader, Sequencer};
 use crate::time::Duration;
 use crate::worker::Worker;
+use asked::samples;
 use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
 use host_clock::HostClock;
@@ -484,8 +485,7 @@ impl Service {
         self.stop_sinks.ask();
         events.extend(self.events.try_iter());
         let ended = Ended {
-            channels: self.channels.into_iter().zip(snapshot.counts).collect(),
-            outside: snapshot.outside,
+            channels: samples(&self.channels, &self.sources, &snapshot),
             ticks: snapshot.ticks,
             happenings: snapshot.happenings,
             hurried: snapshot.hurried,

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::ChannelSamples;
 use crate::host;
 use crate::journal::JournalStatus;
-use crate::sequencer::Counts;
 use crate::time::Instant;
 
 /// How a service is run.
@@ -40,9 +40,7 @@ impl ServiceOptions {
 #[derive(Debug)]
 pub struct Ended {
     /// What became of the samples of each channel.
-    pub channels: Vec<(String, Counts)>,
-    /// How many of the accepted samples of each channel are infinite or outside of the range of their signal.
-    pub outside: Vec<u64>,
+    pub channels: Vec<ChannelSamples>,
     /// How many ticks samples made since the start.
     pub ticks: u64,
     /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.

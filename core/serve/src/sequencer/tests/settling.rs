@@ -167,7 +167,7 @@ fn one_of_two_sources_dies_then_flaps_and_the_other_pauses_once_for_settle_at_mo
         let late: Vec<_> = late.collect();
         assert!(late.len() <= 6, "{death} {up}: {late:?}");
         let delay = |(cut, stamp): &&(Moment, Instant)| cut.as_ns() - stamp.as_ns();
-        let longest = late.iter().map(|of| delay(of)).max();
+        let longest = late.iter().map(delay).max();
         assert!(longest <= Some(5_250_000_000), "{death} {up}: {late:?}");
         if let [first, .., last] = late[..] {
             let pause = ms(1_000 * (late.len() as i64 - 1));
