@@ -88,15 +88,8 @@ impl Service {
     /// where none is connected. It changes nothing of what is put out.
     #[must_use]
     pub fn lacking(&self) -> Vec<&str> {
-        let connections = self
-            .sources
-            .iter()
-            .map(|(name, of)| (name, of.connection()));
-        let is_fed = |of| matches!(of, Connection::Connected | Connection::Ended);
-        let is_none_there = !connections.clone().any(|(_, of)| is_fed(of));
-        let lacks = |of| of == Connection::Never || is_none_there && of == Connection::Away;
-        let lacking = connections.filter(|(_, of)| lacks(*of));
-        lacking.map(|(name, _)| name.as_str()).collect()
+        let sources = self.sources.iter();
+        lacking(sources.map(|(name, of)| (name.as_str(), of.connection())))
     }
 
     /// What is watched of the graph that runs, and what was found.
@@ -149,4 +142,33 @@ pub(super) fn samples(
         }
     };
     channels.iter().enumerate().map(channel).collect()
+}
+
+fn lacking<'a>(sources: impl Iterator<Item = (&'a str, Connection)> + Clone) -> Vec<&'a str> {
+    let is_fed = |of| matches!(of, Connection::Connected | Connection::Ended);
+    let is_none_there = !sources.clone().any(|(_, of)| is_fed(of));
+    let lacks = |of| of == Connection::Never || is_none_there && of == Connection::Away;
+    let lacking = sources.filter(|(_, of)| lacks(*of));
+    lacking.map(|(name, _)| name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_service_lacks_what_never_connected_and_all_that_is_away_where_nothing_is_there() {
+        use Connection::{Away, Connected, Ended, Never};
+        for (one, other, lacks) in [
+            (Connected, Connected, &[][..]),
+            (Connected, Never, &["b"]),
+            (Connected, Away, &[]),
+            (Ended, Away, &[]),
+            (Away, Away, &["a", "b"]),
+            (Never, Away, &["a", "b"]),
+        ] {
+            let found = lacking([("a", one), ("b", other)].into_iter());
+            assert_eq!(found, lacks, "{one:?} {other:?}");
+        }
+    }
 }

@@ -9,6 +9,7 @@
 
 mod asked;
 mod command;
+mod ending;
 mod engine_thread;
 mod error;
 mod event;
@@ -16,7 +17,6 @@ mod frames;
 mod handle;
 mod host_clock;
 mod observer;
-mod options;
 mod position;
 mod replacing;
 mod sink_thread;
@@ -42,12 +42,12 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::CommitError;
 pub use asked::ChannelSamples;
+pub use ending::Ended;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
-pub use options::{Ended, ServiceOptions};
 pub use status::Snapshot;
 
 use crate::aside::{Aside, within};
@@ -60,12 +60,11 @@ use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
 use crate::journal::{FeedNames, JournalOptions, Keep, Progress, Recorder, oldest, retire};
 use crate::keeper::Keeper;
-use crate::moment::{Moment, MonotonicClock};
+use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Leader, Sequencer};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::worker::Worker;
-use asked::samples;
 use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
 use host_clock::HostClock;
@@ -78,8 +77,35 @@ use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
-/// How long the threads may take to end.
-const ENDS: Wait = Wait::from_secs(5);
+
+/// How a service is run.
+#[derive(Debug, Clone)]
+pub struct ServiceOptions {
+    /// The state folder.
+    pub state: PathBuf,
+    /// Whether commands are not put out.
+    pub is_dry: bool,
+    /// Whether estimators learn nothing.
+    pub frozen: bool,
+    /// The machine file.
+    pub machine: PathBuf,
+    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
+    pub host_time: fn() -> Option<Instant>,
+}
+
+impl ServiceOptions {
+    /// A service that puts everything out and learns, with its state in a folder.
+    #[must_use]
+    pub fn new(state: PathBuf) -> Self {
+        Self {
+            state,
+            is_dry: false,
+            frozen: false,
+            machine: PathBuf::new(),
+            host_time: host::synchronised,
+        }
+    }
+}
 
 /// A service at work.
 pub struct Service {
@@ -399,21 +425,6 @@ impl Service {
         events
     }
 
-    /// Whether all sources have come to their ends and their rows are put out, the engine cannot go on, or the end was asked for. A
-    /// sink that does not get on is not waited for; it has its rows at the next start.
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        let is_put = || self.sink_threads.iter().all(JoinHandle::is_finished);
-        self.is_asked_to_end
-            || self.engine.is_finished() && (is_put() || self.put.1.elapsed() >= ENDS)
-    }
-
-    /// Asks for the end: whoever runs the service stops it.
-    pub fn ask_to_end(&mut self, by: &str) {
-        self.note(&format!("{by}: asked for the end"));
-        self.is_asked_to_end = true;
-    }
-
     /// Reports something that happened, as if it had happened here.
     pub fn report(&mut self, event: ServiceEvent) {
         self.own.push(event);
@@ -445,59 +456,6 @@ impl Service {
     /// Writes a remark into the journal.
     pub fn note(&mut self, text: &str) {
         self.order(Order::Note(text.into()));
-    }
-
-    /// Ends: what waits is stepped, rows are put out, the journal is synced, and a checkpoint is taken.
-    ///
-    /// # Errors
-    /// When the last checkpoint cannot be written. Everything is in the journal all the same.
-    pub fn stop(mut self) -> Result<(Ended, Vec<ServiceEvent>), ServiceError> {
-        // Whoever still asks is answered that it has ended.
-        drop(std::mem::replace(&mut self.asked, ServiceHandle::new().1));
-        self.companions.clear();
-        self.stop_sources.ask();
-        self.order(Order::Stop);
-        let mut events = Vec::new();
-        let began = Clock::now();
-        while !self.engine.is_finished() && began.elapsed() < ENDS {
-            events.extend(self.pump());
-            std::thread::sleep(Wait::from_millis(2));
-        }
-        // What came last, where the engine ended before anybody looked.
-        events.extend(self.pump());
-        self.keeper.control().end_watch();
-        let found: Vec<_> = self.found().collect();
-        self.observers.events(&found);
-        events.extend(found);
-        let worker = self.engine.is_finished().then(|| self.engine.join());
-        let mut has_failed = self.has_failed;
-        let mut snapshot = self.shared.read();
-        if let Some(Ok(worker)) = worker {
-            worker.publish(&mut snapshot, Moment::START);
-            worker.into_parts().2.finish();
-        } else {
-            has_failed = true;
-        }
-        let ended = |thread: &JoinHandle<()>| thread.is_finished();
-        while !self.sink_threads.iter().all(ended) && began.elapsed() < ENDS {
-            std::thread::sleep(Wait::from_millis(2));
-        }
-        self.stop_sinks.ask();
-        events.extend(self.events.try_iter());
-        let ended = Ended {
-            channels: samples(&self.channels, &self.sources, &snapshot),
-            ticks: snapshot.ticks,
-            happenings: snapshot.happenings,
-            hurried: snapshot.hurried,
-            journal: self.progress.status(),
-            has_failed,
-        };
-        if !has_failed {
-            self.keeper.finish()?;
-        }
-        // A source that does not stop does not keep the program from ending.
-        drop(self.source_threads);
-        Ok((ended, events))
     }
 
     fn found(&mut self) -> impl Iterator<Item = ServiceEvent> {
