@@ -89,7 +89,7 @@ fn reported(finished: &Finished, kinds: &[&str]) -> Vec<Value> {
     let of_kind = lines.filter(|of| kinds.iter().any(|kind| of["event"] == *kind));
     let bare = of_kind.map(|mut of| {
         let keys = of.as_object_mut().unwrap();
-        (keys.remove("time"), keys.remove("message"));
+        keys.retain(|key, _| key != "time" && key != "message");
         of
     });
     bare.collect()
@@ -299,7 +299,7 @@ fn a_service_says_what_it_watches_and_what_became_of_each_sample_wherever_its_st
     for words in [
         "source log: connected",
         "left out 1 repeated, 1 out of order, 1 unreadable",
-        "temperature.b of log: 642 samples",
+        "temperature.b: 642 samples of log",
         "left out 25 out of range",
         "temperature.a: 21 samples far outside of the fit, 35.5",
         "the correction goes by past drifts of position.Z",

@@ -34,7 +34,7 @@ impl Outside {
     pub(crate) fn look(&mut self, row: &[f64]) {
         for ((count, range), &value) in self.counts.iter_mut().zip(&self.ranges).zip(row) {
             let is_outside = |&(lowest, highest): &(f64, f64)| {
-                !value.is_nan() && !(value.is_finite() && value >= lowest && value <= highest)
+                value.is_infinite() || value < lowest || value > highest
             };
             *count += u64::from(range.as_ref().is_some_and(is_outside));
         }

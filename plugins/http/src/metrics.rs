@@ -130,7 +130,7 @@ fn ticks(page: &mut Page, service: &Service, known: &Known) {
     );
     page.counter(
         "athermal_missed_ticks_total",
-        "Ticks that the control thread missed.",
+        "Ticks, beats, breaks and freezes that the control thread missed.",
         known.missed,
     );
     page.gauge(

@@ -127,10 +127,10 @@ pub fn status(of: &Value) -> String {
         let reasons = LeftOut::ALL.map(LeftOut::name);
         let _ = writeln!(
             all,
-            "{} of {}: {} samples, age {}{}",
+            "{}: {} samples of {}, age {}{}",
             text(&channel["channel"]),
-            text(&channel["source"]),
             channel["accepted"],
+            text(&channel["source"]),
             seconds(&channel["age_s"]),
             counts(reasons.into_iter().map(|why| (why, &channel[why])))
         );

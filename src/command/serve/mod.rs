@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::serve::connector::LeftOut;
 use athermal::serve::deployment::Deployment;
 use athermal::serve::service::{Ended, Service, ServiceError, ServiceOptions, usual_state};
 use clap::Args;
@@ -115,28 +116,25 @@ fn refused(error: ServiceError) -> Failure {
 }
 
 fn summary(terminal: &Terminal, ended: &Ended) {
-    for (channel, counts) in &ended.channels {
-        let left_out = [
-            (counts.late, "late"),
-            (counts.twice, "repeated"),
-            (counts.future, "from the future"),
-            (counts.clock, "of a wrong clock"),
-        ];
-        let left_out = left_out.into_iter().filter(|(count, _)| *count > 0);
-        let words: Vec<_> = left_out
-            .map(|(count, why)| format!("{count} {why}"))
+    for of in &ended.channels {
+        let left_out = of.left_out.iter();
+        let some = left_out.filter(|(why, count)| *count > 0 && *why != LeftOut::OutOfRange);
+        let words: Vec<_> = some
+            .map(|(why, count)| format!("{count} {}", why.name().replace('_', " ")))
             .collect();
         if !words.is_empty() {
             terminal.warning(format_args!(
-                "{channel}: left out {} beside {} accepted",
+                "{}: left out {} beside {} accepted",
+                of.channel,
                 words.join(", "),
-                counted(counts.accepted, "sample")
+                counted(of.accepted, "sample")
             ));
         }
     }
-    for ((channel, _), &samples) in ended.channels.iter().zip(&ended.outside) {
+    for of in &ended.channels {
+        let samples = of.left_out(LeftOut::OutOfRange);
         if samples > 0 {
-            terminal.warning(findings::rejected(channel, samples, ended.ticks));
+            terminal.warning(findings::rejected(&of.channel, samples, ended.ticks));
         }
     }
     if ended.hurried > 0 {

@@ -44,6 +44,10 @@ pub fn by_runs(scratch: &Scratch, model: &Path, [one, two]: [&PathBuf; 2]) -> Ve
     );
     let none = other("none.toml", "outputs.predicted = \"still\"");
     let silent = other("silent.toml", "nodes.drift.windows = [\"1s\"]");
+    let moved = other(
+        "moved.toml",
+        "outputs.correction = \"correction\"\nnodes.correction = { type = \"compensate\", inputs.rate = \"same\", range = \"50 um\", max_rate = \"1 um/min\", max_slew = \"50 nm/s\" }",
+    );
     let x = |nth: u32| 10.0 * f64::from(nth) + 7.0 * (0.9 * f64::from(nth)).sin();
     let row = |nth: u32| format!("{},{:.3}\n", 10 * nth, x(nth));
     let log: String = (0..40).map(row).collect();
@@ -66,6 +70,7 @@ pub fn by_runs(scratch: &Scratch, model: &Path, [one, two]: [&PathBuf; 2]) -> Ve
         told(&graph, &bad, &[&"-i", &"-", &"--lenient"]),
         told(&graph, &objects, &[&"-i", &"-"]),
         told(&silent, &plain, &[&"-i", &"-"]),
+        told(&moved, &plain, &[&"-i", &"-"]),
         told(&graph, &plain, &[&"-i", &"-", &other]),
         told(&graph, &plain, &[&"-i", &"-", &none, &"--shadow", &"100s"]),
         told(&graph, &plain, &kept),

@@ -27,6 +27,14 @@ pub struct ChannelSamples {
     pub stamp: Instant,
 }
 
+impl ChannelSamples {
+    /// How many were left out for a reason.
+    #[must_use]
+    pub fn left_out(&self, reason: LeftOut) -> u64 {
+        self.left_out[reason as usize].1
+    }
+}
+
 impl Service {
     /// How long it has been running.
     #[must_use]
@@ -74,49 +82,15 @@ impl Service {
     /// The samples of each channel, in the order of [`channels`](Self::channels): what became of them.
     #[must_use]
     pub fn samples(&self) -> Vec<ChannelSamples> {
-        let known = self.snapshot();
-        let channel = |(place, name): (usize, &String)| {
-            let source = self
-                .sources
-                .iter()
-                .find_map(|(name, of)| Some((name, of, of.channel(place)?)));
-            let counts = known.counts[place];
-            let left_out = |reason: LeftOut| {
-                let by_source = source.map_or(0, |(_, of, nth)| of.left_out.of(Some(nth), reason));
-                by_source
-                    + match reason {
-                        LeftOut::Late => counts.late,
-                        LeftOut::Repeated => counts.twice,
-                        LeftOut::Future => counts.future,
-                        LeftOut::Clock => counts.clock,
-                        LeftOut::OutOfRange => known.outside[place],
-                        _ => 0,
-                    }
-            };
-            ChannelSamples {
-                channel: name.clone(),
-                source: source.map(|(name, ..)| name.clone()),
-                accepted: counts.accepted,
-                left_out: LeftOut::ALL.map(|reason| (reason, left_out(reason))),
-                stamp: known.stamps[place],
-            }
-        };
-        self.channels.iter().enumerate().map(channel).collect()
+        samples(&self.channels, &self.sources, &self.snapshot())
     }
 
     /// The sources without which the service is not whole: those that have not been connected since it started, and all that are away
     /// where none is connected. It changes nothing of what is put out.
     #[must_use]
     pub fn lacking(&self) -> Vec<&str> {
-        let connections = self
-            .sources
-            .iter()
-            .map(|(name, of)| (name, of.connection()));
-        let is_fed = |of| matches!(of, Connection::Connected | Connection::Ended);
-        let is_none_there = !connections.clone().any(|(_, of)| is_fed(of));
-        let lacks = |of| of == Connection::Never || is_none_there && of == Connection::Away;
-        let lacking = connections.filter(|(_, of)| lacks(*of));
-        lacking.map(|(name, _)| name.as_str()).collect()
+        let sources = self.sources.iter();
+        lacking(sources.map(|(name, of)| (name.as_str(), of.connection())))
     }
 
     /// What is watched of the graph that runs, and what was found.
@@ -135,5 +109,67 @@ impl Service {
     #[must_use]
     pub fn journal(&self) -> JournalStatus {
         self.progress.status()
+    }
+}
+
+/// What became of the samples of these channels, by what the sources and the engine thread have counted.
+pub(super) fn samples(
+    channels: &[String],
+    sources: &[(String, Arc<SourceCounts>)],
+    known: &Snapshot,
+) -> Vec<ChannelSamples> {
+    let channel = |(place, name): (usize, &String)| {
+        let mut sources = sources.iter();
+        let source = sources.find_map(|(name, of)| Some((name, of, of.channel(place)?)));
+        let counts = known.counts[place];
+        let left_out = |reason: LeftOut| {
+            let by_source = source.map_or(0, |(_, of, nth)| of.left_out.of(Some(nth), reason));
+            let by_engine = match reason {
+                LeftOut::Late => counts.late,
+                LeftOut::Repeated => counts.twice,
+                LeftOut::Future => counts.future,
+                LeftOut::Clock => counts.clock,
+                LeftOut::OutOfRange => known.outside[place],
+                _ => 0,
+            };
+            by_source + by_engine
+        };
+        ChannelSamples {
+            channel: name.clone(),
+            source: source.map(|(name, ..)| name.clone()),
+            accepted: counts.accepted,
+            left_out: LeftOut::ALL.map(|reason| (reason, left_out(reason))),
+            stamp: known.stamps[place],
+        }
+    };
+    channels.iter().enumerate().map(channel).collect()
+}
+
+fn lacking<'a>(sources: impl Iterator<Item = (&'a str, Connection)> + Clone) -> Vec<&'a str> {
+    let is_fed = |of| matches!(of, Connection::Connected | Connection::Ended);
+    let is_none_there = !sources.clone().any(|(_, of)| is_fed(of));
+    let lacks = |of| of == Connection::Never || is_none_there && of == Connection::Away;
+    let lacking = sources.filter(|(_, of)| lacks(*of));
+    lacking.map(|(name, _)| name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_service_lacks_what_never_connected_and_all_that_is_away_where_nothing_is_there() {
+        use Connection::{Away, Connected, Ended, Never};
+        for (one, other, lacks) in [
+            (Connected, Connected, &[][..]),
+            (Connected, Never, &["b"]),
+            (Connected, Away, &[]),
+            (Ended, Away, &[]),
+            (Away, Away, &["a", "b"]),
+            (Never, Away, &["a", "b"]),
+        ] {
+            let found = lacking([("a", one), ("b", other)].into_iter());
+            assert_eq!(found, lacks, "{one:?} {other:?}");
+        }
     }
 }

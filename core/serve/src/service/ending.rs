@@ -4,9 +4,11 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::{Duration as Wait, Instant as Clock};
 
+use super::asked::samples;
 use super::engine_thread::Order;
 use super::watch::Watch;
-use super::{Ended, Service, ServiceError, ServiceEvent, ServiceHandle};
+use super::{ChannelSamples, Service, ServiceError, ServiceEvent, ServiceHandle};
+use crate::journal::JournalStatus;
 use crate::moment::Moment;
 
 /// What comes within so long is taken in together.
@@ -15,6 +17,23 @@ const TOGETHER: Wait = Wait::from_millis(50);
 const LOOK: Wait = Wait::from_secs(1);
 /// How long the threads may take to end.
 const ENDS: Wait = Wait::from_secs(5);
+
+/// What is left of a service that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// What became of the samples of each channel.
+    pub channels: Vec<ChannelSamples>,
+    /// How many ticks samples made since the start.
+    pub ticks: u64,
+    /// How many ticks, beats, breaks and freezes there were, those of earlier runs included.
+    pub happenings: u64,
+    /// How many ticks were cut early because too many samples waited.
+    pub hurried: u64,
+    /// How the journal is.
+    pub journal: JournalStatus,
+    /// Whether the engine could not go on.
+    pub has_failed: bool,
+}
 
 impl Service {
     /// Waits until [`pump`](Self::pump) has something to do. For the thread that started the service, which others may unpark; any other
@@ -86,8 +105,7 @@ impl Service {
         self.stop_sinks.ask();
         events.extend(self.events.try_iter());
         let ended = Ended {
-            channels: self.channels.into_iter().zip(snapshot.counts).collect(),
-            outside: snapshot.outside,
+            channels: samples(&self.channels, &self.sources, &snapshot),
             ticks: snapshot.ticks,
             happenings: snapshot.happenings,
             hurried: snapshot.hurried,

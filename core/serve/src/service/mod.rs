@@ -17,7 +17,6 @@ mod frames;
 mod handle;
 mod host_clock;
 mod observer;
-mod options;
 mod position;
 mod replacing;
 mod sink_thread;
@@ -43,12 +42,12 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::CommitError;
 pub use asked::ChannelSamples;
+pub use ending::Ended;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
-pub use options::{Ended, ServiceOptions};
 pub use status::Snapshot;
 
 use crate::aside::{Aside, within};
@@ -65,7 +64,7 @@ use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::{Leader, Sequencer};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order, Remark};
 use handle::Work;
@@ -79,6 +78,35 @@ use wiring::{fed, keep, outputs, rules};
 
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
+
+/// How a service is run.
+#[derive(Debug, Clone)]
+pub struct ServiceOptions {
+    /// The state folder.
+    pub state: PathBuf,
+    /// Whether commands are not put out.
+    pub is_dry: bool,
+    /// Whether estimators learn nothing.
+    pub frozen: bool,
+    /// The machine file.
+    pub machine: PathBuf,
+    /// Asks for the host's time, where it is known to be right: [`host::synchronised`].
+    pub host_time: fn() -> Option<Instant>,
+}
+
+impl ServiceOptions {
+    /// A service that puts everything out and learns, with its state in a folder.
+    #[must_use]
+    pub fn new(state: PathBuf) -> Self {
+        Self {
+            state,
+            is_dry: false,
+            frozen: false,
+            machine: PathBuf::new(),
+            host_time: host::synchronised,
+        }
+    }
+}
 
 /// A service at work.
 pub struct Service {

@@ -195,7 +195,9 @@ fn a_recording_that_is_replayed_gives_the_bits_of_the_engine() {
         "{events:?}"
     );
     assert_eq!(ended.happenings, 2_000);
-    let is_late = |(_, counts): &(String, athermal_serve::sequencer::Counts)| counts.late > 0;
+    let is_late = |of: &athermal_serve::service::ChannelSamples| {
+        of.left_out(athermal_serve::connector::LeftOut::Late) > 0
+    };
     assert!(!ended.channels.iter().any(is_late), "no row is torn apart");
     assert_eq!(ended.journal.lost, 0);
 }
