@@ -11,6 +11,7 @@ mod kind;
 mod outlet;
 mod source_link;
 mod stop;
+mod thin;
 
 pub use back_off::BackOff;
 pub use error::ConnectorError;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration as Wait;
 
-use super::{Service, SinkCounts, Snapshot};
+use super::{Held, Service, SinkCounts, Snapshot};
 use crate::connector::SourceCounts;
 use crate::folder::StateFolder;
 use crate::journal::JournalStatus;
@@ -20,6 +20,12 @@ impl Service {
     #[must_use]
     pub fn last_checkpoint(&self) -> u64 {
         self.keeper.last()
+    }
+
+    /// What the graph keeps of the past; none before there are two checkpoints of this run.
+    #[must_use]
+    pub fn held(&self) -> Option<Held> {
+        self.keeper.held()
     }
 
     /// The state folder.

@@ -40,7 +40,7 @@ use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
-pub use crate::keeper::CommitError;
+pub use crate::keeper::{CommitError, Held};
 pub use ending::Ended;
 pub use error::ServiceError;
 pub use event::ServiceEvent;
@@ -276,6 +276,7 @@ impl Service {
             folder.path(),
             (&feed, &stamps),
             (engine_thread.thread(), &progress),
+            (runtime.wait, runtime.future),
         )?;
         let _ = hand_over.send(open.links);
         let (handle, asked) = ServiceHandle::new();
