@@ -94,7 +94,7 @@ pub struct Dataset {
     paths: Vec<PathBuf>,
     /// What is read instead of the paths, which then name it.
     other: Option<Rc<dyn recording::Recording>>,
-    thinned: Vec<ThinnedChannels>,
+    thinned: Box<[ThinnedChannels]>,
     options: Options,
     reports: RefCell<Vec<(String, Report)>>,
 }
@@ -106,7 +106,7 @@ impl Dataset {
         Self {
             paths,
             other: None,
-            thinned: Vec::new(),
+            thinned: Box::default(),
             options,
             reports: RefCell::new(Vec::new()),
         }
@@ -131,7 +131,7 @@ impl Dataset {
     /// The same, of which channels are thinned; a recording that is no file has been already.
     #[must_use]
     pub fn thinned(mut self, rules: Vec<ThinnedChannels>) -> Self {
-        self.thinned = rules;
+        self.thinned = rules.into();
         self
     }
 

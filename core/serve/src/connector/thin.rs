@@ -78,8 +78,9 @@ impl Thin {
 
     /// How many of the samples that came are safe, where so many of those that were handed on are.
     pub(super) fn safe(&mut self, given: u64) -> u64 {
-        while let Some((_, came)) = self.due.pop_front_if(|(of, _)| *of <= given) {
-            self.safe = came;
+        while let Some((_, came)) = self.due.front().filter(|(of, _)| *of <= given) {
+            self.safe = *came;
+            self.due.pop_front();
         }
         if self.due.is_empty() && self.thinner.first().is_none() {
             self.safe = self.came_in;
