@@ -6,10 +6,13 @@ use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::OnceLock;
 
 use athermal::core::compile::Plan;
+use athermal::core::document::GraphFile;
 use athermal::files::{Dataset, FileError, Format, Options, Report, is_in_memory, recordings_in};
 use athermal::run::model::DataCard;
+use athermal::run::recording::ThinnedChannels;
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
 use clap::Args;
@@ -39,6 +42,9 @@ pub struct Data {
     reading: Reading,
     #[command(flatten)]
     times: Times,
+    /// What a machine file thins of them.
+    #[arg(skip)]
+    thinned: OnceLock<Vec<ThinnedChannels>>,
 }
 
 /// A file, or the files of a folder, by the name that was given.
@@ -116,7 +122,17 @@ impl Data {
             lenient: false,
             reading,
             times: Times::default(),
+            thinned: OnceLock::new(),
         }
+    }
+
+    /// From now on it is thinned as a graph that was read from a file says.
+    ///
+    /// # Errors
+    /// When that has mistakes.
+    pub fn thin(&self, path: &Path, graph: &GraphFile) -> Result<(), Failure> {
+        let _ = self.thinned.set(super::thinned::of(path, graph)?);
+        Ok(())
     }
 
     /// The files that the name in an offset stands for: a path, or the name of files in any folder.
@@ -181,6 +197,7 @@ impl Data {
     pub fn others(&self, files: Vec<PathBuf>) -> Self {
         Self {
             lenient: self.lenient,
+            thinned: self.thinned.clone(),
             ..Self::of(files, self.reading.clone())
         }
     }
@@ -218,7 +235,7 @@ impl Data {
             let files = self.named(name);
             files.map(|file| (file.to_owned(), by.as_ns()))
         });
-        Dataset::new(
+        let dataset = Dataset::new(
             files,
             Options {
                 lenient: self.lenient,
@@ -229,7 +246,8 @@ impl Data {
                 stretch: self.times.stretch(),
                 ..Options::default()
             },
-        )
+        );
+        dataset.thinned(self.thinned.get().cloned().unwrap_or_default())
     }
 
     /// These files as a command for a shell names them; more of them may follow.

@@ -89,6 +89,7 @@ impl Evaluate {
     pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<Found, Failure> {
         self.scored.check(model)?;
         self.data.check_offsets(&[])?;
+        self.data.thin(&self.model, &model.graph)?;
         let dataset = self.data.dataset();
         let options = ScoreOptions {
             each_on_its_own: self.each_on_its_own,

@@ -99,6 +99,7 @@ impl Fit {
         self.data.check_lasting("--data")?;
         let mut sources = Sources::new();
         let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
+        self.data.thin(&self.graph, &model.graph)?;
         let outcome = self.fit(&mut model, terminal)?;
         self.doubt_tests(&model, sources, terminal);
         let failed = outcome.report.failed().count();

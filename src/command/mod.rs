@@ -32,6 +32,7 @@ mod serve;
 mod show;
 pub(crate) mod simulate;
 mod test;
+mod thinned;
 mod threads;
 mod unread;
 mod unscored;

@@ -92,6 +92,7 @@ impl Report {
     /// # Errors
     /// When the data cannot be used.
     pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<(Found, Facts), Failure> {
+        self.data.thin(&self.model, &model.graph)?;
         let dataset = self.data.dataset();
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let facts = gather(model, &watch, self.data.names()).map_err(|error| {

@@ -12,8 +12,12 @@ pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
     let unread = graph.deployment.keys().filter(|key| *key != "model");
     let unread: Vec<_> = unread.map(|section| format!("`[{section}]`")).collect();
     if !unread.is_empty() {
+        let thins = match super::thinned::says(graph) {
+            true => ", but for what is thinned",
+            false => "",
+        };
         terminal.warning(format_args!(
-            "{0}: `athermal run` goes by its options alone and does not read {1}; `athermal serve {0}` does",
+            "{0}: `athermal run` goes by its options alone and does not read {1}{thins}; `athermal serve {0}` does",
             path.display(),
             unread.join(", "),
         ));

@@ -59,5 +59,6 @@ mod starter_graphs;
 mod stopped_runs;
 mod stretches;
 mod swap_commands;
+mod thinned_sources;
 mod trials;
 mod watched_runs;

@@ -30,10 +30,14 @@ impl Checkpoint {
     /// That of an engine after so many ticks, beats, breaks and freezes.
     #[must_use]
     pub fn of(engine: &Engine, happenings: u64) -> Self {
+        Self::of_state(&engine.state(), happenings)
+    }
+
+    pub(crate) fn of_state(state: &EngineState, happenings: u64) -> Self {
         Self {
             happenings,
-            revision: engine.revision().to_owned(),
-            snapshot: engine.snapshot(),
+            revision: state.revision().to_owned(),
+            snapshot: state.to_bytes(),
         }
     }
 

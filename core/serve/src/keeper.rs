@@ -8,8 +8,10 @@ use athermal_run::live::{Control, Notice, StageError};
 
 use crate::aside::{Aside, PATIENCE, within};
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
+use crate::engine::{Engine, EngineState};
 use crate::folder::FolderError;
 use crate::journal::Progress;
+use crate::time::{Duration, Instant};
 
 /// How often is looked whether a checkpoint has been saved, or can be.
 const LOOK: Wait = Wait::from_millis(100);
@@ -31,6 +33,9 @@ pub struct Keeper {
     /// One that is being saved, on a disk that may hang.
     pub(crate) saving: Aside<Result<u64, CheckpointError>>,
     last: u64,
+    /// The first tick that was looked at in this run: its number and its time.
+    first: Option<(u64, Instant)>,
+    held: Option<Held>,
 }
 
 impl Keeper {
@@ -54,6 +59,8 @@ impl Keeper {
             waiting: None,
             saving: Aside::default(),
             last: before,
+            first: None,
+            held: None,
         }
     }
 
@@ -153,6 +160,12 @@ impl Keeper {
         Ok(self.control)
     }
 
+    /// What the graph that runs kept at the last checkpoint; none before there are two of this run.
+    #[must_use]
+    pub fn held(&self) -> Option<Held> {
+        self.held
+    }
+
     /// The checkpoints.
     #[must_use]
     pub fn checkpoints(&self) -> &Checkpoints {
@@ -181,7 +194,9 @@ impl Keeper {
             // What a node that was given up had learned is not whole: the journal goes on from before.
             && replica.panics().is_empty()
         {
-            self.waiting = Some(Checkpoint::of(replica, happenings));
+            let state = replica.state();
+            self.held = Held::of(&state, replica, &mut self.first);
+            self.waiting = Some(Checkpoint::of_state(&state, happenings));
         }
     }
 
@@ -203,6 +218,41 @@ impl Keeper {
             saved.map(|()| checkpoint.happenings)
         });
         Ok(())
+    }
+}
+
+/// What a graph keeps of the past: what runs, and its copy on the control thread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// How many bytes that is, as a checkpoint has them.
+    pub bytes: u64,
+    /// How many it will be once all windows are full, at the rate of ticks that this run has seen.
+    pub full: u64,
+    /// That rate, a second.
+    pub rate: f64,
+}
+
+impl Held {
+    fn of(
+        state: &EngineState,
+        engine: &Engine,
+        first: &mut Option<(u64, Instant)>,
+    ) -> Option<Self> {
+        let (tick, last) = (state.tick(), engine.last()?);
+        let (begin, since) = *first.get_or_insert((tick, last));
+        let passed = (last - since).secs();
+        if tick <= begin || passed <= 0.0 {
+            return None;
+        }
+        let rate = (tick - begin) as f64 / passed;
+        // What an earlier run kept came at this rate too, as far as is known.
+        let span = Duration::from_secs_f64(tick as f64 / rate).unwrap_or(Duration::MAX);
+        let (bytes, full) = state.held(engine.plan(), span);
+        Some(Self {
+            bytes: 2 * bytes,
+            full: 2 * full,
+            rate,
+        })
     }
 }
 

@@ -169,6 +169,12 @@ impl Worker {
         Ok(())
     }
 
+    /// What a source gives next is left of so many samples.
+    pub fn thinned(&mut self, source: usize, samples: u64) {
+        let source = source as u32;
+        self.recorder.record(Record::Thinned { source, samples });
+    }
+
     /// Writes a remark into the journal.
     pub fn note(&mut self, text: Box<str>) {
         self.recorder.record(Record::Note(text));

@@ -84,8 +84,6 @@ struct Stretches {
     /// what the journal does not know is cut off.
     files: Vec<RowFile>,
     held: Vec<u8>,
-    /// The stretch of the last place that was asked for.
-    ended: i64,
 }
 
 impl RowFile {
@@ -114,7 +112,6 @@ impl Stretches {
             names,
             files: Vec::new(),
             held: Vec::new(),
-            ended: i64::MIN,
         };
         let length = of.length();
         // Rows of other columns, or of stretches of another length, are not gone on with.
@@ -228,20 +225,6 @@ impl Stretches {
         Ok(())
     }
 
-    /// Leaves the rows of stretches that have ended before the place that was asked for last: that is on the disk once the next one is
-    /// asked for.
-    fn forget(&mut self) -> io::Result<()> {
-        let open = self.files.last().map_or(i64::MIN, |of| of.stretch);
-        let before = std::mem::replace(&mut self.ended, open);
-        for old in self
-            .files
-            .extract_if(.., |of| of.stretch < before.min(open))
-        {
-            fs::remove_file(&old.path)?;
-        }
-        Ok(())
-    }
-
     /// Writes what is held back; all of it, or none.
     fn write(&mut self) -> io::Result<()> {
         let length = self.length() as u64;
@@ -344,7 +327,6 @@ impl Kept for Stretches {
             Some(last) => last.file.sync_data(),
             None => Ok(()),
         });
-        let synced = synced.and_then(|()| self.forget());
         synced.map_err(|error| failed(&self.folder, &error))?;
         Ok(self.place())
     }
@@ -356,5 +338,13 @@ impl Kept for Stretches {
 
     fn cut(&mut self, end: Place, rows: u64) -> Result<(), ConnectorError> {
         Self::cut(self, end, rows).map_err(|error| failed(&self.folder, &error))
+    }
+
+    /// Rows of stretches that have ended before the place are in files of theirs. Where they cannot be removed they do no harm.
+    fn forget(&mut self, end: Place) {
+        let kept = end.file.cast_signed();
+        for old in self.files.extract_if(.., |of| of.stretch < kept) {
+            let _ = fs::remove_file(&old.path);
+        }
     }
 }

@@ -94,7 +94,7 @@ fn a_file_is_there_once_its_time_is_over_and_a_kill_leaves_whole_files_and_each_
 }
 
 #[test]
-fn a_place_is_good_until_the_one_after_the_next_however_many_files_were_ended_since() {
+fn a_place_is_good_until_one_behind_it_is_kept_however_many_files_were_ended_since() {
     let folder = folder("place");
     let sink = with("{\"path\": \"out\", \"every\": \"1min\"}");
     let open = || open_sink(&sink, &folder, &["a", "b"]).unwrap();
@@ -131,7 +131,13 @@ fn a_place_is_good_until_the_one_after_the_next_however_many_files_were_ended_si
         11,
         "the place before may be the one that is on the disk"
     );
-    kept.end().unwrap();
+    assert_eq!(kept.end().unwrap(), place);
+    assert_eq!(
+        waiting(),
+        11,
+        "it was asked for twice, as where the disk is full"
+    );
+    kept.forget(place);
     assert_eq!(kept.rows_after(place).unwrap(), Some(0));
     assert_eq!(waiting(), 1);
     let seconds: Vec<i64> = files(&out).into_iter().flat_map(|of| of.1).collect();

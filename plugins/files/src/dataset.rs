@@ -7,7 +7,7 @@ use std::rc::Rc;
 use athermal_core::compile::Plan;
 use athermal_core::document::{TimeBase, TimeForm as Declared};
 use athermal_core::time::Duration;
-use athermal_run::recording::{self, Samples, Source, SourceError};
+use athermal_run::recording::{self, Samples, Source, SourceError, ThinnedChannels, thin};
 
 use crate::merge::{self, Joint};
 use crate::recording::offset_of;
@@ -94,6 +94,7 @@ pub struct Dataset {
     paths: Vec<PathBuf>,
     /// What is read instead of the paths, which then name it.
     other: Option<Rc<dyn recording::Recording>>,
+    thinned: Box<[ThinnedChannels]>,
     options: Options,
     reports: RefCell<Vec<(String, Report)>>,
 }
@@ -105,6 +106,7 @@ impl Dataset {
         Self {
             paths,
             other: None,
+            thinned: Box::default(),
             options,
             reports: RefCell::new(Vec::new()),
         }
@@ -123,6 +125,13 @@ impl Dataset {
     #[must_use]
     pub fn of_stretch(mut self, stretch: Stretch) -> Self {
         self.options.stretch = stretch;
+        self
+    }
+
+    /// The same, of which channels are thinned; a recording that is no file has been already.
+    #[must_use]
+    pub fn thinned(mut self, rules: Vec<ThinnedChannels>) -> Self {
+        self.thinned = rules.into();
         self
     }
 
@@ -210,11 +219,12 @@ impl recording::Recording for Dataset {
             }));
         }
         let recording = Joint::open(&self.paths, layout(plan), self.options.clone())?;
-        Ok(Box::new(Reading {
+        let reading = Box::new(Reading {
             recording,
             dataset: self,
             time,
-        }))
+        });
+        Ok(thin(reading, plan, &self.thinned, |_| String::new()))
     }
 }
 

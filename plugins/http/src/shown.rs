@@ -50,6 +50,16 @@ pub fn status(of: &Value) -> String {
             of["undecided"]
         );
     }
+    if let (Some(bytes), Some(full)) = (
+        of["held"]["bytes"].as_f64(),
+        of["held"]["bytes_full"].as_f64(),
+    ) {
+        let (bytes, full) = (bytes / 1e6, full / 1e6);
+        let _ = writeln!(
+            all,
+            "windows hold {bytes:.1} MB, and {full:.1} MB once they are full"
+        );
+    }
     if of["frozen"] == true {
         all += "learning is frozen\n";
     }
@@ -105,6 +115,9 @@ pub fn status(of: &Value) -> String {
             source["dropped"],
             source["restarts"]
         );
+        if source["thinned"] != 0 {
+            let _ = writeln!(all, "  thinned, from {}", source["thinned"]);
+        }
     }
     for sink in of["sinks"].as_array().into_iter().flatten() {
         let _ = writeln!(

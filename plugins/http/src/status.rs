@@ -47,6 +47,7 @@ pub fn status(name: &str, service: &mut Service, known: &Known) -> Value {
         "host_clock_synchronised": snapshot.is_synchronised,
         "beat": service.beat(),
         "last_checkpoint": service.last_checkpoint(),
+        "held": service.held().map(|of| json!({ "bytes": of.bytes, "bytes_full": of.full, "ticks_hz": of.rate })),
         "journal": {
             "written": journal.written,
             "synced": journal.synced,
@@ -181,6 +182,7 @@ fn sources(service: &Service) -> Vec<Value> {
             "restarts": of.restarts.load(Ordering::Relaxed),
             "waiting": of.waiting(),
             "left_out": left_out(&of.left_out),
+            "thinned": of.thinned.load(Ordering::Relaxed),
         })
     };
     service.sources().iter().map(source).collect()

@@ -5,7 +5,7 @@ use std::collections::{HashMap, VecDeque};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration as Wait, Instant as Clock, SystemTime, UNIX_EPOCH};
+use std::time::{Duration as Wait, SystemTime, UNIX_EPOCH};
 
 use athermal_core::time::Instant;
 use athermal_serve::bell::Bell;
@@ -19,9 +19,9 @@ use crate::gap::Gap;
 use crate::payload::{Reading, Reason};
 use crate::source::{Ack, MqttInlet, Retained};
 
-/// What may be acknowledged is looked at no more often, and whether there is room as often where there was none.
+/// How often is looked whether the engine has room where it had none.
 const LOOK: Wait = Wait::from_millis(2);
-/// The same where nobody rings for it, of acknowledgements and of subscriptions without an answer.
+/// How often is looked at acknowledgements for which nobody rings, and at subscriptions without an answer.
 const AGAIN: (Wait, Wait) = (Wait::from_millis(250), Wait::from_secs(1));
 /// How long nothing may be due.
 const LONGEST: Wait = Wait::from_secs(3600);
@@ -89,25 +89,21 @@ impl<'a> Session<'a> {
         });
         self.stop.wakes(&stops);
         self.out.wakes(&looks);
-        let (mut is_rung, mut looked) = (true, Clock::now());
+        // It may have been to stop before.
+        rung.notify_one();
         loop {
             // A connection that is being made takes longer than a look: it is not to be given up for one.
             let mut next = pin!(connection.next());
             let event = loop {
-                let due = match is_rung {
-                    true => LOOK.saturating_sub(looked.elapsed()),
-                    false => self.due(),
-                };
+                // Soon: a broker with Nagle's algorithm sends the next message once the one before is acknowledged.
                 tokio::select! {
                     event = &mut next => break Some(event?),
-                    () = rung.notified(), if !is_rung => is_rung = true,
-                    () = sleep(due) => {
-                        (is_rung, looked) = (false, Clock::now());
-                        self.look(&sender);
-                        if self.stop.is_asked() {
-                            break None;
-                        }
-                    }
+                    () = rung.notified() => {}
+                    () = sleep(self.due()) => {}
+                }
+                self.look(&sender);
+                if self.stop.is_asked() {
+                    break None;
                 }
             };
             match event {
@@ -300,7 +296,7 @@ impl<'a> Session<'a> {
                     return;
                 }
             }
-            let given = self.out.counts().given.load(Ordering::Relaxed);
+            let given = self.out.given();
             if let Some(packet) = waiting.packet {
                 self.acknowledgements.given(given, packet);
             }

@@ -6,7 +6,7 @@ use rumqttc::{TlsConfiguration, Transport};
 use rustls::crypto::ring;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use rustls::{ClientConfig, RootCertStore};
+use rustls::{ClientConfig, Error, RootCertStore};
 
 use crate::broker::{Broker, Identity};
 
@@ -48,11 +48,15 @@ pub fn transport(broker: &Broker) -> Result<Transport, String> {
             let (chain, key) = read(identity)?;
             let config = config.with_client_auth_cert(chain, key);
             config.map_err(|error| {
-                format!(
-                    "the certificate {} does not go with the key {}: {error}",
-                    identity.certificate.display(),
-                    identity.key.display()
-                )
+                let certificate = identity.certificate.display();
+                match error {
+                    Error::InconsistentKeys(_) => {
+                        let key = identity.key.display();
+                        format!("the certificate {certificate} does not go with the key {key}: {error}")
+                    }
+                    // As `openssl x509 -req` makes it where nothing is said of extensions.
+                    _ => format!("the certificate {certificate} cannot be used: {error}; it has to be of version 3 of X.509"),
+                }
             })?
         }
         None => config.with_no_client_auth(),

@@ -114,6 +114,7 @@ impl Diagnose {
             )));
         }
         self.check_names(&model.plan)?;
+        self.data.thin(&self.model, &model.graph)?;
         let dataset = self.data.dataset();
         let options = Options {
             of: self.of.clone(),

@@ -12,20 +12,21 @@ use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
 use athermal::files::{
-    FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
-    layout,
+    FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, TimeColumn, WithRevision, Writer,
+    begun_columns, layout,
 };
 use athermal::run::live::monitor::{Finding, Watch};
 use athermal::run::live::session::WatchedGraph;
 use athermal::run::live::store::{FileLock, OutputIdentity};
 use athermal::run::live::{Session, SessionOptions, Sink, StateStore};
+use athermal::run::recording::thin;
 use clap::Args;
 use serde_json::json;
 
 use crate::command::aside::check_apart;
 use crate::command::faults::{self, ChannelWatch, Purpose};
 use crate::command::model::{self, check_fitted, warn_unfitted, warn_without_novelty};
-use crate::command::{beyond, data, refused, unread};
+use crate::command::{beyond, data, refused, thinned, unread};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::{counted, instant, seconds};
@@ -96,6 +97,8 @@ impl Run {
             let replacement = options.replacement.as_ref();
             swap_words::not_read(failure, replacement.and_then(|of| of.watched.as_ref()))
         })?;
+        let thinned = thinned::of(&self.model, &model.graph)?;
+        let time = TimeColumn::from(&read.time);
         let mut columns = options.columns(&model);
         let is_replaceable = options.replacement.is_some();
         if is_replaceable {
@@ -124,7 +127,9 @@ impl Run {
         } else {
             Box::new(writer)
         };
-        session.run(&mut reader, &mut *sink)?;
+        let mut rows = thin(Box::new(&mut reader), &read, &thinned, |at| time.write(at));
+        session.run(&mut *rows, &mut *sink)?;
+        drop(rows);
         let none = session.output().none(session.engine());
         reports.found(none.filter(|_| ends).map(Finding::NoOutput).as_slice());
         let (engine, ticks) = (session.engine(), session.output().rows());

@@ -4,10 +4,12 @@
 mod drive;
 mod source;
 mod table;
+mod thin;
 
 pub use drive::{Passed, Steps, drive, pass};
 pub use source::{Event, Samples, Source, SourceError};
 pub use table::Table;
+pub use thin::{Left, ThinnedChannels, Thinner, Thinning, thin};
 
 use crate::compile::Plan;
 

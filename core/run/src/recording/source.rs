@@ -54,6 +54,12 @@ pub trait Source {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError>;
 }
 
+impl<S: Source + ?Sized> Source for &mut S {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        (**self).next(samples)
+    }
+}
+
 /// What went wrong with a source; its text says what, where and what to do.
 pub type SourceError = Box<dyn Error + Send + Sync>;
 

@@ -12,6 +12,7 @@ mod left_out;
 mod outlet;
 mod source_link;
 mod stop;
+mod thin;
 
 pub use back_off::BackOff;
 pub use error::ConnectorError;

@@ -6,13 +6,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
+use athermal_run::recording::Thinning;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::thin::Thin;
 use super::{LeftOut, LeftOutCounts, Stamps, Stop, WiredChannel};
 use crate::bell::{Bell, Mailbox};
 use crate::journal::Progress;
 use crate::sequencer::Sample;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// What comes from a source.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +22,8 @@ pub(crate) enum Arrival {
     Sample(Sample),
     /// The next so many samples are of one row.
     Row(usize),
+    /// What follows is left of so many samples.
+    Thinned(u64),
     Connected,
     Away,
     /// The times of what follows may start again.
@@ -54,6 +58,10 @@ impl Remarks {
 pub struct SourceCounts {
     /// Samples that were given.
     pub given: AtomicU64,
+    /// Samples that came, where they are thinned: what is left of them is given.
+    pub thinned: AtomicU64,
+    /// How often time began again, since it had been that of the future.
+    turns: AtomicU64,
     /// Samples that were dropped because the engine thread was behind.
     pub dropped: AtomicU64,
     /// How often it was started again: after a failure, or because it was connected and silent.
@@ -112,7 +120,7 @@ impl SourceCounts {
 
     /// Grows with every sign of life.
     pub(crate) fn signs(&self) -> u64 {
-        [&self.given, &self.dropped, &self.alive]
+        [&self.given, &self.thinned, &self.dropped, &self.alive]
             .iter()
             .map(|count| count.load(Ordering::Relaxed))
             .sum()
@@ -153,6 +161,8 @@ pub struct Outflow {
     /// By channel of the source.
     channels: Vec<FedChannel>,
     stamps: Stamps,
+    /// None where nothing is thinned.
+    thin: Option<Thin>,
     written: Safe,
     synced: Safe,
 }
@@ -220,6 +230,7 @@ pub(crate) fn link(
             })
             .collect(),
         stamps,
+        thin: None,
         written: Safe::default(),
         synced: Safe::default(),
     };
@@ -252,8 +263,87 @@ impl Outflow {
         self.counts.alive.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// From now on it is thinned before it is handed over. A stamp further ahead than `future` ends no interval by itself, unless stamps
+    /// come in order; an interval is over `wait` behind its end then.
+    pub(crate) fn thin(&mut self, thinning: Thinning, (wait, future): (Duration, Duration)) {
+        let bounds = match self.stamps {
+            Stamps::Order => (Duration::ZERO, None),
+            Stamps::Clock => (wait, Some(future)),
+        };
+        let after = self.channels.iter().map(|of| of.after);
+        self.thin = Some(Thin::new(thinning, after, bounds));
+    }
+
+    /// Takes a sample that is thinned.
+    fn take(&mut self, channel: usize, sample: Sample) {
+        let turns = self.counts.turns.load(Ordering::Acquire);
+        if self.thin.as_ref().is_some_and(|of| of.turns != turns) {
+            self.hand_on(true);
+        }
+        let Some(thin) = &mut self.thin else { return };
+        if std::mem::replace(&mut thin.turns, turns) != turns {
+            thin.thinner.begin();
+        }
+        self.counts.thinned.fetch_add(1, Ordering::Relaxed);
+        if thin.take(channel, sample.stamp, sample.value) {
+            return;
+        }
+        let is_given = self.ring.push(Arrival::Sample(sample)).is_ok();
+        let counts = [&self.counts.dropped, &self.counts.given][usize::from(is_given)];
+        counts.fetch_add(1, Ordering::Relaxed);
+        thin.handed_on(self.counts.given.load(Ordering::Relaxed));
+    }
+
+    /// Hands on what is left of the intervals that are over, as far as there is room; or of all.
+    fn hand_on(&mut self, all: bool) {
+        while let Some(thin) = &mut self.thin
+            && thin.thinner.first().is_some()
+            && (all || thin.thinner.is_over())
+        {
+            if self.ring.slots() < self.channels.len() + 2 {
+                self.engine.unpark();
+                if !all || self.ring.is_abandoned() {
+                    return;
+                }
+                std::thread::sleep(Wait::from_millis(1));
+                continue;
+            }
+            let mut left = Vec::with_capacity(self.channels.len());
+            let popped = thin.thinner.pop(|nth, value| left.push((nth, value)));
+            let Some((stamp, samples)) = popped else {
+                return;
+            };
+            let row = left.iter().map(|&(nth, value)| {
+                Arrival::Sample(Sample {
+                    channel: self.channels[nth].place,
+                    stamp,
+                    value,
+                })
+            });
+            let head = [Arrival::Thinned(samples), Arrival::Row(left.len())];
+            if let Ok(chunk) = self.ring.write_chunk_uninit(left.len() + 2) {
+                chunk.fill_from_iter(head.into_iter().chain(row));
+            }
+            let more = left.len() as u64;
+            let given = self.counts.given.fetch_add(more, Ordering::Relaxed) + more;
+            thin.handed_on(given);
+            self.engine.unpark();
+        }
+    }
+
+    /// How many samples came: what [`written`](Self::written) and [`synced`](Self::synced) are compared with.
+    #[must_use]
+    pub fn given(&self) -> u64 {
+        let given = || self.counts.given.load(Ordering::Relaxed);
+        self.thin.as_ref().map_or_else(given, |of| of.came_in)
+    }
+
     /// The times of what follows may start again.
     pub fn segment(&mut self) {
+        self.hand_on(true);
+        if let Some(thin) = &mut self.thin {
+            thin.thinner.begin();
+        }
         for channel in &mut self.channels {
             channel.after = Instant::MIN;
         }
@@ -267,6 +357,11 @@ impl Outflow {
         let Some(sample) = wired(&self.channels, self.stamps, channel, stamp, value) else {
             return true;
         };
+        if self.thin.is_some() {
+            self.take(channel, sample);
+            self.hand_on(false);
+            return true;
+        }
         let is_given = self.ring.push(Arrival::Sample(sample)).is_ok();
         let counts = if is_given {
             &self.counts.given
@@ -291,6 +386,17 @@ impl Outflow {
         }
         // Time passes also where nothing is measured.
         let is_empty = values.iter().all(|value| value.is_nan());
+        if self.thin.is_some() {
+            for (channel, value) in values.iter().enumerate() {
+                let is_there = !value.is_nan() || is_empty && channel == 0;
+                let sample = wired(&self.channels, self.stamps, channel, stamp, *value);
+                if let Some(sample) = sample.filter(|_| is_there) {
+                    self.take(channel, sample);
+                }
+            }
+            self.hand_on(false);
+            return true;
+        }
         let Self {
             ring,
             channels,
@@ -336,13 +442,15 @@ impl Outflow {
     /// How many of the samples that were given are written into the journal: so many may be acknowledged.
     pub fn written(&mut self) -> u64 {
         let written = self.while_journalled(self.progress.written());
-        self.written.after(written, &self.counts)
+        let safe = self.written.after(written, &self.counts);
+        self.thin.as_mut().map_or(safe, |of| of.safe(safe))
     }
 
     /// The same of samples that survive a power cut too.
     pub fn synced(&mut self) -> u64 {
         let synced = self.while_journalled(self.progress.synced());
-        self.synced.after(synced, &self.counts)
+        let safe = self.synced.after(synced, &self.counts);
+        self.thin.as_mut().map_or(safe, |of| of.safe(safe))
     }
 
     /// From now on it rings where more of what was given may be [written](Self::written) or [synced](Self::synced).
@@ -363,6 +471,11 @@ impl Outflow {
     #[must_use]
     pub fn counts(&self) -> &Arc<SourceCounts> {
         &self.counts
+    }
+
+    /// It has come to its end, and nothing more belongs to an interval that is open.
+    pub(crate) fn finish(&mut self) {
+        self.hand_on(true);
     }
 
     pub(crate) fn end(&mut self) {
@@ -418,7 +531,15 @@ impl SourceLink {
     /// Whether what comes next is a sample, or a row of them.
     pub(crate) fn is_giving(&self) -> bool {
         let next = self.ring.peek();
-        matches!(next, Ok(Arrival::Sample(_) | Arrival::Row(_)))
+        matches!(
+            next,
+            Ok(Arrival::Sample(_) | Arrival::Row(_) | Arrival::Thinned(_))
+        )
+    }
+
+    /// Time begins again.
+    pub(crate) fn turn(&self) {
+        self.counts.turns.fetch_add(1, Ordering::AcqRel);
     }
 
     /// All that was taken stands in the journal once it has so many records.

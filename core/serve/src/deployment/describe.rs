@@ -54,6 +54,7 @@ impl Deployment {
                 "name": source.name,
                 "type": source.kind.name,
                 "silent": source.silent,
+                "thinned": source.thinning.map(|of| json!({ "left": of.left.name(), "every": of.every })),
                 "channels": channels.collect::<Vec<_>>(),
             })
         });
@@ -121,6 +122,14 @@ fn describe_source(
     write!(into, "source `{name}`, of kind {kind}")?;
     if let Some(clock) = source.clock {
         write!(into, ", its clock within {}", clock.within)?;
+    }
+    if let Some(of) = source.thinning {
+        write!(
+            into,
+            ", thinned to the {} of each {}",
+            of.left.name(),
+            of.every
+        )?;
     }
     writeln!(
         into,

@@ -19,6 +19,8 @@ pub use size::Size;
 
 use std::path::PathBuf;
 
+use athermal_run::recording::{ThinnedChannels, Thinning};
+
 use crate::companion::{Companion, companion_kinds};
 use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Mapped, Sink, SinkKind, Source, SourceKind, SourceWiring, WiredChannel};
@@ -59,6 +61,8 @@ pub struct DeclaredSource {
     pub silent: Duration,
     /// How its clock is judged; not at all without.
     pub clock: Option<ClockRule>,
+    /// How it is thinned before the graph; not at all without.
+    pub thinning: Option<Thinning>,
     /// The channels that it gives.
     pub channels: Vec<DeclaredChannel>,
 }
@@ -127,6 +131,19 @@ impl DeclaredSource {
 }
 
 impl Deployment {
+    /// The channels that are thinned before the graph, for whoever reads them elsewhere.
+    #[must_use]
+    pub fn thinned(&self) -> Vec<ThinnedChannels> {
+        let of = |source: &DeclaredSource| {
+            let channels = source.channels.iter().map(|of| of.channel.name.clone());
+            Some(ThinnedChannels {
+                thinning: source.thinning?,
+                channels: channels.collect(),
+            })
+        };
+        self.sources.iter().filter_map(of).collect()
+    }
+
     /// What a graph that has been compiled to a plan says of its deployment. `files` are those that it was read from: relative paths
     /// start at the file in which they stand. All mistakes are reported; without one there is a deployment.
     pub fn read(

@@ -3,12 +3,13 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use athermal_run::recording::{Left, Thinning};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::channels::{ChannelsForm, Claim, GraphChannels};
-use super::problem::{ChannelTwice, KindTwice, NoAddress, NoSource, UnknownKind};
+use super::problem::{ChannelTwice, KindTwice, NoAddress, NoSource, UnfitParameter, UnknownKind};
 use super::{DeclaredChannel, DeclaredSource, keys};
 use crate::compile::Plan;
 use crate::connector::{ConnectorKind, Kinds, Source, SourceKind, all_sources};
@@ -19,7 +20,9 @@ use crate::sequencer::{ClockRemedy, ClockRule};
 use crate::time::Duration;
 
 /// The keys that every source has.
-pub(super) const KEYS: [&str; 4] = ["channels", "silent", "clock", "late"];
+pub(super) const KEYS: [&str; 7] = [
+    "channels", "silent", "clock", "late", "mean", "last", "median",
+];
 
 /// The keys that every source has.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -37,6 +40,42 @@ pub(super) struct SourceKeys {
     clock: Option<ClockKeys>,
     /// A sample no later than this is given to the next tick; a channel may have its own.
     late: Duration,
+    /// The graph is given the mean of the samples of each such time, with the stamp of its end; each sample without.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    mean: Option<Duration>,
+    /// The same with the last sample.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    last: Option<Duration>,
+    /// The same with the median.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    median: Option<Duration>,
+}
+
+impl SourceKeys {
+    /// How it is thinned; what is said twice is reported.
+    fn thinning(&self, table: &Value, diagnostics: &mut Diagnostics) -> Option<Thinning> {
+        let ways = [
+            (Left::Mean, self.mean),
+            (Left::Last, self.last),
+            (Left::Median, self.median),
+        ];
+        let named = ways.into_iter().filter_map(|(left, every)| {
+            Some(Thinning {
+                left,
+                every: every?,
+            })
+        });
+        let named: Vec<_> = named.collect();
+        if named.len() > 1 {
+            let (words, advice) = (
+                "it is thinned in two ways",
+                "keep one of `mean`, `last` and `median`",
+            );
+            let (words, advice) = (words.to_owned(), advice.to_owned());
+            diagnostics.report(table.place, UnfitParameter { words, advice });
+        }
+        named.first().copied()
+    }
 }
 
 /// How the clock of a source is judged.
@@ -71,6 +110,9 @@ impl Default for SourceKeys {
             silent: Duration::from_ns(30_000_000_000),
             clock: None,
             late: Duration::ZERO,
+            mean: None,
+            last: None,
+            median: None,
         }
     }
 }
@@ -142,6 +184,7 @@ struct Part<'a> {
     place: Place,
     kind: Option<(&'static SourceKind, Box<dyn Source>)>,
     keys: Option<SourceKeys>,
+    thinning: Option<Thinning>,
     folder: PathBuf,
     /// Where its `channels` stand; at its name without.
     at: Place,
@@ -206,11 +249,16 @@ fn part<'a>(
         let own = channels.own(nth, mapping, &parameters, diagnostics);
         claims.get_or_insert_default().extend(own);
     }
+    let keys = keys::read::<SourceKeys>(&own, &what, diagnostics);
+    let thinning = keys
+        .as_ref()
+        .and_then(|of| of.thinning(&entry.value, diagnostics));
     Part {
         name,
         place: entry.key,
         kind,
-        keys: keys::read::<SourceKeys>(&own, &what, diagnostics),
+        keys,
+        thinning,
         folder: files.resolve(entry.value.place_of("path"), ""),
         at: named.map_or(entry.key, |value| value.place),
         claims,
@@ -312,5 +360,6 @@ fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Optio
         silent: keys.silent,
         channels: claims.into_iter().map(channel).collect(),
         clock: keys.clock.map(ClockRule::from),
+        thinning: part.thinning,
     })
 }

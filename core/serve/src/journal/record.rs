@@ -54,6 +54,13 @@ pub enum Record {
         /// The host's time at an arrival less its stamp.
         least: Duration,
     },
+    /// What a source gives next is left of so many samples, which are not in the journal themselves.
+    Thinned {
+        /// The source.
+        source: u32,
+        /// How many samples.
+        samples: u64,
+    },
     /// Another graph takes over before the next tick. Its model is kept beside the journal.
     Swap {
         /// The digits of its revision as a number.
@@ -88,6 +95,7 @@ const NOTE: u8 = 12;
 // 13 is a mark of the file itself.
 const WAITS: u8 = 14;
 const LAG: u8 = 15;
+const THINNED: u8 = 16;
 
 impl Record {
     /// The record of what became of a sample; none while that is open.
@@ -119,7 +127,7 @@ impl Record {
             Self::Late(sample) | Self::Twice(sample) | Self::Refused(sample, _) => {
                 timeline.decided(*sample);
             }
-            Self::Freeze(_) | Self::Swap { .. } | Self::Note(_) => {}
+            Self::Freeze(_) | Self::Swap { .. } | Self::Note(_) | Self::Thinned { .. } => {}
         }
     }
 
@@ -182,6 +190,11 @@ impl Record {
                     LAG
                 }
             }
+            Self::Thinned { source, samples } => {
+                put(&source.to_le_bytes());
+                put(&samples.to_le_bytes());
+                THINNED
+            }
             Self::Swap { revision } => {
                 put(&revision.to_le_bytes());
                 SWAP
@@ -233,6 +246,10 @@ impl Record {
             LAG => Self::Lag {
                 source: u32::from_le_bytes(fields.take()?),
                 least: fields.duration()?,
+            },
+            THINNED => Self::Thinned {
+                source: u32::from_le_bytes(fields.take()?),
+                samples: fields.number()?,
             },
             SWAP => Self::Swap {
                 revision: fields.number()?,

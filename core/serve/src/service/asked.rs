@@ -6,7 +6,7 @@ use std::time::Duration as Wait;
 
 use athermal_run::live::monitor::Watch;
 
-use super::{Service, SinkCounts, Snapshot};
+use super::{Held, Service, SinkCounts, Snapshot};
 use crate::connector::{Connection, LeftOut, SourceCounts};
 use crate::folder::StateFolder;
 use crate::journal::JournalStatus;
@@ -46,6 +46,12 @@ impl Service {
     #[must_use]
     pub fn last_checkpoint(&self) -> u64 {
         self.keeper.last()
+    }
+
+    /// What the graph keeps of the past; none before there are two checkpoints of this run.
+    #[must_use]
+    pub fn held(&self) -> Option<Held> {
+        self.keeper.held()
     }
 
     /// The state folder.

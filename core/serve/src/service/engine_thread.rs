@@ -24,6 +24,8 @@ use crate::worker::{Output, Worker};
 
 /// How many arrivals of a source are taken before time is looked at again.
 const BATCH: usize = 256;
+/// Something came twice within this: much comes.
+const BUSY: Duration = Duration::from_ns(100_000_000);
 /// Where a tick is due so soon, samples go into the journal together with it.
 const SOON: Wait = Wait::from_millis(250);
 /// The longest sleep while the journal has a gap, which is to end soon.
@@ -146,10 +148,13 @@ impl EngineThread {
         let mut left = self.sources.len();
         let (mut published, mut sound) = (Moment::START, self.clock.now());
         let mut is_stopped = false;
+        // When something came the last two times.
+        let mut came = [Moment::START; 2];
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
             let was_stopped = is_stopped;
             let before = self.worker.recorder().happenings();
+            let records = self.worker.recorder().event();
             while let Ok(order) = self.orders.pop() {
                 match order {
                     Order::Freeze(frozen) => self.worker.freeze(frozen),
@@ -175,6 +180,13 @@ impl EngineThread {
                 }
             }
             let now = self.clock.now();
+            if self.worker.recorder().event() != records {
+                // Where much comes it is acknowledged soon: a broker may wait for that.
+                if now - came[0] < BUSY {
+                    self.worker.rest();
+                }
+                came = [came[1], now];
+            }
             let sinks = &mut self.sinks;
             // What the replica cannot take in is stepped later: a backlog of any length.
             let goes_on = |worker: &Worker| !is_patient || !worker.is_crowded();
@@ -182,6 +194,7 @@ impl EngineThread {
                 .pass_while(now, goes_on, |output| sinks.put(output))?;
             if let Some((last, to)) = self.worker.went_back() {
                 let _ = self.remarks.push(Remark::WentBack(last, to));
+                self.sources.iter().for_each(SourceLink::turn);
             }
             if self.worker.recorder().happenings() != before {
                 self.control.ring();
@@ -233,6 +246,7 @@ impl EngineThread {
             let now = self.clock.now();
             match arrival {
                 Arrival::Row(samples) => together = samples,
+                Arrival::Thinned(samples) => self.worker.thinned(nth, samples),
                 Arrival::Sample(sample) => {
                     together = together.saturating_sub(1);
                     let admission = self.worker.arrive(sample, now);

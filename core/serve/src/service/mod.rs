@@ -40,7 +40,7 @@ use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
-pub use crate::keeper::CommitError;
+pub use crate::keeper::{CommitError, Held};
 pub use asked::ChannelSamples;
 pub use ending::Ended;
 pub use error::ServiceError;
@@ -278,6 +278,7 @@ impl Service {
             folder.path(),
             (&feed, &stamps),
             (engine_thread.thread(), &progress),
+            (runtime.wait, runtime.future),
         )?;
         let _ = hand_over.send(open.links);
         let (handle, asked) = ServiceHandle::new();

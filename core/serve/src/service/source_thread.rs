@@ -50,6 +50,7 @@ impl SourceThread {
                 Ok(Ok(())) => {
                     if !stop.is_asked() {
                         let source = name.clone();
+                        out.finish();
                         events.send(ServiceEvent::SourceEnded { source });
                     }
                     out.end();

@@ -15,7 +15,7 @@ use crate::bell::{Bell, Mailbox};
 use crate::connector::{Remarks, SourceCounts, SourceLink, Stop, link};
 use crate::deployment::DeclaredSource;
 use crate::journal::Progress;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// How many arrivals of a source may wait for the engine thread.
 const ARRIVALS: usize = 1 << 14;
@@ -30,13 +30,14 @@ pub(super) struct OpenSources {
     pub(super) heard: Receiver<(String, String)>,
 }
 
-/// Opens sources, which go on behind the newest stamps of the feed.
+/// Opens sources, which go on behind the newest stamps of the feed. `bounds` are `wait` and `future`.
 pub(super) fn open(
     sources: Vec<DeclaredSource>,
     model: &Model,
     state: &Path,
     (feed, stamps): (&[Feed], &[Instant]),
     (engine, progress): (&Thread, &Arc<Progress>),
+    bounds: (Duration, Duration),
 ) -> Result<OpenSources, ServiceError> {
     let (tell, heard) = channel();
     let tell = Mailbox::new(tell, &Bell::here());
@@ -63,7 +64,7 @@ pub(super) fn open(
         for (of, place) in wiring.channels.iter_mut().zip(&places) {
             of.after = stamps[*place as usize];
         }
-        let (outflow, link) = link(
+        let (mut outflow, link) = link(
             ARRIVALS,
             &wiring.channels,
             &places,
@@ -74,6 +75,9 @@ pub(super) fn open(
                 Remarks::new(&source.name, &tell),
             ),
         );
+        if let Some(thinning) = source.thinning {
+            outflow.thin(thinning, bounds);
+        }
         let inlet = source.parameters.open(wiring);
         let inlet = inlet.map_err(|error| ServiceError::Source {
             source: source.name.clone(),

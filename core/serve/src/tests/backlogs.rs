@@ -1,5 +1,6 @@
 //! What has queued up while a service was away: it is caught up with, however much it is, and all goes on.
 
+use std::sync::atomic::Ordering;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::Notice;
@@ -106,17 +107,19 @@ fn caught_up(rows: i64, clock: bool) {
             .all(|of| of.late + of.twice + of.future == 0)
     );
     swapped_afterwards(&bench, &mut service);
+    // A sink may be slower, and has the rest at the next start.
+    until(&mut service, "all rows out", |of, _| {
+        let put = of.sinks()[0].1.put.load(Ordering::Relaxed);
+        put + 1_000 > of.snapshot().happenings
+    });
     let (ended, _) = service.stop().unwrap();
     assert_eq!(ended.journal.lost, 0);
     let out = bench.out();
     assert!(
         out.keys().copied().eq(1..=ended.happenings as i64),
-        "each row once: {} of {}, {:?} to {:?}; {:?}",
+        "each row once: {} of {}",
         out.len(),
-        ended.happenings,
-        out.keys().next(),
-        out.keys().next_back(),
-        ended
+        ended.happenings
     );
     assert!(bench.check_replay() as i64 > rows);
 }

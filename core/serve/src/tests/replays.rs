@@ -59,6 +59,10 @@ fn every_kind_of_record_is_read_as_it_was_written() {
         Record::Refused(sample(2.0), Refusal::Clock { off: ns(-7) }),
         Record::Refused(sample(2.0), Refusal::NoChannel),
         Record::Waits(sample(3.0)),
+        Record::Thinned {
+            source: 1,
+            samples: 1_000,
+        },
         Record::Lag {
             source: 3,
             least: ns(-9),

@@ -165,8 +165,9 @@ mod with_tls {
         service.stop();
     }
 
-    /// A certificate by `ours`, as `NAME.pem` and `NAME.key`.
+    /// A certificate by `ours`, as `NAME.pem` and `NAME.key`. Without an extension it would be of version 1, which nobody takes.
     fn certificate(folder: &Path, name: &str) {
+        fs::write(folder.join("leaf"), "basicConstraints=CA:FALSE\n").unwrap();
         openssl(
             folder,
             &format!(
@@ -176,7 +177,7 @@ mod with_tls {
         openssl(
             folder,
             &format!(
-                "x509 -req -in {name}.csr -CA ours.pem -CAkey ours.key -CAcreateserial -days 2 -out {name}.pem"
+                "x509 -req -in {name}.csr -CA ours.pem -CAkey ours.key -CAcreateserial -days 2 -extfile leaf -out {name}.pem"
             ),
         );
     }

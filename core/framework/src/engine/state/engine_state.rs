@@ -8,10 +8,11 @@ use thiserror::Error;
 use super::blend::Blending;
 use super::revision::fnv_1a;
 use crate::channel::Extremes;
+use crate::compile::Plan;
 use crate::engine::learning::EmbargoState;
 use crate::engine::tick::History;
 use crate::node::{RecentError, Restored, State};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// What every snapshot begins with.
 const MAGIC: &[u8; 16] = b"athermal state 1";
@@ -145,6 +146,20 @@ impl EngineState {
         }
         rmp_serde::from_slice(payload).map_err(|error| RestoreError::Unreadable {
             reason: error.to_string(),
+        })
+    }
+
+    /// How many bytes the nodes keep, and how many they will once all that they look back over has been filled as far as `span` is.
+    #[must_use]
+    pub fn held(&self, plan: &Plan, span: Duration) -> (u64, u64) {
+        let nodes = plan.nodes.iter().map(|node| {
+            let own = self.nodes.get(&node.instance());
+            let bytes = own.and_then(|of| of.own.as_ref()).map_or(0, Vec::len);
+            let filled = (span.secs() / node.memory.secs()).clamp(1e-6, 1.0);
+            (bytes as u64, (bytes as f64 / filled) as u64)
+        });
+        nodes.fold((0, 0), |(now, full), (bytes, filled)| {
+            (now + bytes, full + filled)
         })
     }
 
