@@ -42,7 +42,6 @@ pub struct Data {
     reading: Reading,
     #[command(flatten)]
     times: Times,
-    /// What a machine file thins of them.
     #[arg(skip)]
     thinned: OnceLock<Vec<ThinnedChannels>>,
 }

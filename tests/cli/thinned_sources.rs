@@ -1,6 +1,9 @@
 //! A source that is thinned before the graph: a fit, a run and a service of the same raw rows thin alike, as whoever had thinned by hand.
 
 use std::collections::BTreeMap;
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::services::{end, history, lines, rows, serve, until_rows};
 use crate::workbench::{Scratch, athermal};
@@ -128,4 +131,59 @@ fn a_source_that_is_thinned_in_two_ways_is_a_mistake() {
         .ended(2)
         .told;
     assert!(told.contains("mean"), "{told}");
+}
+
+#[test]
+fn status_says_what_windows_hold_and_will_hold_before_they_are_full() {
+    let scratch = Scratch::new("held");
+    let machine = format!(
+        "{}[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\ncheckpoint = \"100 ms\"\n\
+         [sources.in]\ntype = \"stdin\"\n[sinks.history]\ntype = \"csv\"\npath = \"history.csv\"\n",
+        GRAPH
+            .replace("[\"7s\"]", "[\"10min\"]")
+            .replace("nodes.thermal", "#")
+            .replace("outputs.thermal", "#")
+    );
+    scratch.file("line.toml", machine);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(["serve"])
+        .arg(scratch.path("line.toml"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(HEADER.as_bytes()).unwrap();
+    let state = scratch.path("line.state");
+    let mut nth = 0;
+    // Ten rows a second of the machine, and what is known once that is shown.
+    let mut held = |least: f64| {
+        let began = Instant::now();
+        loop {
+            assert!(began.elapsed() < Duration::from_secs(30), "{least}");
+            pipe.write_all(rows(nth, nth + 20).as_bytes()).unwrap();
+            nth += 20;
+            std::thread::sleep(Duration::from_millis(50));
+            let text = athermal(&[&"status", &state, &"--format", &"json"]).out;
+            let status: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+            let of = |key: &str| status["held"][key].as_f64();
+            if let (Some(bytes), Some(full)) = (of("bytes"), of("bytes_full"))
+                && bytes > least
+            {
+                return (bytes, full);
+            }
+        }
+    };
+    let (first, expected) = held(0.0);
+    let (later, still) = held(2.0 * first.max(10_000.0));
+    assert!(
+        expected > 2.0 * later,
+        "{first} then {later}, of {expected}"
+    );
+    assert!(
+        (still / expected - 1.0).abs() < 0.2,
+        "{still} of {expected}"
+    );
+    end(child);
 }

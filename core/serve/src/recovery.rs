@@ -256,6 +256,7 @@ impl Recovered {
         let mut log = Log::open_at(&folder.journal(), from)?;
         let mut seen = 0;
         let mut replay = Replay::new(engine, &Begin::nothing());
+        let known = folder.commits().since(from).map(|of| of.happenings).max();
         let mut committed = committed(folder, from);
         while let Some(entry) = log.read()? {
             let (event, record) = match entry {
@@ -279,6 +280,8 @@ impl Recovered {
                     model = next.map_err(|error| no_model(&revision, error))?;
                     let next = match replay.followed(&revision) {
                         Some(next) => next,
+                        // It was committed while this was on its way: whoever goes on from here knows of it.
+                        None if is_known_now(folder, &revision, known.unwrap_or(from)) => break,
                         None => carried(replay.engine(), &model)?,
                     };
                     replay.replace(next);
@@ -377,6 +380,12 @@ fn committed(
         Some((happenings, engine))
     };
     commits.filter_map(engine).peekable()
+}
+
+/// Whether a graph has been committed after so many ticks, beats, breaks and freezes.
+fn is_known_now(folder: &StatePaths, revision: &str, after: u64) -> bool {
+    let mut commits = folder.commits().since(after);
+    commits.any(|of| of.revision == revision && of.happenings > after)
 }
 
 /// A graph that takes over from the state of another, without a past to warm it by.

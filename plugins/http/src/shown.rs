@@ -22,6 +22,13 @@ fn seconds(value: &Value) -> String {
         .map_or_else(|| "none".to_owned(), |of| format!("{of:.1} s"))
 }
 
+fn size(bytes: f64) -> String {
+    match bytes < 1e6 {
+        true => format!("{:.0} kB", bytes / 1e3),
+        false => format!("{:.1} MB", bytes / 1e6),
+    }
+}
+
 /// How a service is.
 pub fn status(of: &Value) -> String {
     let mut all = format!(
@@ -50,15 +57,10 @@ pub fn status(of: &Value) -> String {
             of["undecided"]
         );
     }
-    if let (Some(bytes), Some(full)) = (
-        of["held"]["bytes"].as_f64(),
-        of["held"]["bytes_full"].as_f64(),
-    ) {
-        let (bytes, full) = (bytes / 1e6, full / 1e6);
-        let _ = writeln!(
-            all,
-            "windows hold {bytes:.1} MB, and {full:.1} MB once they are full"
-        );
+    let held = [&of["held"]["bytes"], &of["held"]["bytes_full"]].map(Value::as_f64);
+    if let [Some(bytes), Some(full)] = held {
+        let (bytes, full) = (size(bytes), size(full));
+        let _ = writeln!(all, "windows hold {bytes}, and {full} once they are full");
     }
     if of["frozen"] == true {
         all += "learning is frozen\n";

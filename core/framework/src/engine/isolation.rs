@@ -5,7 +5,7 @@ use std::panic::resume_unwind;
 
 use super::at_work::named;
 use super::{Engine, When, Work};
-use crate::compile::Step;
+use crate::compile::{PlannedNode, Step};
 use crate::diagnostic::NodePanic;
 
 impl Engine {
@@ -29,6 +29,23 @@ impl Engine {
             (Ok(panic), None) => resume_unwind(panic),
             (Err(panic), _) => resume_unwind(panic),
         }
+        self.leave_out(node);
+    }
+
+    /// Isolates nodes as another engine of the same graph does, and gives up those that it has given up.
+    pub(super) fn isolate_as(&mut self, other: &Self) {
+        self.panics.clone_from(&other.panics);
+        let given_up =
+            |node: &PlannedNode| other.panics().iter().any(|of| of.node == node.instance());
+        let nodes = self.plan.nodes.iter().enumerate();
+        let nodes: Vec<_> = nodes
+            .filter(|(_, of)| given_up(of))
+            .map(|(nth, _)| nth)
+            .collect();
+        nodes.into_iter().for_each(|node| self.leave_out(node));
+    }
+
+    fn leave_out(&mut self, node: usize) {
         for work in &mut self.work {
             match work {
                 Work::Step(Step::Run(of) | Step::Capture(of)) if *of == node => {

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::fmt;
 
 /// A panic in the code of a node: what it is for whoever catches it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct NodePanic {
     /// The node: `thermal.Z1`.
     pub node: String,

@@ -92,8 +92,7 @@ impl Stepper {
     /// as a snapshot, and asks for memory: for a moment in which nothing is due. True where it was sent.
     pub fn mirror_again(&mut self) -> bool {
         let LiveEngine { engine, places, .. } = &*self.live;
-        // A copy would run nodes again that were given up here.
-        let can_copy = engine.panics().is_empty() && !self.leaving.is_full();
+        let can_copy = !self.leaving.is_full();
         if !self.is_lost || self.is_crowded() || !can_copy {
             return false;
         }

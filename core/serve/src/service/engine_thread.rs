@@ -171,7 +171,9 @@ impl EngineThread {
             sound = if is_ahead { sound } else { now };
             let is_patient = now - sound < PATIENCE;
             let is_crowded = self.worker.recorder().is_crowded() || is_ahead && is_patient;
-            let is_full = self.worker.sequencer().is_crowded();
+            // Sources of clocks too wait for a journal thread that gets on.
+            let is_full =
+                self.worker.sequencer().is_crowded() || self.worker.recorder().is_crowded();
             for nth in 0..self.sources.len() {
                 let source = &self.sources[nth];
                 let is_held = was_stopped || is_full && source.is_giving();

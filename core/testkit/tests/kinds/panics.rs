@@ -108,4 +108,11 @@ fn a_node_that_panics_is_given_up_where_that_is_asked_for_and_the_others_go_on()
     assert!(given[2][0] == 0.3 && given[2][1].is_nan(), "{given:?}");
     let panics: Vec<_> = engine.panics().iter().map(|of| &*of.node).collect();
     assert_eq!(panics, ["passed.Y"]);
+    // A copy does without it too, and would give up others.
+    let mut twin = engine.twin().unwrap();
+    let now = Instant::from_ns(4_000_000_000);
+    let row = twin.step(now, &[1.5, 0.5]).unwrap();
+    assert!(row.iter().all(|value| value.is_nan()), "{row:?}");
+    let panics: Vec<_> = twin.panics().iter().map(|of| &*of.node).collect();
+    assert_eq!(panics, ["passed.Y", "passed.X"]);
 }

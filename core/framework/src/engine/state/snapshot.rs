@@ -48,7 +48,7 @@ impl Engine {
         Ok(())
     }
 
-    /// An engine that knows the same and goes on with the same bits.
+    /// An engine that knows the same and goes on with the same bits, without the nodes that were given up.
     ///
     /// # Errors
     /// When a node does not take its own state back.
@@ -57,7 +57,10 @@ impl Engine {
             .expect("what was fitted belongs to the plan, or there would be no engine to copy");
         twin.revision.clone_from(&self.revision);
         match twin.go_on(&self.state()) {
-            None => Ok(twin),
+            None => {
+                twin.isolate_as(self);
+                Ok(twin)
+            }
             Some((node, reason)) => Err(RestoreError::Refused { node, reason }),
         }
     }
