@@ -71,6 +71,7 @@ fn at_rest(child: &Child, scratch: &Scratch, mut row: impl FnMut(usize)) {
 }
 
 #[test]
+#[ignore = "runs alone, so that what wakes is its own: `cargo test --test cli idle -- --ignored`"]
 #[cfg(target_os = "linux")]
 fn a_service_that_is_given_a_row_a_second_through_a_pipe_sleeps_until_it_comes() {
     let scratch = desk("idle-pipe", &service("type = \"stdin\""));
@@ -95,6 +96,7 @@ fn a_service_that_is_given_a_row_a_second_through_a_pipe_sleeps_until_it_comes()
 }
 
 #[test]
+#[ignore = "runs alone, so that what wakes is its own: `cargo test --test cli idle -- --ignored`"]
 #[cfg(target_os = "linux")]
 fn a_service_that_follows_a_file_sleeps_while_it_does_not_grow() {
     let scratch = desk("idle-file", &service("type = \"csv\"\npath = \"log.csv\""));
