@@ -1,7 +1,7 @@
 //! What `run` warns of `serve` warns of: the same rows through both, and what a service that runs says of itself.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -97,10 +97,8 @@ fn reported(finished: &Finished, kinds: &[&str]) -> Vec<Value> {
 
 const PIPES: &str = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\n[sources.in]\ntype = \"stdin\"\n[sinks.out]\ntype = \"csv\"\npath = \"out.csv\"\n";
 
-#[test]
-fn the_same_rows_give_the_same_warnings_by_kind_channel_and_count_in_a_run_and_a_service() {
-    let (scratch, model, machine) = desk("pipes", PIPES);
-    let (rows, out) = (damaged(), scratch.path("run.csv"));
+/// The same rows through a run and through a service.
+fn by_both(model: &Path, machine: &Path, out: &Path, rows: &str) -> [Finished; 2] {
     let run: &[&dyn AsRef<std::ffi::OsStr>] = &[
         &"run",
         &model,
@@ -111,9 +109,15 @@ fn the_same_rows_give_the_same_warnings_by_kind_channel_and_count_in_a_run_and_a
         &"--format",
         &"json",
     ];
-    let run = athermal_fed(run, rows.as_bytes()).ended(0);
     let serve: &[&dyn AsRef<std::ffi::OsStr>] = &[&"serve", &machine, &"--format", &"json"];
-    let served = athermal_fed(serve, rows.as_bytes()).ended(0);
+    [run, serve].map(|words| athermal_fed(words, rows.as_bytes()).ended(0))
+}
+
+#[test]
+fn the_same_rows_give_the_same_warnings_by_kind_channel_and_count_in_a_run_and_a_service() {
+    let (scratch, model, machine) = desk("pipes", PIPES);
+    let (rows, out) = (damaged(), scratch.path("run.csv"));
+    let [run, served] = by_both(&model, &machine, &out, &rows);
     let (by_run, by_serve) = (reported(&run, &KINDS), reported(&served, &KINDS));
     let mut count = BTreeMap::new();
     for of in &by_run {
@@ -173,19 +177,7 @@ fn a_graph_that_never_puts_anything_out_is_reported_by_a_service_as_by_a_run() {
     });
     let out = scratch.path("run.csv");
     let kinds = ["no_output", "silent"];
-    let run: &[&dyn AsRef<std::ffi::OsStr>] = &[
-        &"run",
-        &model,
-        &"--input",
-        &"-",
-        &"--output",
-        &out,
-        &"--format",
-        &"json",
-    ];
-    let run = athermal_fed(run, rows.as_bytes()).ended(0);
-    let serve: &[&dyn AsRef<std::ffi::OsStr>] = &[&"serve", &machine, &"--format", &"json"];
-    let served = athermal_fed(serve, rows.as_bytes()).ended(0);
+    let [run, served] = by_both(&model, &machine, &out, &rows);
     let (by_run, by_serve) = (reported(&run, &kinds), reported(&served, &kinds));
     let nothing = by_run
         .iter()
@@ -200,7 +192,7 @@ fn a_graph_that_never_puts_anything_out_is_reported_by_a_service_as_by_a_run() {
         .take(41)
         .map(|line| format!("{line}\n"))
         .collect();
-    let served = athermal_fed(serve, few.as_bytes()).ended(0);
+    let served = athermal_fed(&[&"serve", &machine, &"--format", &"json"], few.as_bytes()).ended(0);
     let none = reported(&served, &["no_output"]);
     assert_eq!(none.len(), 1, "{}", served.told);
     assert_eq!(none[0]["ticks"], 40);
