@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use athermal_serve::connector::Stop;
 
 /// How long the end of a file is left alone before it is looked at again, at least and at most: for twice as long as nothing has come.
-const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_millis(300));
+const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_millis(500));
 
 /// Reads a file to its end and waits there for more. Ends where the file was replaced or cut short, after what still stood in it, or
 /// where it is to stop.
