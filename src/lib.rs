@@ -45,6 +45,8 @@ mod drawing;
 #[cfg(feature = "cli")]
 mod invocation;
 #[cfg(feature = "cli")]
+mod meant;
+#[cfg(feature = "cli")]
 mod program;
 #[cfg(feature = "cli")]
 pub mod schema;

@@ -10,8 +10,8 @@ use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
 use crate::command::Command;
-use crate::invocation;
 use crate::terminal::{Answer, Failure, Format, Options, Terminal};
+use crate::{invocation, meant};
 
 const EXAMPLES: &str = "\
 Start here:
@@ -59,7 +59,9 @@ pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     let name = words.first().map(|name| name.to_string_lossy());
     invocation::called(name.unwrap_or_default().into_owned());
-    let arguments = whole().get_matches_from(words);
+    let arguments = whole()
+        .try_get_matches_from(&words)
+        .unwrap_or_else(|error| meant::exit(error, &words));
     let options = Options::from_arg_matches(&arguments);
     let options = options.unwrap_or_else(|error| error.exit());
     let mut terminal = Terminal::new(&options);

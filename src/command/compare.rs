@@ -20,7 +20,7 @@ use serde_json::{Map, Value, json};
 
 use self::table::{describe, is_one_of_several};
 use super::beyond;
-use super::data::{self, Data, FITS, recording, warn_overlap};
+use super::data::{self, Data, FITS, warn_overlap};
 use super::doubts;
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
@@ -54,12 +54,12 @@ use athermal_analysis::figures::{count, number, seconds};
       --mode free-run")]
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
-    #[arg(required = true, value_name = "GRAPH")]
+    #[arg(required = true, value_name = "GRAPH", value_parser = crate::meant::graph_or_model())]
     graphs: Vec<PathBuf>,
     #[command(flatten)]
     data: Data,
     /// The recording to score on; several files are joined as with --data
-    #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
+    #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = crate::meant::recording())]
     on: Vec<PathBuf>,
     #[command(flatten)]
     scored: Scored,

@@ -16,11 +16,12 @@ use athermal::run::recording::ThinnedChannels;
 use athermal::serve::journal::JournalRecording;
 use athermal::{Duration, Model};
 use clap::Args;
-use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use serde_json::json;
 
 use super::refused;
 use crate::invocation::{program, quoted};
+use crate::meant::recording;
 use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal, outside};
@@ -33,7 +34,7 @@ use athermal_fleet::job::Times;
 #[derive(Debug, Args)]
 pub struct Data {
     /// CSV or JSON lines, or a folder of them; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
-    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
+    #[arg(long = "data", short = 'd', required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
     given: Vec<Given>,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
@@ -97,19 +98,6 @@ fn offset(text: &str) -> Result<(PathBuf, Duration), String> {
 fn journal_of(path: &Path) -> Option<PathBuf> {
     let folder = path.to_str()?.strip_prefix("journal:")?;
     Some(PathBuf::from(folder))
-}
-
-/// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
-pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
-    no_graph("this is a graph and holds no data; name graphs before this option")
-}
-
-/// Reads the path of a recording; a graph is refused with these words.
-pub fn no_graph(reason: &'static str) -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(move |path| {
-        let is_graph = path.extension().is_some_and(|ending| ending == "toml");
-        if is_graph { Err(reason) } else { Ok(path) }
-    })
 }
 
 impl Data {

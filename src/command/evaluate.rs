@@ -56,6 +56,7 @@ use athermal_analysis::figures::seconds;
 )]
 pub struct Evaluate {
     /// The model, or a graph that names one or in which nothing needs fitting
+    #[arg(value_parser = crate::meant::graph_or_model())]
     model: PathBuf,
     #[command(flatten)]
     data: Data,

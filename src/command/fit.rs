@@ -62,11 +62,12 @@ use athermal_analysis::figures::{count, counted, number, paragraph, table};
 )]
 pub struct Fit {
     /// The graph, or a model whose graph is fitted anew
+    #[arg(value_parser = crate::meant::graph_or_model())]
     graph: PathBuf,
     #[command(flatten)]
     data: Data,
     /// Where the model goes; `-` is standard output
-    #[arg(long, short, value_name = "MODEL")]
+    #[arg(long, short, value_name = "MODEL", value_parser = crate::meant::written())]
     output: PathBuf,
     #[command(flatten)]
     blocks: BlockOptions,

@@ -7,8 +7,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
-use super::data::{Data, Reading, no_graph};
+use super::data::{Data, Reading};
 use crate::invocation::{command, quoted};
+use crate::meant::{new_log, written};
 use crate::starter::{NoStarter, Request, Starter, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 use athermal_analysis::figures::paragraph;
@@ -30,10 +31,10 @@ use athermal_analysis::figures::paragraph;
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log, or the files of several loggers
-    #[arg(required = true, value_name = "DATA", value_parser = no_graph("this is a graph, which init writes, and holds no data; give it a log, and the graph to write with -o"))]
+    #[arg(required = true, value_name = "DATA", value_parser = new_log())]
     data: Vec<PathBuf>,
     /// Where the graph goes; `-` is standard output
-    #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
+    #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml", value_parser = written())]
     output: PathBuf,
     /// The column that gives the time, or several in braces: "{Date} {Time}"
     #[arg(long, value_name = "COLUMN")]

@@ -36,11 +36,12 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 )]
 pub struct Report {
     /// The model, or a graph that names one or in which nothing needs fitting
+    #[arg(value_parser = crate::meant::graph_or_model())]
     model: PathBuf,
     #[command(flatten)]
     data: Data,
     /// Where the page goes; `-` is standard output
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE", value_parser = crate::meant::written())]
     output: Option<PathBuf>,
     /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]

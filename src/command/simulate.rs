@@ -44,7 +44,7 @@ pub struct Simulate {
     /// The machine; all are listed when none is named
     machine: Option<String>,
     /// CSV, JSON lines or what else is written, by its ending, CSV without one; `-` is standard output, as CSV
-    #[arg(long, short, value_name = "FILE", requires = "machine")]
+    #[arg(long, short, value_name = "FILE", requires = "machine", value_parser = crate::meant::written())]
     output: Option<PathBuf>,
     /// Length of the recording in days
     #[arg(

@@ -8,6 +8,7 @@ use athermal::files::{
 use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
 use super::texts::Texts;
+use super::time_form;
 use athermal_analysis::figures::{number, time};
 
 /// The time of a log.
@@ -173,7 +174,7 @@ pub fn find(
     };
     likely.sort_by_key(|(rank, texts)| (*rank, is_number(texts)));
     let texts = likely.iter().map(|(_, texts)| texts);
-    let mut unread = texts.filter(|texts| dates::look_like_times(&texts.read()));
+    let mut unread = texts.filter(|texts| looks_like_times(texts));
     let unread = unread.find(|texts| clock(texts).is_none());
     // Beside what is meant to be a time, no other column that happens to grow is one.
     let mut found = likely
@@ -198,6 +199,12 @@ pub fn find(
     }
 }
 
+/// Whether texts are dates and times, in whatever form.
+fn looks_like_times(texts: &Texts) -> bool {
+    let cells = texts.read();
+    dates::look_like_times(&cells) || time_form::fitting(&cells).is_some()
+}
+
 /// Why texts are not the time.
 fn no_clock(texts: &Texts, format: Option<&TimeFormat>) -> String {
     let columns = &texts.columns;
@@ -208,9 +215,12 @@ fn no_clock(texts: &Texts, format: Option<&TimeFormat>) -> String {
         (Some(first), None) if is_time_of_day(first) => format!(
             "`{columns}` has times of day such as `{first}`, and no other column their dates: log these too"
         ),
-        (Some(first), None) if dates::look_like_times(&texts.read()) => format!(
-            "`{columns}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
-             e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
+        (Some(first), None) if looks_like_times(texts) => format!(
+            "`{columns}` has times such as `{first}`, {}",
+            match time_form::fitting(&texts.read()) {
+                Some(form) => format!("in a form that is not known; `--time-format '{form}'` fits them"),
+                None => "which no form of --time-format fits: write dates and times as 2026-03-28 06:00:00".to_owned(),
+            }
         ),
         _ if goes_back(texts) => {
             format!("`{columns}` goes back from row to row: sort the log, oldest first")

@@ -14,6 +14,7 @@ mod spacing;
 mod survey;
 mod text;
 mod texts;
+mod time_form;
 mod undecided;
 mod window;
 

@@ -36,6 +36,7 @@ mod json_page;
 mod kept_runs;
 mod language_commands;
 mod levels;
+mod meant_calls;
 mod named_models;
 mod not_files;
 mod nothing_to_score;

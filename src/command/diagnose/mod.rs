@@ -45,6 +45,7 @@ use tables::Tables;
   athermal diagnose model.json --data test.csv --no-fit --format json")]
 pub struct Diagnose {
     /// The model, or a graph that names one or in which nothing needs fitting
+    #[arg(value_parser = crate::meant::graph_or_model())]
     model: PathBuf,
     #[command(flatten)]
     data: Data,

@@ -43,12 +43,13 @@ use reports::Reports;
 )]
 pub struct Run {
     /// The model, or a graph that names one or in which nothing needs fitting
+    #[arg(value_parser = crate::meant::graph_or_model())]
     model: PathBuf,
     /// CSV or JSON lines; `-` is standard input
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE", value_parser = crate::meant::recording())]
     input: PathBuf,
     /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV, or JSON lines with `--format json`
-    #[arg(long, short, value_name = "FILE", default_value = "-")]
+    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = crate::meant::written())]
     output: PathBuf,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]

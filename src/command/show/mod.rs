@@ -37,6 +37,7 @@ use crate::terminal::{Answer, Failure, Terminal, print};
   athermal show model.json --expand --format dot | dot -Tpdf -o graph.pdf")]
 pub struct Show {
     /// The graph, or a model
+    #[arg(value_parser = crate::meant::graph_or_model())]
     graph: PathBuf,
     /// What to print
     #[arg(id = "format", long, value_name = "FORMAT", value_parser = formats(), default_value = "plan")]

@@ -30,7 +30,7 @@ use work::Status;
                         athermal test machine.toml --filter \"dead sensor\" --format json")]
 pub struct Test {
     /// Graph files
-    #[arg(required = true, value_name = "GRAPH")]
+    #[arg(required = true, value_name = "GRAPH", value_parser = crate::meant::graph_or_model())]
     graphs: Vec<PathBuf>,
     /// Only tests whose name contains this text, in upper or lower case
     #[arg(long, value_name = "TEXT")]

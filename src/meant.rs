@@ -1,0 +1,181 @@
+//! What a file on the command line is, and the call that was meant where it is not what is expected there.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use clap::builder::{PathBufValueParser, StyledStr, TypedValueParser};
+use clap::error::{ContextKind, ContextValue};
+
+use crate::program::whole;
+
+/// What a file shows itself to be, by how it ends or begins.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Given {
+    Folder,
+    Graph,
+    Model,
+    Log,
+}
+
+const ENDINGS_OF_LOGS: [&str; 9] = [
+    "csv", "tsv", "txt", "dat", "log", "lvm", "jsonl", "ndjson", "parquet",
+];
+/// The first key of a model.
+const MARK: &str = "\"athermal_model\"";
+
+impl Given {
+    fn of(path: &Path) -> Option<Self> {
+        if path.is_dir() {
+            return Some(Self::Folder);
+        }
+        let ending = path.extension().and_then(|of| of.to_str()).unwrap_or("");
+        let ending = ending.to_ascii_lowercase();
+        if ending == "toml" {
+            return Some(Self::Graph);
+        }
+        let mut begin = Vec::new();
+        let read = File::open(path).map(|file| file.take(64).read_to_end(&mut begin));
+        if read.is_ok() && String::from_utf8_lossy(&begin).contains(MARK) {
+            return Some(Self::Model);
+        }
+        ENDINGS_OF_LOGS
+            .contains(&ending.as_str())
+            .then_some(Self::Log)
+    }
+}
+
+/// A path, unless the file there is what cannot stand in its place.
+fn path_but(refuse: fn(&Path, Given) -> Option<String>) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| {
+        let refused = Given::of(&path).and_then(|given| refuse(&path, given));
+        refused.map_or(Ok(path), Err)
+    })
+}
+
+/// Reads the path of a graph or a model.
+pub fn graph_or_model() -> impl TypedValueParser<Value = PathBuf> {
+    path_but(|_, given| {
+        let words = "this is a log, and a graph or model stands here; `athermal init` writes a graph for a log, and `athermal fit` a model";
+        (given == Given::Log).then(|| words.to_owned())
+    })
+}
+
+/// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
+pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
+    path_but(|_, given| match given {
+        Given::Graph => {
+            Some("this is a graph and holds no data; name graphs before this option".to_owned())
+        }
+        Given::Model => {
+            Some("this is a model and holds no data; name models before this option".to_owned())
+        }
+        Given::Folder | Given::Log => None,
+    })
+}
+
+/// Reads the path of a log that is looked at for the first time.
+pub fn new_log() -> impl TypedValueParser<Value = PathBuf> {
+    path_but(|_, given| {
+        let what = match given {
+            Given::Graph => "a graph, which init writes,",
+            Given::Model => "a model, which fit writes,",
+            Given::Folder | Given::Log => return None,
+        };
+        Some(format!(
+            "this is {what} and holds no data; give it a log, and the graph to write with -o"
+        ))
+    })
+}
+
+/// Reads the path of a file that is written.
+pub fn written() -> impl TypedValueParser<Value = PathBuf> {
+    path_but(|path, given| {
+        let inside = path.join("NAME");
+        (given == Given::Folder)
+            .then(|| format!("this is a folder; name a file in it: {}", inside.display()))
+    })
+}
+
+/// What other programs call a command.
+fn synonym(command: &str) -> Option<&'static str> {
+    Some(match command {
+        "train" | "learn" | "calibrate" => "fit",
+        "predict" | "forecast" | "infer" | "apply" => "run",
+        "score" | "eval" | "validate" => "evaluate",
+        "lint" | "verify" => "check",
+        "plot" => "report",
+        "start" => "serve",
+        _ => return None,
+    })
+}
+
+/// The same words in the places where the command has them, if that makes a call of them.
+fn meant(words: &[OsString]) -> Option<String> {
+    let words: Option<Vec<&str>> = words.iter().skip(1).map(|of| of.to_str()).collect();
+    let words = words?;
+    let (given, rest) = words.split_first()?;
+    let command = synonym(given).unwrap_or(given);
+    let (mut graphs, mut logs, mut others) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut of_option, mut of_data) = (false, false);
+    for &word in rest {
+        if matches!(word, "--data" | "-d" | "--input" | "-i") {
+            (of_option, of_data) = (false, true);
+        } else if word.starts_with('-') && word != "-" {
+            (of_option, of_data) = (!word.contains('='), false);
+            others.push(word);
+        } else if std::mem::take(&mut of_option) {
+            others.push(word);
+        } else {
+            match Given::of(Path::new(word)) {
+                Some(Given::Graph | Given::Model) => graphs.push(word),
+                Some(Given::Log) => logs.push(word),
+                _ if of_data => logs.push(word),
+                _ => others.push(word),
+            }
+        }
+    }
+    let command = match command {
+        "check" | "show" if graphs.is_empty() => "init",
+        "fit" if graphs.is_empty() && !logs.is_empty() => "init",
+        command => command,
+    };
+    logs.dedup();
+    let option = match command {
+        _ if logs.is_empty() => None,
+        "init" => None,
+        "run" => Some("--input"),
+        _ => Some("--data"),
+    };
+    let is_named = |of: &&str| of.starts_with("-o") || of.starts_with("--output");
+    let output = (command == "fit" && !others.iter().any(is_named)).then_some(["-o", "model.json"]);
+    if command == "init" {
+        others.clear();
+    }
+    let call = ["athermal", command]
+        .into_iter()
+        .chain(graphs)
+        .chain(option)
+        .chain(logs);
+    let call: Vec<&str> = call
+        .chain(output.into_iter().flatten())
+        .chain(others)
+        .collect();
+    let is_new = call[1..] != words[..];
+    if is_new && whole().try_get_matches_from(&call).is_ok() {
+        return Some(call.join(" "));
+    }
+    synonym(given).map(|command| format!("athermal {command}"))
+}
+
+/// Ends the program with an error of the command line, with the call that was meant where there is one.
+pub fn exit(mut error: clap::Error, words: &[OsString]) -> ! {
+    if error.use_stderr()
+        && let Some(call) = meant(words)
+    {
+        let tip = vec![StyledStr::from(format!("`{call}`"))];
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tip));
+    }
+    error.exit()
+}
