@@ -103,7 +103,13 @@ fn not_written(path: &Path) -> impl Fn(io::Error) -> FolderError {
     let path = path.to_owned();
     move |error| FolderError::NotWritten {
         path: path.clone(),
-        error,
+        error: match error.kind() {
+            io::ErrorKind::AlreadyExists => io::Error::new(
+                error.kind(),
+                "it is there and no folder: name another state folder",
+            ),
+            _ => error,
+        },
     }
 }
 

@@ -115,7 +115,7 @@ impl fmt::Display for Reason {
             Self::Null => "the value is null",
             Self::NotANumber => "the value is no number",
             Self::Truth => {
-                "true or false is no number of a channel whose unit is not 1: write `unit = \"1\"`"
+                "true or false is a number only of a channel whose signal has `unit = \"1\"`"
             }
             Self::NotFinite => "the value is not finite",
             Self::NoTime => "it has no time where one is expected",

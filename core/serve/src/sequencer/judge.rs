@@ -9,7 +9,8 @@
 //! | the same, and others go on at the old time | the majority of sources decides, then the host's unsure clock; else the old time stays |
 //! | its stamps run faster than time | a backlog, which decides nothing |
 //!
-//! Sources whose stamps come in order have times of their own: they are not judged and do not decide.
+//! Sources whose stamps come in order have times of their own: they are not judged and do not decide, and the last tick is right where
+//! it is theirs.
 
 use super::Rules;
 use super::pace::{MINUTE, Pace};
@@ -26,8 +27,6 @@ const UNSURE: Duration = Duration::from_ns(86_400_000_000_000);
 pub(super) struct Judge {
     future: Duration,
     wait: Duration,
-    /// Whether a source gives stamps in order, whose time is another: then no segment begins by what others show.
-    is_mixed: bool,
     channels: Vec<Judged>,
     /// By source, of the vote under way.
     votes: Vec<i32>,
@@ -45,6 +44,8 @@ struct Judged {
     source: usize,
     is_in_order: bool,
     pace: Pace,
+    /// The stamp that came last.
+    came: Option<Instant>,
     /// How many of its samples wait.
     waiting: usize,
     /// Since when its stamps have been too far ahead.
@@ -68,13 +69,13 @@ impl Judge {
             source: of.source,
             is_in_order: rules.is_in_order(of.source),
             pace: Pace::default(),
+            came: None,
             waiting: 0,
             ahead: None,
         };
         Self {
             future: rules.future,
             wait: rules.wait,
-            is_mixed: rules.sources.iter().any(|of| of.is_in_order),
             channels: rules.channels.iter().map(judged).collect(),
             votes: vec![0; rules.sources.len()],
             newest: None,
@@ -109,7 +110,9 @@ impl Judge {
 
     /// Looks at a stamp that came, whatever becomes of it. True where the pace of its channel is known anew.
     pub(super) fn look(&mut self, channel: usize, stamp: Instant, now: Moment) -> bool {
-        self.channels[channel].pace.look(stamp, now, self.wait)
+        let of = &mut self.channels[channel];
+        of.came = Some(stamp);
+        of.pace.look(stamp, now, self.wait)
     }
 
     /// By how much a stamp is of the future, as far as that is to be asked; none where it is not.
@@ -223,7 +226,7 @@ impl Judge {
         let future = self.future;
         let is_near = last - stamp <= future;
         let is_again = self.back.is_some_and(|back| now - back < MINUTE);
-        if is_near || is_again || self.is_mixed {
+        if is_near || is_again || self.is_of_others(last, now) {
             return false;
         }
         if let Some(host) = self.trusted(now) {
@@ -247,6 +250,16 @@ impl Judge {
             i32::from(is_before && pace.lasts(now)) - i32::from(!is_before && pace.goes(2, now))
         });
         score > 0 || score == 0 && self.is_nearer(stamp, last, now)
+    }
+
+    /// Whether the last tick is, or may be, the time of a source in order: a recording or simulation has a time of its own, and goes on.
+    fn is_of_others(&self, last: Instant, now: Moment) -> bool {
+        let has_begun = now - Moment::START >= MINUTE;
+        let mut in_order = self.channels.iter().filter(|of| of.is_in_order);
+        in_order.any(|of| {
+            of.came
+                .map_or(!has_begun, |came| last - came <= self.future)
+        })
     }
 
     /// The source and channel whose clock is ahead of that of a channel, and by how much: the one that is farthest.

@@ -401,6 +401,38 @@ fn beside_a_source_with_times_of_its_own_no_segment_begins() {
 }
 
 #[test]
+fn beside_a_logger_that_is_right_a_device_from_2100_that_is_set_right_begins_a_segment() {
+    for is_trusted in [false, true] {
+        let mut rules = rules_of(2);
+        rules.sources[0].is_in_order = true;
+        let mut world = World {
+            sequencer: connected(rules),
+            decided: Vec::new(),
+        };
+        for second in 0..3 {
+            world.comes(1, 9_000 * HOUR + 1_000 * second, 1_000 * second);
+        }
+        if is_trusted {
+            world = world.trusted(100 * HOUR + 3_000, 3_000);
+        }
+        for second in 3..100 {
+            world.comes(0, 100 * HOUR + 1_000 * second, 1_000 * second);
+            world.comes(1, 100 * HOUR + 1_000 * second + 500, 1_000 * second + 500);
+        }
+        world.until(200_000);
+        assert_eq!(world.went_back(), 1, "trusted: {is_trusted}");
+        let least = if is_trusted { 90 } else { 30 };
+        for channel in [0, 1] {
+            let accepted = world.accepted(channel).len();
+            assert!(
+                accepted >= least,
+                "{channel}: {accepted}, trusted: {is_trusted}"
+            );
+        }
+    }
+}
+
+#[test]
 fn who_is_late_behind_a_clock_that_is_ahead_by_less_than_future_is_counted_and_the_clock_named() {
     let mut world = World::of(2).trusted(HOUR, 0);
     let mut late = 0;
