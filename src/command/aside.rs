@@ -1,5 +1,6 @@
 //! Writing whole files: beside their place first, then renamed, so that a reader never sees half of one.
 
+use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -71,6 +72,38 @@ fn is_one_file(_one: &Path, _other: &Path) -> bool {
 /// When it cannot be written.
 pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     write_whole(path, content.as_ref()).map_err(|error| Failure::Outside(not_written(path, &error)))
+}
+
+/// The same with what is written to a path as it comes: to one beside it with the same ending. Standard output and what is no file are
+/// written to as they are.
+///
+/// # Errors
+/// As `write`, and when the file cannot be renamed; what was written until then is removed.
+pub fn written_aside<T>(
+    path: &Path,
+    write: impl FnOnce(&Path) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let is_file = fs::metadata(path).map_or(path.as_os_str() != "-", |of| of.is_file());
+    let (true, Some(name)) = (is_file, path.file_name()) else {
+        return write(path);
+    };
+    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let mut aside = OsString::from(".part-");
+    aside.push(name);
+    let aside = path.with_file_name(aside);
+    let written = write(&aside).and_then(|written| {
+        let failed = |error| Failure::Outside(not_written(&path, &error));
+        fs::rename(&aside, &path).map_err(failed)?;
+        Ok(written)
+    });
+    written.map_err(|failure| {
+        let _ = fs::remove_file(&aside);
+        let (aside, path) = (aside.display().to_string(), path.display().to_string());
+        match failure {
+            Failure::Outside(words) => Failure::Outside(words.replace(&aside, &path)),
+            other => other,
+        }
+    })
 }
 
 /// Why a file is not written.

@@ -17,7 +17,7 @@ use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_point
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::aside::{check_apart, not_written, write_aside};
+use super::aside::{check_apart, not_written, write_aside, written_aside};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
@@ -175,10 +175,10 @@ impl Simulate {
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
         let recording = self.recording(machine)?;
-        match &self.compensate {
+        written_aside(output, |output| match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
             Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
-        }
+        })
     }
 
     fn recording<'a>(&self, machine: &'a dyn Machine) -> Result<Simulated<'a>, Failure> {

@@ -2,8 +2,10 @@
 //! lost.
 
 #![cfg(unix)]
+use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
 
 use crate::workbench::{Graph, Scratch, athermal, athermal_fed};
 
@@ -239,4 +241,41 @@ fn an_input_that_ends_ends_the_run_as_before() {
     let text = std::fs::read(&log).unwrap();
     let piped = athermal_fed(&[&"run", &graph, &"-i", &"-", &"--lenient"], &text).ended(0);
     assert_eq!(of_file.out, piped.out);
+}
+
+#[test]
+fn what_is_simulated_is_a_whole_file_or_the_one_that_was_there() {
+    let scratch = Scratch::new("simulated-whole");
+    let log = scratch.file("log.csv", "what was there\n");
+    let aside = scratch.path(".part-log.csv");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(["simulate", "die-tester", "--days", "3000", "-q", "-o"])
+        .arg(&log)
+        .spawn()
+        .unwrap();
+    let is_begun = || fs::metadata(&aside).is_ok_and(|of| of.len() > 100_000);
+    let began = Instant::now();
+    while !is_begun() {
+        assert!(
+            began.elapsed() < Duration::from_secs(60),
+            "nothing is written"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(fs::read_to_string(&log).unwrap(), "what was there\n");
+    athermal(&[&"simulate", &"die-tester", &"--days", &"0.01", &"-o", &log]).ended(0);
+    assert!(fs::read_to_string(&log).unwrap().starts_with("time_s,"));
+    assert!(!aside.exists());
+    let nowhere = scratch.path("nowhere/log.csv");
+    let failed = athermal(&[
+        &"simulate",
+        &"die-tester",
+        &"--days",
+        &"0.01",
+        &"-o",
+        &nowhere,
+    ]);
+    failed.ended(3).tells(&["nowhere/log.csv: No such file"]);
 }
