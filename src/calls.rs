@@ -26,8 +26,8 @@ use crate::command::init::Init;
 use crate::command::model::{check_fitted, warn_unfitted, warn_without_novelty};
 use crate::command::report::Report;
 use crate::command::simulate::Simulate;
-use crate::drawing::{diagram, svg};
 use crate::terminal::{Failure, Options, Terminal};
+use athermal_analysis::drawing::{diagram, svg};
 
 pub use crate::command::found::Found;
 pub use crate::starter::{Starter, WITHOUT_ZONE};

@@ -28,7 +28,7 @@ pub use athermal_serve as serve;
 pub use athermal_trial as trial;
 
 #[cfg(feature = "analysis")]
-pub use athermal_analysis::{chart, diagnosis, report};
+pub use athermal_analysis::{chart, diagnosis, drawing, report};
 
 #[cfg(feature = "cli")]
 #[macro_use(print, println)]
@@ -40,8 +40,6 @@ pub mod calls;
 mod checkout;
 #[cfg(feature = "cli")]
 mod command;
-#[cfg(feature = "cli")]
-mod drawing;
 #[cfg(feature = "cli")]
 mod invocation;
 #[cfg(feature = "cli")]

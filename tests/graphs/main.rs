@@ -16,6 +16,7 @@ mod language;
 mod leaks;
 mod learning;
 mod modules;
+mod pictures;
 mod planned;
 mod predicted_at_once;
 mod runs_between_truths;

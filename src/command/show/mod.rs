@@ -15,8 +15,8 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::model::{self, load_fitted};
-use crate::drawing::{Diagram, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
+use athermal_analysis::drawing::{Diagram, diagram, dot, mermaid, plan, svg};
 
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
 ///

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::ops::Range;
 
-use athermal::core::compile::{Plan, PlannedNode, PlannedRole, Step};
-use athermal::core::node::Read;
-use athermal::core::time::Duration;
-use athermal::diagnosis::text::grouped;
+use crate::diagnosis::text::grouped;
+use athermal_core::compile::{Plan, PlannedNode, PlannedRole, Step};
+use athermal_core::node::Read;
+use athermal_core::time::Duration;
 
-use athermal_analysis::figures::{count, length, table};
+use crate::figures::{count, length, table};
 
 /// The plan for people; instances of one node share lines unless `expand`.
 #[must_use]

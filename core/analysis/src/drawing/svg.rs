@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::layout::layout;
 use super::{Box, Class, Diagram, Flow};
-use athermal_analysis::markup::escaped;
+use crate::markup::escaped;
 
 const MARGIN: f64 = 24.0;
 const TITLE: f64 = 40.0;
