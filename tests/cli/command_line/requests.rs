@@ -39,14 +39,15 @@ fn options_that_need_another_are_refused_without_it() {
 
 #[test]
 fn a_log_in_the_place_of_a_model_is_refused_by_its_beginning() {
-    let (scratch, _, data, model) = desk("swapped");
+    let (scratch, _, data, _) = desk("swapped");
     // What comes after is no text, and would be told instead if it were read.
     let mut log = std::fs::read(&data).unwrap();
     log.extend([0xff; 20_000]);
-    let log = scratch.file("odd.csv", log);
-    athermal_on("evaluate", &log, &model, &[])
+    // Its name does not show what it is.
+    let log = scratch.file("odd", log);
+    athermal_on("evaluate", &log, &data, &[])
         .ended(2)
-        .tells(&["odd.csv", "no model"]);
+        .tells(&["odd", "no model"]);
 }
 
 #[test]
