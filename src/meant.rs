@@ -35,9 +35,12 @@ impl Given {
         if ending == "toml" {
             return Some(Self::Graph);
         }
+        // What is read from a pipe is gone.
+        let is_file = path.metadata().is_ok_and(|of| of.is_file());
+        let file = is_file.then(|| File::open(path).ok()).flatten();
         let mut begin = Vec::new();
-        let read = File::open(path).map(|file| file.take(64).read_to_end(&mut begin));
-        if read.is_ok() && String::from_utf8_lossy(&begin).contains(MARK) {
+        let _ = file.map(|file| file.take(64).read_to_end(&mut begin));
+        if String::from_utf8_lossy(&begin).contains(MARK) {
             return Some(Self::Model);
         }
         ENDINGS_OF_LOGS
