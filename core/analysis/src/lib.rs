@@ -8,6 +8,7 @@
 pub mod chart;
 pub mod diagnosis;
 pub mod drawing;
-pub mod figures;
 pub mod markup;
 pub mod report;
+
+pub use athermal_core::figures;

@@ -27,15 +27,14 @@
 //! ```
 
 pub mod collect;
-pub mod findings;
-pub mod message;
 pub mod numbers;
 #[macro_use]
 pub mod output;
 mod registry;
 pub mod terminal;
 
-pub use message::Message;
+pub use athermal_core::message::{self, Message};
+pub use athermal_run::live::monitor::words as findings;
 pub use registry::{Command, CommandKind, declare, kind, kinds, run};
 pub use terminal::{Answer, Failure, Format, Terminal};
 

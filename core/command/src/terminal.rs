@@ -5,8 +5,8 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use athermal_analysis::figures::counted;
 use athermal_core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
+use athermal_core::figures::counted;
 use athermal_files::FileError;
 use athermal_run::fit::FitError;
 use athermal_run::live::{RunError, StateError};

@@ -125,7 +125,9 @@ pub mod prng;
 mod tests;
 
 // The vocabulary that a graph is written in; authors of nodes need one crate.
-pub use athermal_graph::{channel, diagnostic, document, quantity, time, unit};
+pub use athermal_graph::{
+    channel, diagnostic, document, event, events, figures, message, quantity, time, unit,
+};
 
 #[doc(hidden)]
 pub use inventory;

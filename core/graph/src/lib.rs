@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`diagnostic`] | how a mistake in a file is reported: code, place, reason, a way out |
 //! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
+//! | [`figures`], [`message`], [`event`] | numbers and tables for people; what is reported, and what can happen |
 //! | [`document`] | a file, with what it extends, as a tree with places, expanded into declarations |
 //!
 //! A reader begins with [`document::load`](document), and follows one table of the file into the declaration that it becomes.
@@ -14,7 +15,16 @@ pub mod channel;
 mod decimal_comma;
 pub mod diagnostic;
 pub mod document;
+pub mod event;
+pub mod figures;
+pub mod message;
 pub mod quantity;
 mod schema;
 pub mod time;
 pub mod unit;
+
+/// What macros of this crate make use of.
+#[doc(hidden)]
+pub mod __private {
+    pub use serde_json;
+}

@@ -16,4 +16,7 @@ pub mod recording;
 pub mod score;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, quantity, time, unit};
+use athermal_core::{
+    channel, compile, diagnostic, document, engine, event, figures, message, node, quantity, time,
+    unit,
+};

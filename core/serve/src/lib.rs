@@ -23,6 +23,7 @@
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
+//! | [`facts`] | what is known of it, each fact declared once |
 //! | [`companion`] | what runs beside it and asks it things |
 
 /// Makes errors of other parts into those of one.
@@ -42,6 +43,7 @@ pub mod checkpoint;
 pub mod companion;
 pub mod connector;
 pub mod deployment;
+pub mod facts;
 pub mod folder;
 pub mod host;
 pub mod journal;
@@ -56,7 +58,10 @@ pub mod testkit;
 pub mod worker;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, quantity, time, unit};
+use athermal_core::{
+    channel, compile, diagnostic, document, engine, event, figures, message, node, quantity, time,
+    unit,
+};
 
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,9 @@ pub type Answer = Response<UnsyncBoxBody<Bytes, Infallible>>;
 /// Why something is refused.
 #[derive(Debug)]
 pub struct Refused {
+    /// The status.
     pub status: StatusCode,
+    /// Why, as JSON: `error` is a sentence.
     pub body: Value,
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use athermal_command::{
     Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
 };
+use athermal_serve::facts::{ChannelsFacts, Known as _, StatusFacts};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -75,11 +76,18 @@ struct Status {
 
 impl Command for Status {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let status = self.service.get(terminal, "/v1/status")?;
+        let mut status = self.service.get(terminal, "/v1/status")?;
         let channels = self.service.get(terminal, "/v1/channels")?;
-        let mut whole = status.clone();
-        whole["channels"] = channels["channels"].clone();
-        show(terminal, &whole, || shown::status(&whole))?;
+        status["channels"] = channels["channels"].clone();
+        let kinds = [StatusFacts::declared(), ChannelsFacts::declared()];
+        let words = || {
+            kinds
+                .into_iter()
+                .flatten()
+                .map(|of| of.words(&status))
+                .collect()
+        };
+        show(terminal, &status, words)?;
         // A script asks whether all is well.
         Ok(match status["state"].as_str() {
             Some("running") => Answer::Fine,

@@ -14,7 +14,7 @@ use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::ConnectorError;
 use athermal_serve::service::Service;
 
-use crate::hub::{Hub, Looker};
+use crate::hub::{ControlFacts, Hub, Looker};
 use crate::routes::Routes;
 use crate::server::{Doors, Server};
 use crate::settings::Control;
@@ -51,8 +51,8 @@ impl Companion for Control {
         let hub = Arc::new(Hub::default());
         let (handle, seen) = (beside.handle.clone(), Arc::clone(&hub));
         let look = move |service: &mut Service| {
-            let looker = Looker(seen, service.channels().to_vec());
-            service.observe(Box::new(looker));
+            service.observe(Box::new(Looker(Arc::clone(&seen))));
+            service.contribute("control", move || ControlFacts::read(&seen));
         };
         // The service answers once it is pumped, which is after this.
         std::thread::spawn(move || handle.ask(PATIENCE, look));

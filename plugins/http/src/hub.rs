@@ -1,25 +1,21 @@
 //! What a service shows to those that listen: each tick and what happens, through bounded queues. Nobody is waited for.
 
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::Engine;
+use athermal_core::event::Event as _;
 use athermal_core::time::Instant;
-use athermal_run::live::Notice;
+use athermal_serve::facts::EventFacts;
 use athermal_serve::service::{Observer, ServiceEvent};
+use athermal_serve::{facts, register_facts};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
-use crate::prediction_error::PredictionErrors;
-use crate::words::described;
-
 /// How many ticks and events may wait for a listener.
 const WAITING: usize = 256;
-/// How many of the last events are shown in a status.
-const RECENT: usize = 32;
 
 /// What a listener is given.
 #[derive(Debug)]
@@ -46,37 +42,33 @@ pub struct Listener {
     pub dropped: Arc<AtomicU64>,
 }
 
-/// What is known since the service started.
-#[derive(Default)]
+/// Who listens.
+#[derive(Debug, Default)]
 pub struct Hub {
     inner: Mutex<Inner>,
     turned_away: AtomicU64,
 }
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Inner {
     listeners: Vec<(mpsc::Sender<Arc<Item>>, Arc<AtomicU64>)>,
-    known: Known,
+    /// Dropped for all listeners so far.
+    dropped: u64,
 }
 
-/// What is counted, and what happened last.
-#[derive(Default, Clone)]
-pub struct Known {
-    pub swaps: u64,
-    pub missed: u64,
-    pub source_failures: u64,
-    pub sink_failures: u64,
-    pub refused_swaps: u64,
-    pub no_checkpoint: u64,
-    /// The last events, with the time of day.
-    pub recent: VecDeque<Value>,
-    pub errors: PredictionErrors,
-    /// The novelty of each estimator that gives one, by its name.
-    pub novelty: Vec<(String, f64)>,
-    /// Dropped for all listeners so far.
-    pub dropped: u64,
-    pub listeners: usize,
+facts! {
+    /// The control interface.
+    ControlFacts(hub: &Hub) {
+        /// Connections to the control interface that there was no room for.
+        refused_connections: u64 [counter "athermal_control_refused_connections_total"] = hub.turned_away.load(Ordering::Relaxed);
+        /// Streams of events that are open.
+        listeners: usize [gauge "athermal_control_listeners"] = hub.inner().listening();
+        /// Events and ticks that listeners were too slow for.
+        dropped_items: u64 [counter "athermal_control_dropped_items_total"] = hub.inner().dropped;
+    }
 }
+
+register_facts!(ControlFacts, "control");
 
 impl Hub {
     /// One more listener.
@@ -88,22 +80,9 @@ impl Hub {
         Listener { items, dropped }
     }
 
-    /// What is known.
-    pub fn known(&self) -> Known {
-        let mut inner = self.inner();
-        inner.listeners.retain(|(to, _)| !to.is_closed());
-        inner.known.listeners = inner.listeners.len();
-        inner.known.clone()
-    }
-
     /// A connection had no room.
     pub fn turned_away(&self) {
         self.turned_away.fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// How many connections had no room.
-    pub fn count_turned_away(&self) -> u64 {
-        self.turned_away.load(Ordering::Relaxed)
     }
 
     fn inner(&self) -> MutexGuard<'_, Inner> {
@@ -112,12 +91,17 @@ impl Hub {
 }
 
 impl Inner {
+    fn listening(&mut self) -> usize {
+        self.listeners.retain(|(to, _)| !to.is_closed());
+        self.listeners.len()
+    }
+
     fn send(&mut self, item: impl FnOnce() -> Item) {
         if self.listeners.is_empty() {
             return;
         }
         let item = Arc::new(item());
-        let dropped = &mut self.known.dropped;
+        let dropped = &mut self.dropped;
         self.listeners
             .retain(|(to, count)| match to.try_send(Arc::clone(&item)) {
                 Ok(()) => true,
@@ -131,42 +115,21 @@ impl Inner {
     }
 }
 
-/// Looks on at a service of these channels, and fills a hub.
-pub struct Looker(pub Arc<Hub>, pub Vec<String>);
+/// Looks on at a service, and fills a hub.
+pub struct Looker(pub Arc<Hub>);
 
 impl Observer for Looker {
     fn event(&mut self, event: &ServiceEvent) {
-        let mut inner = self.0.inner();
-        let known = &mut inner.known;
-        match event {
-            ServiceEvent::Swap(Notice::TookOver { .. }) => known.swaps += 1,
-            ServiceEvent::Swap(Notice::Missed { ticks }) => known.missed += ticks,
-            ServiceEvent::SourceFailed { .. } => known.source_failures += 1,
-            ServiceEvent::SinkFailed { .. } => known.sink_failures += 1,
-            ServiceEvent::NotTakenOver(_) | ServiceEvent::NotStaged(_) => known.refused_swaps += 1,
-            ServiceEvent::NoCheckpoint(_) => known.no_checkpoint += 1,
-            _ => {}
-        }
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let at_s = now.map_or(0.0, |of| of.as_secs_f64());
-        for (_, message) in described(event, &self.1, false) {
-            let (name, facts, words) = (message.name(), message.facts(), message.to_string());
-            let event =
-                json!({ "event": name, "host_time_s": at_s, "message": words, "facts": facts });
-            if inner.known.recent.len() == RECENT {
-                inner.known.recent.pop_front();
-            }
-            inner.known.recent.push_back(event.clone());
-            inner.send(|| Item::Event(event));
+        for (is_fault, message) in event.messages(false) {
+            let of = || Item::Event(json!(EventFacts::read(is_fault, &message, at_s)));
+            self.0.inner().send(of);
         }
     }
 
     fn tick(&mut self, at: Instant, engine: &Engine) {
-        let mut inner = self.0.inner();
-        let known = &mut inner.known;
-        known.errors.look(at, engine);
-        look_at_novelty(&mut known.novelty, engine);
-        inner.send(|| {
+        self.0.inner().send(|| {
             let plan = Arc::clone(engine.plan());
             Item::Tick(Tick {
                 at,
@@ -179,27 +142,4 @@ impl Observer for Looker {
             })
         });
     }
-}
-
-fn look_at_novelty(novelty: &mut Vec<(String, f64)>, engine: &Engine) {
-    use athermal_core::compile::PlannedRole::Estimator;
-    let nodes = engine.plan().nodes.iter();
-    let given = nodes.filter_map(|node| match &node.role {
-        Estimator {
-            novelty: Some(slot),
-            ..
-        } => Some((node, *slot)),
-        _ => None,
-    });
-    let mut count = 0;
-    for (nth, (node, slot)) in given.enumerate() {
-        count = nth + 1;
-        let value = engine.value(slot);
-        match novelty.get_mut(nth) {
-            Some((name, known)) if *name == node.instance() => *known = value,
-            Some(place) => *place = (node.instance(), value),
-            None => novelty.push((node.instance(), value)),
-        }
-    }
-    novelty.truncate(count);
 }

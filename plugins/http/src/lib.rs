@@ -5,9 +5,9 @@
 //! | [`settings`] | what `[control]` says |
 //! | `server` | connections: how many, how long, how large |
 //! | `guard` | who is heard: `Host`, `Origin`, token |
-//! | `routes` | what is answered |
+//! | [`Route`], `routes` | what a route is, and what is answered; [`mount!`] lets another crate answer too |
 //! | `stage` | how a file becomes a graph that can take over, or all of its mistakes |
-//! | `status`, `metrics`, `stream` | what is known of the service, for people, Prometheus and listeners |
+//! | `openapi`, `stream` | the description of it all, and what happens, for listeners |
 //!
 //! It runs on a thread of its own. What it asks of a service goes through [`ServiceHandle`](athermal_serve::service::ServiceHandle);
 //! the engine thread does not notice.
@@ -20,21 +20,27 @@ mod commands;
 mod control;
 mod guard;
 mod hub;
-mod metrics;
-mod prediction_error;
+mod openapi;
 mod reload;
+mod route;
 mod routes;
 mod server;
 pub mod settings;
 mod shown;
 mod stage;
-mod status;
 mod stream;
 mod token;
-pub mod words;
 
+pub use answer::Refused;
+pub use openapi::openapi;
 pub use reload::reload;
-pub use routes::{OPENAPI, ROUTES};
+pub use route::{Answerer, Asked, Gives, Mounted, Reply, Route, SchemaOf, routes};
+
+/// What macros of this crate make use of.
+#[doc(hidden)]
+pub mod __private {
+    pub use inventory;
+}
 
 #[cfg(test)]
 mod tests;

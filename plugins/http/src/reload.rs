@@ -14,7 +14,7 @@ use crate::stage::{load, of_file};
 const PATIENCE: Wait = Wait::from_secs(60);
 
 /// The revision of what runs.
-pub(crate) fn revision(service: &mut Service) -> Option<String> {
+fn revision(service: &mut Service) -> Option<String> {
     service.running().map(|of| of.revision().to_owned())
 }
 

@@ -11,15 +11,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Clock};
 
+use hyper::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
-use hyper::{Request, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt as _};
 use tokio::sync::watch;
 
-use crate::answer::{Answer, Refused};
+use crate::answer::Answer;
 use crate::guard::Peer;
 use crate::routes::Routes;
 use crate::stream::Life;
@@ -229,9 +229,4 @@ impl Drop for Place {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-/// What is not understood.
-pub fn not_understood(words: &str) -> Refused {
-    Refused::new(StatusCode::BAD_REQUEST, words)
 }

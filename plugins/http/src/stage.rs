@@ -7,13 +7,14 @@ use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_run::model::{Model, ModelError};
 use athermal_serve::deployment::Deployment;
 use hyper::StatusCode;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
 
 use crate::answer::Refused;
 
 /// What is to be staged: a file that the service reads, or the text of a model.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Given {
     /// A graph or a model on this machine, from the root on.

@@ -4,7 +4,8 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use athermal::Duration;
-use athermal::core::engine::{Carry, NodeCarry};
+use athermal::core::engine::NodeCarry;
+use athermal::core::event::Event as _;
 use athermal::run::live::session::{Refusal, WatchedGraph};
 use athermal::run::live::{Notice, StageError, Staged, Verdict};
 use serde_json::json;
@@ -49,17 +50,7 @@ pub fn ready(
 /// What becomes of each node of a graph that is ready to take over.
 fn staged(path: &Path, staged: &Staged) -> Message {
     let all = staged.carry();
-    let carried = all
-        .iter()
-        .filter(|node| node.outcome == Carry::Carried)
-        .count();
-    let mut text = format!(
-        "{} (revision {}): {carried} of {} nodes go on as they were",
-        path.display(),
-        staged.revision(),
-        all.len()
-    );
-    text += &nodes(all);
+    let mut text = NodeCarry::graph_words(path, staged.revision(), all);
     let (past, endless) = staged.endless();
     if !endless.is_empty() {
         let _ = write!(
@@ -82,24 +73,9 @@ fn staged(path: &Path, staged: &Staged) -> Message {
     Message::new("staged", facts, text)
 }
 
-/// What becomes of the nodes that do not go on as they were, a line each.
-fn nodes(all: &[NodeCarry]) -> String {
-    let mut text = String::new();
-    for node in all {
-        let (word, why) = match &node.outcome {
-            Carry::Carried => continue,
-            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
-            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
-            Carry::Cold { reason } => ("cold", reason.clone()),
-        };
-        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
-    }
-    text
-}
-
 /// What becomes of the nodes of a graph that was given at the start of a service.
 pub fn carry(terminal: &Terminal, all: &[NodeCarry]) {
-    let text = nodes(all);
+    let text = NodeCarry::words(all);
     if !text.is_empty() {
         terminal.note(text.trim_start());
     }
@@ -195,8 +171,8 @@ pub fn not_read(failure: Failure, watched: Option<&WatchedGraph>) -> Failure {
 
 /// What happened at a hand-over.
 pub fn notice(terminal: &Terminal, notice: &Notice) {
-    match athermal_http::words::notice(notice) {
-        (true, message) => terminal.warning(message),
-        (false, message) => terminal.note(message),
-    }
+    notice
+        .messages(true)
+        .into_iter()
+        .for_each(|of| terminal.report(of));
 }

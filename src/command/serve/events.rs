@@ -4,31 +4,28 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use athermal::core::event::Event as _;
 use athermal::serve::recovery::{RecoveryReport, Start};
 use athermal::serve::service::{ServiceEvent, SinkCounts};
 
 use crate::command::run::swap_words;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, instant, seconds};
-use athermal_http::words::described;
 
 /// A service's way to the terminal.
-pub struct Events<'a> {
-    pub terminal: Terminal,
-    pub channels: &'a [String],
-}
+pub struct Events(pub Terminal);
 
-impl Events<'_> {
+impl Events {
     /// Reports an event.
     pub fn report(&self, event: ServiceEvent) {
-        let together = !self.terminal.events;
+        let Self(terminal) = self;
         let all = match &event {
             ServiceEvent::Compared { verdict, .. } => vec![(false, swap_words::shadow(verdict))],
-            event => described(event, self.channels, together),
+            event => event.messages(!terminal.events),
         };
-        all.into_iter().for_each(|of| self.terminal.report(of));
+        all.into_iter().for_each(|of| terminal.report(of));
         if let ServiceEvent::Staged { carry, .. } = &event {
-            swap_words::carry(&self.terminal, carry);
+            swap_words::carry(terminal, carry);
         }
     }
 }

@@ -62,11 +62,7 @@ impl Serve {
         let started = Service::start(&model, deployment, &options);
         let (mut service, report) = started.map_err(refused)?;
         events::recovered(terminal, &state, &report);
-        let channels = service.channels().to_vec();
-        let reports = events::Events {
-            terminal: *terminal,
-            channels: &channels,
-        };
+        let reports = events::Events(*terminal);
         while !service.is_over() && !stop::is_stopped() {
             for event in service.pump() {
                 reports.report(event);

@@ -9,24 +9,14 @@ use athermal_core::time::Instant;
 use athermal_run::live::Feed;
 use athermal_run::live::monitor::silence::{self, Silence};
 use athermal_run::live::monitor::standstill::{self, Standstill};
+pub use athermal_run::live::monitor::words::{Purpose, facts};
 use athermal_run::live::monitor::{Finding, Monitor, places};
 use athermal_run::recording::{Event, Recording, Samples, Source, SourceError};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::leap::{self, Leaps};
 use crate::figures::seconds;
-
-/// What a recording is read for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
-    /// Models learn from it.
-    Fit,
-    /// Models are set against it.
-    Scores,
-    /// Models predict from it.
-    Run,
-}
 
 /// What is wrong with a channel.
 #[derive(Debug)]
@@ -55,16 +45,6 @@ impl ChannelFaults {
     pub fn facts(&self, fault: &impl Serialize) -> Value {
         facts(&self.channel, self.of_truth, fault)
     }
-}
-
-/// A fault of a channel, as JSON.
-#[must_use]
-pub fn facts(channel: &str, of_truth: bool, fault: &impl Serialize) -> Value {
-    let mut facts = json!({ "channel": channel, "of_truth": of_truth });
-    if let (Value::Object(all), Value::Object(found)) = (&mut facts, json!(fault)) {
-        all.extend(found);
-    }
-    facts
 }
 
 /// A recording whose channels are looked at when it is first read.

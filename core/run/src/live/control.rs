@@ -10,6 +10,7 @@ use std::sync::Arc;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::handover::{Feed, Happening, LiveEngine, Mark};
+use super::notice::Notice;
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
@@ -83,30 +84,6 @@ enum Origin {
     Previous {
         left: Duration,
     },
-}
-
-/// What has happened since the last look.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Notice {
-    /// A committed graph took over before the tick of this number.
-    TookOver {
-        /// Its revision.
-        revision: String,
-        /// The first tick that it stepped.
-        tick: u64,
-        /// The instant of that tick.
-        time: Instant,
-    },
-    /// The engine thread sent a graph back because it came too late; it can be committed again.
-    SentBack,
-    /// Ticks, segment breaks or commands were missed: states can no longer be carried, until a graph warmed by the retained past
-    /// takes over.
-    Missed {
-        /// How many.
-        ticks: u64,
-    },
-    /// What runs is known again after something was missed.
-    Mirrored,
 }
 
 /// The two ends of an engine of which there is a replica.

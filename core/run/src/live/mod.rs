@@ -17,6 +17,7 @@
 mod control;
 mod handover;
 pub mod monitor;
+mod notice;
 mod refit;
 mod retained;
 mod run;
@@ -28,8 +29,9 @@ mod staged;
 mod stepper;
 pub mod store;
 
-pub use control::{Control, Notice};
+pub use control::Control;
 pub use handover::Feed;
+pub use notice::Notice;
 pub use refit::Refit;
 pub use run::{RunError, run};
 pub use session::{Replacement, Report, Reporter, Session, SessionOptions};

@@ -1,5 +1,6 @@
 //! Decides whether a candidate predicts no worse than what runs, on the same ticks and truths.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compile::Plan;
@@ -16,7 +17,7 @@ pub struct Shadow {
 }
 
 /// What a comparison has come to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Verdict {
     /// Whether the stated time has passed.
     pub over: bool,
@@ -29,7 +30,7 @@ pub struct Verdict {
 }
 
 /// One output, as both predicted it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Compared {
     /// The output: `predicted.Z1`.
     pub output: String,

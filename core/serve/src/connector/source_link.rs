@@ -8,6 +8,8 @@ use std::time::Duration as Wait;
 
 use athermal_run::recording::Thinning;
 use rtrb::{Consumer, Producer, RingBuffer};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::thin::Thin;
 use super::{LeftOut, LeftOutCounts, Stamps, Stop, WiredChannel};
@@ -128,7 +130,8 @@ impl SourceCounts {
 }
 
 /// How the connection of a source is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Connection {
     /// It has not been connected since the service started.
     Never,

@@ -6,8 +6,9 @@ use std::time::Duration as Wait;
 
 use athermal_run::live::monitor::Watch;
 
-use super::{Held, Service, SinkCounts, Snapshot};
+use super::{Held, Service, SinkCounts, Snapshot, Watcher};
 use crate::connector::{Connection, LeftOut, SourceCounts};
+use crate::facts::Sections;
 use crate::folder::StateFolder;
 use crate::journal::JournalStatus;
 use crate::time::Instant;
@@ -36,6 +37,31 @@ impl ChannelSamples {
 }
 
 impl Service {
+    /// The name of the machine.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// When the model that runs was fitted, in s since 1970.
+    #[must_use]
+    pub fn fitted_s(&self) -> Option<f64> {
+        self.fitted.get(self.running()?.revision()).copied()
+    }
+
+    /// What is kept in mind of it.
+    #[must_use]
+    pub fn watcher(&self) -> &Watcher {
+        &self.watcher
+    }
+
+    /// What companions know.
+    #[must_use]
+    pub fn sections(&self) -> Sections {
+        let all = self.sections.iter().map(|(name, read)| (*name, read()));
+        Sections(all.collect())
+    }
+
     /// How long it has been running.
     #[must_use]
     pub fn uptime(&self) -> Wait {

@@ -49,8 +49,8 @@ pub(super) enum Order {
 /// What the engine thread has to report.
 #[derive(Debug)]
 pub(super) enum Remark {
-    /// A sample was not accepted, for the so many-th time; whose clock is ahead of it.
-    NotAccepted(Admission, u64, Option<Leader>),
+    /// A sample of a channel was not accepted, for the so many-th time; whose clock is ahead of it.
+    NotAccepted(usize, Admission, u64, Option<Leader>),
     /// The last tick was of the future: it is the time of a stamp.
     WentBack(Instant, Instant),
 }
@@ -290,7 +290,7 @@ impl EngineThread {
             .is_some_and(|of| 10_u64.pow(of) == count)
         {
             let leader = self.worker.sequencer().leader(admission, self.clock.now());
-            let remark = Remark::NotAccepted(admission, count, leader);
+            let remark = Remark::NotAccepted(channel, admission, count, leader);
             let _ = self.remarks.push(remark);
             self.control.ring();
         }

@@ -18,6 +18,7 @@ mod handle;
 mod host_clock;
 mod observer;
 mod position;
+mod prediction_error;
 mod replacing;
 mod sink_thread;
 mod sinks;
@@ -27,8 +28,10 @@ mod status;
 #[cfg(test)]
 mod tests;
 mod watch;
+mod watcher;
 mod wiring;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -44,11 +47,13 @@ pub use crate::keeper::{CommitError, Held};
 pub use asked::ChannelSamples;
 pub use ending::Ended;
 pub use error::ServiceError;
-pub use event::ServiceEvent;
+pub use event::{Ahead, OwnEvents, ServiceEvent, event_kinds};
 pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
+pub use prediction_error::{PredictionError, PredictionErrors};
 pub use status::Snapshot;
+pub use watcher::{LastTicks, Seen, Watcher};
 
 use crate::aside::{Aside, within};
 use crate::bell::{Bell, Mailbox};
@@ -57,13 +62,14 @@ use crate::companion::Beside;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
 use crate::deployment::Deployment;
+use crate::facts::SectionFacts;
 use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
 use crate::journal::{FeedNames, JournalOptions, Keep, Progress, Recorder, oldest, retire};
 use crate::keeper::Keeper;
 use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
-use crate::sequencer::{Leader, Sequencer};
+use crate::sequencer::Sequencer;
 use crate::time::{Duration, Instant};
 use crate::worker::Worker;
 use engine_thread::{EngineThread, Order, Remark};
@@ -108,11 +114,19 @@ impl ServiceOptions {
     }
 }
 
+type Section = Box<dyn Fn() -> Box<dyn SectionFacts> + Send>;
+
 /// A service at work.
 pub struct Service {
+    name: String,
     handle: ServiceHandle,
     asked: Receiver<Work>,
     observers: Observers,
+    watcher: Watcher,
+    /// When models were fitted, by their revisions, in s since 1970.
+    fitted: BTreeMap<String, f64>,
+    /// What companions know.
+    sections: Vec<(&'static str, Section)>,
     companions: Vec<Box<dyn Send>>,
     comparison: Option<Comparison>,
     is_asked_to_end: bool,
@@ -226,7 +240,8 @@ impl Service {
         folder.commits().retain(..=happenings);
         let was_frozen = recovered.engine.frozen();
         let (stepper, mut control) = pair_from(recovered.engine, live)?;
-        let observers = Observers::default();
+        let (observers, watcher) = (Observers::default(), Watcher::default());
+        observers.add(Box::new(watcher.clone()));
         control.watch(recovered.model.sample_ranges());
         let looking = observers.clone();
         control.look_on(move |at, engine| looking.tick(at, engine));
@@ -282,10 +297,17 @@ impl Service {
         )?;
         let _ = hand_over.send(open.links);
         let (handle, asked) = ServiceHandle::new();
+        let stem = options.machine.file_stem();
+        let stem = stem.map(|of| of.to_string_lossy().into_owned());
+        let name = model.graph.name.clone().or(stem).unwrap_or_default();
         let mut service = Self {
+            name,
             handle,
             asked,
             observers,
+            watcher,
+            fitted: BTreeMap::new(),
+            sections: Vec::new(),
             companions: Vec::new(),
             comparison: None,
             is_asked_to_end: false,
@@ -321,6 +343,8 @@ impl Service {
             control: std::thread::current(),
             waited: Clock::now(),
         };
+        service.note_fit(model);
+        service.note_fit(&recovered.model);
         service.own.extend(service.host.first());
         if differs {
             service.replace(model);
@@ -333,7 +357,7 @@ impl Service {
             let thread = spawn("source", move || source.run(&stop, &tell))?;
             service.source_threads.push(thread);
         }
-        let beside = service.beside(model, options);
+        let beside = service.beside(options);
         for companion in companions {
             match companion.start(&beside) {
                 Ok(running) => service.companions.push(running),
@@ -371,13 +395,19 @@ impl Service {
         }
         while let Ok(remark) = self.remarks.pop() {
             events.push(match remark {
-                Remark::NotAccepted(admission, count, leader) => {
-                    let name = |of: &Leader| Some(self.sources.get(of.source)?.0.clone());
-                    let leader = leader.and_then(|of| Some((name(&of)?, of)));
+                Remark::NotAccepted(place, admission, count, leader) => {
+                    let channel = |of: usize| self.channels.get(of).cloned();
                     ServiceEvent::NotAccepted {
                         admission,
+                        channel: channel(place),
                         count,
-                        leader,
+                        leader: leader.and_then(|of| {
+                            Some(Ahead {
+                                source: self.sources.get(of.source)?.0.clone(),
+                                channel: channel(of.channel).unwrap_or_default(),
+                                ahead: of.ahead,
+                            })
+                        }),
                     }
                 }
                 Remark::WentBack(last, to) => ServiceEvent::WentBack { last, to },
@@ -451,6 +481,16 @@ impl Service {
         self.observers.add(observer);
     }
 
+    /// Gives facts that a companion knows a place among those of the service: see [`register_facts!`](crate::register_facts).
+    pub fn contribute<T: SectionFacts + 'static>(
+        &mut self,
+        section: &'static str,
+        read: impl Fn() -> T + Send + 'static,
+    ) {
+        let read: Section = Box::new(move || Box::new(read()));
+        self.sections.push((section, read));
+    }
+
     /// Takes a checkpoint, which is saved once the journal is synced up to it. After how many ticks, beats, breaks and freezes it is;
     /// none where none can be taken.
     pub fn checkpoint(&mut self, by: &str) -> Option<u64> {
@@ -502,12 +542,10 @@ impl Service {
         }
     }
 
-    fn beside(&self, model: &Model, options: &ServiceOptions) -> Beside {
-        let stem = options.machine.file_stem();
-        let stem = stem.map(|of| of.to_string_lossy().into_owned());
+    fn beside(&self, options: &ServiceOptions) -> Beside {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or(path.to_owned());
         Beside {
-            name: model.graph.name.clone().or(stem).unwrap_or_default(),
+            name: self.name.clone(),
             machine: absolute(&options.machine),
             state: absolute(self.folder.path()),
             handle: self.handle(),

@@ -6,6 +6,7 @@ use athermal_run::model::Model;
 use super::{Service, ServiceEvent};
 use crate::aside::within;
 use crate::engine::Engine;
+use crate::figures::unix_seconds;
 use crate::folder::StatePaths;
 use crate::keeper::CommitError;
 use crate::time::Duration;
@@ -32,6 +33,7 @@ impl Service {
         }
         let staged = self.keeper.control().stage(model, false)?;
         let revision = staged.revision().to_owned();
+        self.note_fit(model);
         self.comparison = None;
         self.note(&format!("{by}: staged {revision}"));
         let staged = self.keeper.look().staged();
@@ -121,6 +123,14 @@ impl Service {
     fn hand_over(&mut self, by: &str, revision: Option<String>) {
         let revision = revision.unwrap_or_default();
         self.note(&format!("{by}: {revision} is to take over"));
+    }
+
+    /// Keeps in mind when a model was fitted.
+    pub(super) fn note_fit(&mut self, model: &Model) {
+        let created = model.card.as_ref().and_then(|of| of.created.as_deref());
+        if let (Some(revision), Some(at_s)) = (model.revision(), created.and_then(unix_seconds)) {
+            self.fitted.insert(revision, at_s);
+        }
     }
 
     /// Keeps the model that was given, where that has not been possible.

@@ -1,6 +1,7 @@
 //! The control interface of services that run: what it answers, and what it does not let through.
 
 mod attacks;
+mod declared;
 mod latency;
 mod metrics;
 mod openapi;

@@ -1,8 +1,10 @@
 //! Which nodes of a new graph go on from the state of the old one.
 
 use std::collections::HashMap;
+use std::path::Path;
 
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::compile::origins::Dependents;
 use crate::compile::{Change, Plan, PlannedNode, diff};
@@ -37,7 +39,7 @@ pub enum Begin {
 }
 
 /// What became of a node in a swap.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct NodeCarry {
     /// The instance: `thermal.Z1`.
     pub node: String,
@@ -46,8 +48,38 @@ pub struct NodeCarry {
     pub outcome: Carry,
 }
 
+impl NodeCarry {
+    /// What becomes of a graph, with a line for each node that does not go on as it was.
+    #[must_use]
+    pub fn graph_words(graph: &Path, revision: &str, all: &[Self]) -> String {
+        let carried = all.iter().filter(|node| node.outcome == Carry::Carried);
+        format!(
+            "{} (revision {revision}): {} of {} nodes go on as they were{}",
+            graph.display(),
+            carried.count(),
+            all.len(),
+            Self::words(all)
+        )
+    }
+
+    /// What becomes of the nodes that do not go on as they were, a line each.
+    #[must_use]
+    pub fn words(all: &[Self]) -> String {
+        let words = all.iter().filter_map(|of| {
+            let (how, why) = match &of.outcome {
+                Carry::Carried => return None,
+                Carry::Adopted { reason } => ("goes on from the old state", reason),
+                Carry::Warmed { reason } => ("warmed by the past", reason),
+                Carry::Cold { reason } => ("cold", reason),
+            };
+            Some(format!("\n  {}: {how}, {why}", of.node))
+        });
+        words.collect()
+    }
+}
+
 /// How a node of a new graph begins.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "carry", rename_all = "lowercase")]
 pub enum Carry {
     /// As it was: neither it nor anything that it reads has changed.

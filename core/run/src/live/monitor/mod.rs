@@ -10,6 +10,7 @@ mod sensor;
 pub mod silence;
 pub mod standstill;
 mod watch;
+pub mod words;
 
 pub use finding::Finding;
 pub use output::{NoOutput, OutputMonitor};

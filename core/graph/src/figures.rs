@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-pub use athermal_core::diagnostic::{count, counted, digits};
-use athermal_core::time::{Duration, Instant};
 use jiff::Timestamp;
+
+pub use crate::diagnostic::{count, counted, digits};
+use crate::time::{Duration, Instant};
 
 /// How wide tables may be, in characters.
 const WIDTH: usize = 80;
@@ -122,6 +123,13 @@ pub fn instant(at_s: f64) -> String {
     let date = (at_s >= DATES_S).then(|| Timestamp::from_second(at_s as i64).ok());
     date.flatten()
         .map_or_else(|| format!("{at_s} s"), |date| date.to_string())
+}
+
+/// The seconds since 1970 of a time as RFC 3339 writes it.
+#[must_use]
+pub fn unix_seconds(text: &str) -> Option<f64> {
+    let at: Timestamp = text.parse().ok()?;
+    Some(at.as_second() as f64)
 }
 
 /// A time as a graph file states it; one that is too long for that as [`time`] writes it.

@@ -1,14 +1,56 @@
 //! What monitors of a graph at work find, in words: `run` and `serve` say the same.
 
-use athermal_analysis::diagnosis::watch::{Purpose, facts};
-use athermal_analysis::figures::{apart, count, counted, exact, instant, time as length};
-use athermal_core::diagnostic::listed;
-use athermal_core::engine::SampleRange;
-use athermal_run::live::monitor::{Finding, NoOutput, SensorChange, SensorFault, feedback};
+use athermal_core::events;
+use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::Message;
+use super::{Finding, NoOutput, SensorChange, SensorFault, feedback};
+use crate::diagnostic::listed;
+use crate::engine::SampleRange;
+use crate::event::EventKind;
+use crate::figures::{apart, count, counted, exact, instant, time as length};
+use crate::message::Message;
 
+/// What a recording is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// Models learn from it.
+    Fit,
+    /// Models are set against it.
+    Scores,
+    /// Models predict from it.
+    Run,
+}
+
+/// A fault of a channel, as JSON.
+#[must_use]
+pub fn facts(channel: &str, of_truth: bool, fault: &impl Serialize) -> Value {
+    let mut facts = json!({ "channel": channel, "of_truth": of_truth });
+    if let (Value::Object(all), Value::Object(found)) = (&mut facts, json!(fault)) {
+        all.extend(found);
+    }
+    facts
+}
+
+/// What is declared of what monitors find.
+pub const KINDS: &[EventKind] = events!(kinds {
+    /// A sample is infinite or outside of the `range` of its signal, the first in an hour.
+    "rejected_samples", fault, { channel: String, time: String, value: f64 };
+    /// A sample lies farther outside of those of the fit than these are apart, the first in an hour.
+    "outside_fit", fault, { channel: String, time: String, value: f64, lowest_in_fit: f64, highest_in_fit: f64 };
+    /// A sensor gives one value for much longer than ever else.
+    "stuck", fault, { channel: String, of_truth: bool, from_s: f64, to_s: f64, value: f64, samples: u64 };
+    /// A sensor that was stuck changes again.
+    "changes_again", note, { channel: String, of_truth: bool, from_s: f64, to_s: f64 };
+    /// A sensor gives nothing for ten minutes while ticks come.
+    "silent", fault, { channel: String, of_truth: bool, from_s: f64, to_s: f64 };
+    /// A sensor that was silent has samples again.
+    "has_samples_again", note, { channel: String, of_truth: bool, from_s: f64, to_s: f64 };
+    /// No output has had a value for an hour beyond the warm-up of the graph, or up to the end.
+    "no_output", fault, { ticks: u64, first_silent: String };
+    /// The correction goes by past drifts of what it moves.
+    "feeds_back", fault, { channels: Vec<String> };
+});
 /// The event for samples that do not count.
 pub const REJECTED: &str = "rejected_samples";
 /// The event for samples outside of those of the fit.

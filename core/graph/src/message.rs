@@ -10,6 +10,7 @@ pub struct Message {
     name: &'static str,
     facts: Map<String, Value>,
     words: String,
+    count: u64,
 }
 
 impl Message {
@@ -24,7 +25,32 @@ impl Message {
             name,
             facts,
             words: words.to_string(),
+            count: 1,
         }
+    }
+
+    /// The same of facts by their keys.
+    #[must_use]
+    pub fn of(
+        name: &'static str,
+        facts: Vec<(&'static str, Value)>,
+        words: impl fmt::Display,
+    ) -> Self {
+        let facts = facts.into_iter().map(|(key, of)| (key.to_owned(), of));
+        Self::new(name, Value::Object(facts.collect()), words)
+    }
+
+    /// It counts for so many.
+    #[must_use]
+    pub fn counting(mut self, count: u64) -> Self {
+        self.count = count;
+        self
+    }
+
+    /// For how many it counts.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.count
     }
 
     /// What happened, by its name.

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use athermal_core::compile::Plan;
-use athermal_core::engine::Engine;
-use athermal_core::time::Instant;
 use athermal_run::score::{PairedPrediction, link};
+
+use crate::compile::{Plan, PlannedChannel};
+use crate::engine::Engine;
+use crate::time::Instant;
 
 /// After so many seconds an error counts half.
 const HALF_LIFE_S: f64 = 3_600.0;
 
 /// The errors of all predictions of a graph.
-#[derive(Default, Clone)]
+#[derive(Debug, Default, Clone)]
 pub struct PredictionErrors {
     plan: Option<Arc<Plan>>,
     all: Vec<PredictionError>,
@@ -20,7 +21,7 @@ pub struct PredictionErrors {
 }
 
 /// The error of a prediction.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct PredictionError {
     /// The channel that predicts.
     pub name: String,
@@ -80,7 +81,7 @@ impl PredictionError {
 }
 
 fn predictions(plan: &Plan) -> Vec<PredictionError> {
-    let prediction = |(slot, channel): (usize, &athermal_core::compile::PlannedChannel)| {
+    let prediction = |(slot, channel): (usize, &PlannedChannel)| {
         let link = link(plan, slot)?;
         let truth = &plan.channels[link.slot].channel;
         Some(PredictionError {
@@ -98,35 +99,4 @@ fn predictions(plan: &Plan) -> Vec<PredictionError> {
         .enumerate()
         .filter_map(prediction)
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tests::fitted;
-
-    #[test]
-    fn what_was_predicted_before_a_break_is_no_prediction_of_what_comes_after_it() {
-        let path = std::env::temp_dir().join(format!("athermal-break-{}.toml", std::process::id()));
-        std::fs::write(&path, crate::tests::GRAPH).unwrap();
-        let model = fitted(athermal_run::model::Model::load(&path).unwrap());
-        std::fs::remove_file(path).unwrap();
-        let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
-        let mut errors = PredictionErrors::default();
-        let mut step = |ms: i64, z: f64| {
-            let now = Instant::from_ns(ms * 1_000_000);
-            if engine.last().is_some_and(|last| now <= last) {
-                engine.segment();
-            }
-            engine.step(now, &[20.5, 21.5, z]).unwrap();
-            errors.look(now, &engine);
-            errors.iter().filter(|of| of.rmse().is_some()).count()
-        };
-        for tick in 0..30 {
-            assert_eq!(step(100 * tick, f64::NAN), 0);
-        }
-        // It goes back by less than the predictions reach, and no truth has been paired before.
-        assert_eq!(step(2_050, 50.0), 0);
-        assert_eq!(step(3_050, 50.0), 2);
-    }
 }

@@ -1,0 +1,127 @@
+//! What is kept in mind of a service while it runs: how many events there were, the last ones, the last ticks of each output, the errors
+//! of predictions.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+
+use super::prediction_error::PredictionErrors;
+use super::{Observer, ServiceEvent};
+use crate::compile::Plan;
+use crate::compile::PlannedRole::Estimator;
+use crate::engine::Engine;
+use crate::event::Event as _;
+use crate::message::Message;
+use crate::time::Instant;
+
+/// How many of the last events are kept.
+const EVENTS: usize = 32;
+/// How many of the last ticks.
+const TICKS: usize = 256;
+
+/// Keeps in mind what happens. It is looked at from the control thread, which alone fills it.
+#[derive(Debug, Clone, Default)]
+pub struct Watcher(Arc<Mutex<Seen>>);
+
+/// What has been seen since the start.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// How many events there were, by their names.
+    pub counts: BTreeMap<&'static str, u64>,
+    /// The last events, the oldest first: whether each is a fault, and when the host's clock said so, in s since 1970.
+    pub recent: VecDeque<(bool, Message, f64)>,
+    /// The last ticks of each output.
+    pub last: LastTicks,
+    /// The errors of predictions.
+    pub errors: PredictionErrors,
+    /// The novelty of each estimator that gives one, by its name.
+    pub novelty: Vec<(String, f64)>,
+}
+
+/// The last ticks of each output, of graphs before included.
+#[derive(Debug, Default)]
+pub struct LastTicks {
+    plan: Option<Arc<Plan>>,
+    /// The outputs of the graph that runs.
+    pub outputs: Vec<String>,
+    /// Instants, and the values of the outputs, NaN where one had none; the oldest first.
+    pub ticks: VecDeque<(Instant, Vec<f64>)>,
+}
+
+impl Watcher {
+    /// What has been seen.
+    pub fn seen(&self) -> MutexGuard<'_, Seen> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Observer for Watcher {
+    fn event(&mut self, event: &ServiceEvent) {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        let host_time_s = now.map_or(0.0, |of| of.as_secs_f64());
+        let mut seen = self.seen();
+        for (is_fault, message) in event.messages(false) {
+            *seen.counts.entry(message.name()).or_default() += message.count();
+            if seen.recent.len() == EVENTS {
+                seen.recent.pop_front();
+            }
+            seen.recent.push_back((is_fault, message, host_time_s));
+        }
+    }
+
+    fn tick(&mut self, at: Instant, engine: &Engine) {
+        let seen = &mut *self.seen();
+        seen.last.tick(at, engine);
+        seen.errors.look(at, engine);
+        look_at_novelty(&mut seen.novelty, engine);
+    }
+}
+
+impl LastTicks {
+    fn tick(&mut self, at: Instant, engine: &Engine) {
+        let plan = engine.plan();
+        if !self.plan.as_ref().is_some_and(|of| Arc::ptr_eq(of, plan)) {
+            self.follow(plan);
+        }
+        let room = (self.ticks.len() == TICKS).then(|| self.ticks.pop_front());
+        let mut values = room.flatten().map_or_else(Vec::new, |(_, values)| values);
+        values.clear();
+        values.extend_from_slice(engine.outputs());
+        self.ticks.push_back((at, values));
+    }
+
+    /// Goes on with the outputs of another graph.
+    fn follow(&mut self, plan: &Arc<Plan>) {
+        let outputs: Vec<_> = plan.outputs.iter().map(|of| of.name.clone()).collect();
+        let place = |name: &String| self.outputs.iter().position(|of| of == name);
+        let places: Vec<_> = outputs.iter().map(place).collect();
+        for (_, values) in &mut self.ticks {
+            let value = |place: &Option<usize>| place.map_or(f64::NAN, |place| values[place]);
+            *values = places.iter().map(value).collect();
+        }
+        self.outputs = outputs;
+        self.plan = Some(Arc::clone(plan));
+    }
+}
+
+fn look_at_novelty(novelty: &mut Vec<(String, f64)>, engine: &Engine) {
+    let nodes = engine.plan().nodes.iter();
+    let given = nodes.filter_map(|node| match &node.role {
+        Estimator {
+            novelty: Some(slot),
+            ..
+        } => Some((node, *slot)),
+        _ => None,
+    });
+    let mut count = 0;
+    for (nth, (node, slot)) in given.enumerate() {
+        count = nth + 1;
+        let value = engine.value(slot);
+        match novelty.get_mut(nth) {
+            Some((name, known)) if *name == node.instance() => *known = value,
+            Some(place) => *place = (node.instance(), value),
+            None => novelty.push((node.instance(), value)),
+        }
+    }
+    novelty.truncate(count);
+}
