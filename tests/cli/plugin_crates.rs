@@ -20,7 +20,7 @@ fn with_core(scratch: &Scratch, name: &str, core: &str) -> String {
 }
 
 /// Each role, the files that it has beside those that all have, and what the author is told to type.
-const ROLES: [(&str, &[&str], &str); 6] = [
+const ROLES: [(&str, &[&str], &str); 7] = [
     ("feature", &["tests/conformance.rs"], "build --with path:."),
     (
         "estimator",
@@ -30,6 +30,7 @@ const ROLES: [(&str, &[&str], &str); 6] = [
     ("combiner", &["tests/conformance.rs"], "build --with path:."),
     ("source", &["tests/live.rs"], "target/athermal serve"),
     ("sink", &["tests/live.rs"], "target/athermal serve"),
+    ("companion", &["tests/live.rs"], "target/athermal serve"),
     ("machine", &["tests/conformance.rs"], "build --with path:."),
 ];
 

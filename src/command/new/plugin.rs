@@ -1,4 +1,4 @@
-//! `athermal new plugin`: a crate with a node type, a source, a sink or a machine.
+//! `athermal new plugin`: a crate with a node type, a source, a sink, a companion or a machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::checkout::{Checkout, VERSION, in_toml};
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
-/// Write a crate with a node type, a source, a sink or a machine of your own
+/// Write a crate with a node type, a source, a sink, a companion or a machine of your own
 ///
 /// The crate builds as it is: something small that works, its tests, a graph with a test, and a README with what to do
 /// next. A node, a source and a sink come with the tests of the rules that each of them keeps.
@@ -62,6 +62,7 @@ impl Plugin {
             ("VERSION", VERSION.to_owned()),
             ("CORE", of("core/framework")),
             ("SERVE", of("core/serve")),
+            ("INTERFACE", of("plugins/http")),
             ("TRIAL", of("core/trial")),
             ("TESTKIT", of("core/testkit")),
         ];
@@ -118,6 +119,7 @@ impl Plugin {
             Role::Source => {
                 source_kind(&names.kind).map(|of| ("source", of.name, of.package, of.version))
             }
+            Role::Companion => None,
             Role::Sink => {
                 sink_kind(&names.kind).map(|of| ("sink", of.name, of.package, of.version))
             }
@@ -139,7 +141,7 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
 }
 
-/// What to do with a source or a sink.
+/// What to do with a part of a service.
 const SERVE: &str = "build a binary that has it, and serve a graph with it";
 
 /// What was written, and what to type next.
@@ -154,6 +156,7 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
             format!("the machine `{package}`"),
             "build a binary that has it, and try a graph on it",
         ),
+        Role::Companion => (format!("the companion of `[{kind}]`"), SERVE),
         Role::Source => (format!("the source `{kind}`"), SERVE),
         Role::Sink => (format!("the sink `{kind}`"), SERVE),
     };

@@ -1,5 +1,5 @@
 //! The files of a new plugin crate. Their texts are those of `examples/templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
-//! name, and `CORE`, `SERVE`, `TRIAL`, `TESTKIT` and `VERSION` for the athermal that it builds on.
+//! name, and `CORE`, `SERVE`, `INTERFACE`, `TRIAL`, `TESTKIT` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -18,6 +18,8 @@ pub enum Role {
     Source,
     /// Where outputs go: a controller, a screen
     Sink,
+    /// What runs beside a service: a page, an alarm
+    Companion,
     /// A machine to simulate
     Machine,
 }
@@ -32,13 +34,13 @@ impl Role {
     /// Whether graph files name it as a `type`.
     #[must_use]
     pub fn has_kind(self) -> bool {
-        self.is_node() || self.is_live()
+        self.is_node() || matches!(self, Self::Source | Self::Sink)
     }
 
     /// Whether it is part of a service.
     #[must_use]
     pub fn is_live(self) -> bool {
-        matches!(self, Self::Source | Self::Sink)
+        matches!(self, Self::Source | Self::Sink | Self::Companion)
     }
 }
 
@@ -119,6 +121,9 @@ fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
         Role::Source | Role::Sink => files![
             "Cargo.toml": "live/Cargo.toml.txt",
         ],
+        Role::Companion => files![
+            "Cargo.toml": "companion/Cargo.toml.txt", "README.md": "companion/README.md.txt",
+        ],
         Role::Machine => files![
             "Cargo.toml": "machine/Cargo.toml.txt", "README.md": "machine/README.md.txt",
         ],
@@ -143,6 +148,10 @@ fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
         Role::Sink => files![
             "src/lib.rs": "sink/lib.rs", "tests/live.rs": "sink/live.rs",
             "graphs/my-node.toml": "sink/graph.toml", "README.md": "sink/README.md.txt",
+        ],
+        Role::Companion => files![
+            "src/lib.rs": "companion/lib.rs", "tests/live.rs": "companion/live.rs",
+            "graphs/my-node.toml": "companion/graph.toml",
         ],
         Role::Machine => files![
             "src/lib.rs": "machine/lib.rs", "tests/conformance.rs": "machine/conformance.rs",
@@ -190,12 +199,20 @@ mod tests {
     #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
-        let words = ["VERSION", "CORE", "SERVE", "TRIAL", "TESTKIT"]
+        let words = ["VERSION", "CORE", "SERVE", "INTERFACE", "TRIAL", "TESTKIT"]
             .map(|word| (word, "\"/sources\"".to_owned()));
         for role in Role::value_variants() {
             for (path, text) in files(&names, *role, &words) {
                 for left in [
-                    "my_node", "my-node", "MyNode", "CORE", "SERVE", "TRIAL", "TESTKIT", "VERSION",
+                    "my_node",
+                    "my-node",
+                    "MyNode",
+                    "CORE",
+                    "SERVE",
+                    "INTERFACE",
+                    "TRIAL",
+                    "TESTKIT",
+                    "VERSION",
                 ] {
                     assert!(!path.contains(left), "{left} in {path}");
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");

@@ -1,0 +1,14 @@
+//! What the companion declares is known.
+
+use athermal_serve::companion::companion_kinds;
+use athermal_serve::facts::guide;
+use my_node as _;
+
+#[test]
+fn its_section_its_facts_its_events_and_its_page_are_known() {
+    assert!(companion_kinds().any(|of| of.section == "my_node"));
+    for name in ["my_node_looks_total", "my_node_degraded"] {
+        assert!(guide().contains(name), "{name}");
+    }
+    assert!(athermal_http::routes().any(|of| of.path == "/my_node"));
+}
