@@ -73,6 +73,40 @@ pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure
     write_whole(path, content.as_ref()).map_err(|error| Failure::Outside(not_written(path, &error)))
 }
 
+/// Lets a file be written beside its place, under a name with the same ending, and puts it there once it is whole: what fails or is
+/// stopped leaves what was there. What is there and is no file is written to as it is.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn beside<T>(
+    path: &Path,
+    write: impl FnOnce(&Path) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let is_other = path.as_os_str() == "-" || fs::metadata(path).is_ok_and(|of| !of.is_file());
+    let (false, Some(name)) = (is_other, path.file_name()) else {
+        return write(path);
+    };
+    // A link stays one: the file that it leads to is written.
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let name = place.file_name().unwrap_or(name).to_string_lossy();
+    let aside = place.with_file_name(format!(".{}-{name}", std::process::id()));
+    let written = write(&aside).and_then(|written| {
+        let put =
+            fs::rename(&aside, &place).map_err(|error| Failure::Outside(not_written(path, &error)));
+        put.map(|()| written)
+    });
+    if written.is_err() {
+        let _ = fs::remove_file(&aside);
+    }
+    // Of the name aside nobody knows.
+    let (aside, path) = (aside.display().to_string(), path.display().to_string());
+    written.map_err(|failure| match failure {
+        Failure::Outside(text) => Failure::Outside(text.replace(&aside, &path)),
+        Failure::Request(text) => Failure::Request(text.replace(&aside, &path)),
+        other => other,
+    })
+}
+
 /// Why a file is not written.
 pub fn not_written(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}", path.display())

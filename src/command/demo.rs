@@ -99,7 +99,7 @@ fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u6
         ..Setup::default()
     };
     let recording = Simulated::new(known.machine, setup);
-    write_recording(&recording, known.machine, false, path, terminal)
+    write_recording(&recording, known.machine, false, (path, path), terminal)
 }
 
 fn fit_model(

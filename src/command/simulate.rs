@@ -17,7 +17,7 @@ use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_point
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::aside::{check_apart, not_written, write_aside};
+use super::aside::{beside, check_apart, not_written, write_aside};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
@@ -175,10 +175,10 @@ impl Simulate {
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
         let recording = self.recording(machine)?;
-        match &self.compensate {
-            None => write_recording(&recording, machine, self.truth, output, terminal),
-            Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
-        }
+        beside(output, |aside| match &self.compensate {
+            None => write_recording(&recording, machine, self.truth, (output, aside), terminal),
+            Some(model) => self.write_corrected(model, &recording, machine, aside, terminal),
+        })
     }
 
     fn recording<'a>(&self, machine: &'a dyn Machine) -> Result<Simulated<'a>, Failure> {
@@ -280,7 +280,7 @@ pub fn write_recording(
     recording: &Simulated,
     machine: &dyn Machine,
     truth: bool,
-    output: &Path,
+    (output, aside): (&Path, &Path),
     terminal: &Terminal,
 ) -> Result<u64, Failure> {
     let mut simulation = Watched::start(recording, terminal)?;
@@ -288,7 +288,7 @@ pub fn write_recording(
     let format = FileFormat::from_path(output);
     if matches!(format, Some(FileFormat::JsonLines | FileFormat::Typed)) {
         let mut row = Row::empty(channels);
-        return write_rows(output, &table_columns(channels, truth), |values| {
+        return write_rows(aside, &table_columns(channels, truth), |values| {
             let more = simulation.next(&mut row);
             take(&row, truth, values);
             more.then_some(row.time_ns)
@@ -304,7 +304,7 @@ pub fn write_recording(
     let out: Box<dyn Write> = if output.as_os_str() == "-" {
         Box::new(io::stdout().lock())
     } else {
-        Box::new(File::create(output).map_err(failed)?)
+        Box::new(File::create(aside).map_err(failed)?)
     };
     let mut out = BufWriter::with_capacity(1 << 16, out);
     let rows = write_table(channels, &mut simulation, truth, &mut out).map_err(failed)?;

@@ -327,6 +327,45 @@ fn machines_side_by_side_and_sensors_of_one_name_are_named() {
 }
 
 #[test]
+fn a_simulation_that_fails_or_is_stopped_leaves_what_was_there() {
+    let scratch = Scratch::new("whole");
+    let file = scratch.file("week.csv", "what was there\n");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(["simulate", "die-tester", "--days", "400", "-o"])
+        .arg(&file)
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "what was there\n");
+    for name in ["week.csv", "week.jsonl"] {
+        let file = scratch.path(name);
+        athermal(&[
+            &"simulate",
+            &"linear-axis",
+            &"--days",
+            &"0.01",
+            &"-o",
+            &file,
+        ])
+        .ended(0);
+        assert!(std::fs::read_to_string(&file).unwrap().lines().count() > 10);
+    }
+    let nowhere = scratch.path("no/folder/week.csv");
+    let refused = athermal(&[
+        &"simulate",
+        &"linear-axis",
+        &"--days",
+        &"0.01",
+        &"-o",
+        &nowhere,
+    ]);
+    refused.tells(&["no/folder/week.csv"]);
+    assert!(!refused.told.contains("/."), "{}", refused.told);
+}
+
+#[test]
 fn times_that_start_again_after_a_reboot_are_segments() {
     let scratch = Scratch::new("reboots");
     let row = |nth: usize, at: usize| {

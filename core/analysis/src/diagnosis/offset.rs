@@ -83,6 +83,11 @@ pub fn offset<R: Recording>(
     if counts.is_empty() {
         return Ok(None);
     }
+    // What is not looked at need not be fitted over and over.
+    let options = FitOptions {
+        only: Some(counts.keys().cloned().collect()),
+        ..options
+    };
     let mut deviances = |shift: i64| -> Option<Deviances> {
         progress(done, fits);
         done += 1;
