@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 use athermal::core::diagnostic::{panic_message, panic_text};
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
-use crate::command::Command;
+use crate::command::{Command, mistaken};
 use crate::invocation;
 use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 
@@ -59,6 +59,14 @@ pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     let name = words.first().map(|name| name.to_string_lossy());
     invocation::called(name.unwrap_or_default().into_owned());
+    let texts: Vec<String> = words
+        .iter()
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect();
+    if let Some(meant) = mistaken::meant(&texts) {
+        eprintln!("error: {meant}");
+        return Failure::Request(meant).status();
+    }
     let arguments = whole().get_matches_from(words);
     let options = Options::from_arg_matches(&arguments);
     let options = options.unwrap_or_else(|error| error.exit());

@@ -33,7 +33,7 @@ use athermal_fleet::job::Times;
 #[derive(Debug, Args)]
 pub struct Data {
     /// CSV or JSON lines, or a folder of them; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
-    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
+    #[arg(long = "data", short = 'd', short_alias = 'g', required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
     given: Vec<Given>,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]

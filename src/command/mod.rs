@@ -19,6 +19,7 @@ mod fit_blocks;
 pub(crate) mod found;
 pub(crate) mod init;
 mod man;
+pub(crate) mod mistaken;
 pub(crate) mod model;
 mod new;
 mod nodes;

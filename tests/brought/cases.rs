@@ -327,6 +327,72 @@ fn machines_side_by_side_and_sensors_of_one_name_are_named() {
 }
 
 #[test]
+fn a_call_that_means_another_is_answered_with_that_one() {
+    let scratch = Scratch::new("meant");
+    let log = scratch.file("log.csv", "time_s,plate_degC,Z_nm\n0,20,1\n10,20,2\n");
+    let text = scratch.file("log.txt", "time_s;plate_degC;Z_nm\n0;20;1\n10;20;2\n");
+    let graph = scratch.file("g.toml", "schema = 1\n");
+    let model = scratch.file("m.json", "{\n  \"athermal_model\": 1\n}\n");
+    let folder = scratch.path("");
+    for (words, parts) in [
+        (
+            vec!["train", "g.toml"],
+            vec!["no command `train`", "fit GRAPH --data LOG -o MODEL"],
+        ),
+        (
+            vec!["predict", "m.json"],
+            vec!["no command `predict`", "run MODEL --input LOG"],
+        ),
+        (vec!["score", "m.json"], vec!["evaluate MODEL --data LOG"]),
+        (
+            vec!["fit", "log.csv", "--data", "log.csv", "-o", "x.json"],
+            vec!["log.csv is a log", "init", "-o graph.toml"],
+        ),
+        (vec!["check", "log.txt"], vec!["log.txt is a log", "init"]),
+        (vec!["show", "log.csv"], vec!["log.csv is a log"]),
+        (
+            vec!["evaluate", "log.csv", "--data", "m.json"],
+            vec!["evaluate", "m.json --data", "log.csv"],
+        ),
+        (
+            vec!["fit", "log.csv", "-d", "g.toml", "-o", "x.json"],
+            vec!["fit", "g.toml --data"],
+        ),
+        (
+            vec!["run", "log.csv", "--input", "m.json"],
+            vec!["m.json --input"],
+        ),
+        (
+            vec!["evaluate", "m.json", "--data", "log.csv", "m.json"],
+            vec!["m.json is a model and holds no data"],
+        ),
+        (vec!["init", "m.json"], vec!["m.json is a model", "show"]),
+        (vec!["init", "g.toml"], vec!["this is a graph"]),
+        (
+            vec!["fit", "g.toml", "-d", "log.csv", "-o", ""],
+            vec!["this is a folder", "model.json"],
+        ),
+        (
+            vec!["report", "m.json", "-d", "log.csv", "-o", ""],
+            vec!["this is a folder", "report.html"],
+        ),
+    ] {
+        let path = |word: &&str| match *word {
+            "" => folder.display().to_string(),
+            "log.csv" => log.display().to_string(),
+            "log.txt" => text.display().to_string(),
+            "g.toml" => graph.display().to_string(),
+            "m.json" => model.display().to_string(),
+            word => word.to_owned(),
+        };
+        let words: Vec<String> = words.iter().map(path).collect();
+        let words: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            words.iter().map(|word| word as &dyn AsRef<_>).collect();
+        athermal(&words).ended(2).tells(&parts);
+    }
+}
+
+#[test]
 fn a_simulation_that_fails_or_is_stopped_leaves_what_was_there() {
     let scratch = Scratch::new("whole");
     let file = scratch.file("week.csv", "what was there\n");

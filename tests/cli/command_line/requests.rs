@@ -44,9 +44,10 @@ fn a_log_in_the_place_of_a_model_is_refused_by_its_beginning() {
     let mut log = std::fs::read(&data).unwrap();
     log.extend([0xff; 20_000]);
     let log = scratch.file("odd.csv", log);
-    athermal_on("evaluate", &log, &model, &[])
-        .ended(2)
-        .tells(&["odd.csv", "no model"]);
+    athermal_on("evaluate", &log, &model, &[]).ended(2).tells(&[
+        "odd.csv is a log",
+        "model.json is what is to stand in its place",
+    ]);
 }
 
 #[test]
