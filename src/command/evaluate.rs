@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::report;
-use athermal::run::score::{Lack, Score, ScoreOptions, score};
+use athermal::run::score::{FellBack, Lack, Score, ScoreOptions, score};
 use clap::Args;
 use serde_json::json;
 
@@ -25,8 +25,8 @@ use athermal_analysis::figures::seconds;
 ///
 /// Each prediction is compared with the truth measured later. Beside it stand no model, persistence (the
 /// last truth that shares nothing with the predicted one), and the standard error of the truth itself. Persistence is K
-/// steps back for predictions K steps ahead; a free run has none. All predictions of a truth are scored on the instants at
-/// which all of them are valid.
+/// steps back for predictions K steps ahead; a free run has none. What the graph puts out is scored wherever it has a value, as it is
+/// used; all other predictions of a truth, to be compared, on the instants at which all of them are valid.
 ///
 /// The standard error of a truth that is a slope is that of its line, from the residuals about it (root mean square over
 /// the instants). Scatter of the samples and curvature of the drift within the window both count there. So it may be more
@@ -121,12 +121,14 @@ impl Evaluate {
         facts["scores"] = json!(scores.scores);
         facts["unscored"] = json!(scores.unscored);
         facts["lacks"] = json!(scores.lacks);
+        facts["fell_back"] = json!(scores.fell_back);
         doubts.add_to(&mut facts);
         doubts.warn(terminal);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
         self.data.warn_fitted_on(terminal, model, period);
         unscored::warn(terminal, &scores.unscored);
-        for message in Lack::warnings(&scores.lacks) {
+        let fell_back = FellBack::warnings(&scores.fell_back);
+        for message in Lack::warnings(&scores.lacks).into_iter().chain(fell_back) {
             terminal.warning(message);
         }
         let none = |of: &Score| of.valid.is_some() && of.n == 0;

@@ -275,6 +275,12 @@ pub fn fit_on(
 ) -> Result<FitOutcome, Failure> {
     let mut outcome = fit_without_card(model, data, options, terminal)?;
     warn_bare(&outcome, terminal);
+    for (output, voter, share) in outcome.report.fallbacks(&model.plan) {
+        terminal.warning(format_args!(
+            "{output}: {voter} lacks a regressor in {:.0}% of the rows, so it will be its fallback as often",
+            100.0 * share
+        ));
+    }
     let doubts = std::mem::take(&mut outcome.doubts);
     let (dataset, report) = (&outcome.dataset, &outcome.report);
     data::warn_of(terminal, doubts, &dataset.reports());

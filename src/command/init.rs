@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use athermal::core::document::TableFormat;
 use athermal::core::time::TimeFormat;
 use clap::Args;
 use serde_json::json;
@@ -45,6 +46,9 @@ pub struct Init {
     /// The columns that drift
     #[arg(long, num_args = 1.., value_name = "COLUMN")]
     drifts: Vec<String>,
+    /// How the text is laid out where that is not found, as `[table]` of a graph says it: skip=2 names=1 separator=; decimal=,
+    #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
+    table: Vec<String>,
     /// Write over a graph that is there
     #[arg(long)]
     force: bool,
@@ -102,6 +106,7 @@ impl Init {
             time: self.time.clone(),
             format: self.time_format.clone(),
             drifting: self.drifts.clone(),
+            table: self.table()?,
         };
         let data = Data::of(self.data.clone(), self.reading.clone());
         data.check_offsets(&[])?;
@@ -115,6 +120,24 @@ impl Init {
                 }
             }
             NoStarter::Unfit(why) => Failure::Request(why),
+        })
+    }
+
+    /// What `--table` declares.
+    fn table(&self) -> Result<TableFormat, Failure> {
+        let mut declared = toml::Table::new();
+        for text in &self.table {
+            let Some((key, value)) = text.split_once('=') else {
+                return Err(Failure::Request(format!(
+                    "--table {text}: expected a key of [table] and its value, such as skip=2"
+                )));
+            };
+            let read = format!("value = {value}").parse::<toml::Table>().ok();
+            let read = read.and_then(|mut of| of.remove("value"));
+            declared.insert(key.to_owned(), read.unwrap_or_else(|| value.into()));
+        }
+        declared.try_into().map_err(|error: toml::de::Error| {
+            Failure::Request(format!("--table: {}", error.message()))
         })
     }
 

@@ -10,7 +10,7 @@ use athermal::core::engine::SampleRange;
 use athermal::diagnosis::feedback;
 use athermal::report::{Facts, gather, page, plots, text};
 use athermal::run::fit::FitError;
-use athermal::run::score::Lack;
+use athermal::run::score::{FellBack, Lack};
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};
@@ -112,7 +112,8 @@ impl Report {
         if let Some(message) = feedback::in_words(&model.plan) {
             terminal.warning(message);
         }
-        for message in Lack::warnings(&facts.lacks) {
+        let fell_back = FellBack::warnings(&facts.fell_back);
+        for message in Lack::warnings(&facts.lacks).into_iter().chain(fell_back) {
             terminal.warning(message);
         }
         for of in &facts.unjudged {

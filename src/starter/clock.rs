@@ -26,8 +26,8 @@ pub struct Clock {
     pub zone: Option<String>,
     /// Why it was taken.
     pub(super) why: String,
-    /// Another form that reads the first rows as well, and otherwise.
-    pub(super) other: Option<TimeFormat>,
+    /// Other forms that read the first rows as well, and otherwise.
+    pub(super) others: Vec<TimeFormat>,
 }
 
 /// What a time is called, the likeliest first.
@@ -84,7 +84,7 @@ impl Clock {
         time(seconds)
     }
 
-    fn dated(columns: TimeColumns, dates: Dates) -> Self {
+    pub(super) fn dated(columns: TimeColumns, dates: Dates) -> Self {
         Self {
             columns,
             form: dates.form,
@@ -92,7 +92,7 @@ impl Clock {
             lacks_zone: dates.lacks_zone,
             zone: dates.zone,
             why: dates.why,
-            other: dates.other,
+            others: dates.others,
         }
     }
 
@@ -127,8 +127,10 @@ impl Clock {
             true => "",
             false => " put together,",
         };
-        let other = self.other.as_ref().map_or_else(String::new, |other| {
-            format!("; they may as well be `{other}`: if so, give that with --time-format")
+        let mut others = self.others.iter().map(|other| format!("`{other}`"));
+        let other = others.next().map_or_else(String::new, |first| {
+            let all = others.fold(first, |all, other| format!("{all} or {other}"));
+            format!("; they may as well be {all}: if so, give that with --time-format")
         });
         format!("time: `{}`,{together} {}{other}", self.columns, self.why)
     }
@@ -144,7 +146,7 @@ pub fn find(
     format: Option<&TimeFormat>,
 ) -> Result<Clock, String> {
     let clock = |texts: &Texts| match format {
-        Some(format) => by_format(texts, format),
+        Some(format) => by_format(texts, format).ok(),
         None => clock(described, texts),
     };
     if let Some(name) = named {
@@ -210,17 +212,23 @@ fn no_clock(texts: &Texts, format: Option<&TimeFormat>) -> String {
     let columns = &texts.columns;
     match (texts.first(), format) {
         (Some(first), Some(format)) => {
-            format!("`{columns}` has no time as `{format}` says, but such as `{first}`")
+            let cells = texts.read();
+            let fitting = dates::of(&cells).map(|of| of.why);
+            let other = by_format(texts, format).err().flatten();
+            let other = other.map(|other| format!("`{other}` fits more of them"));
+            let way =
+                other.or(fitting.map(|why| format!("leave --time-format out: they are {why}")));
+            let way = way
+                .or(cure(&cells))
+                .map_or_else(String::new, |way| format!("; {way}"));
+            format!("`{columns}` has no time as `{format}` says, but such as `{first}`{way}")
         }
         (Some(first), None) if is_time_of_day(first) => format!(
             "`{columns}` has times of day such as `{first}`, and no other column their dates: log these too"
         ),
         (Some(first), None) if looks_like_times(texts) => format!(
-            "`{columns}` has times such as `{first}`, {}",
-            match time_form::fitting(&texts.read()) {
-                Some(form) => format!("in a form that is not known; `--time-format '{form}'` fits them"),
-                None => "which no form of --time-format fits: write dates and times as 2026-03-28 06:00:00".to_owned(),
-            }
+            "`{columns}` has times such as `{first}`, in a form that is not known; {}",
+            cure(&texts.read()).unwrap_or_default()
         ),
         _ if goes_back(texts) => {
             format!("`{columns}` goes back from row to row: sort the log, oldest first")
@@ -238,12 +246,35 @@ fn goes_back(texts: &Texts) -> bool {
     numbers.len() > 2 && numbers.len() == cells.len() && fall * 100 >= (numbers.len() - 1) * 95
 }
 
-/// Texts that have a format.
-fn by_format(texts: &Texts, format: &TimeFormat) -> Option<Clock> {
+/// What can be done about times of an unknown form.
+fn cure(cells: &[String]) -> Option<String> {
+    cells.first()?;
+    Some(match time_form::fitting(cells) {
+        Some(format) => format!("give it: --time-format \"{format}\""),
+        None => {
+            "no form of --time-format fits them all: write them as 2026-03-31 14:05:00, with the date".to_owned()
+        }
+    })
+}
+
+/// Texts that have a format: most of those with digits, and no fewer than have another.
+///
+/// # Errors
+/// The form that more of them have, where one is known.
+fn by_format(texts: &Texts, format: &TimeFormat) -> Result<Clock, Option<TimeFormat>> {
     let dates = dates::by(format.clone());
-    let mut cells = texts.read().into_iter();
-    let read = cells.any(|cell| dates.form.read(cell.as_bytes()).is_some());
-    read.then(|| Clock::dated(texts.columns.clone(), dates))
+    let cells = texts.read();
+    let read = cells
+        .iter()
+        .filter(|cell| dates.form.read(cell.as_bytes()).is_some());
+    let (read, has_digit) = (read.count(), |cell: &&String| {
+        cell.contains(|c: char| c.is_ascii_digit())
+    });
+    let most = dates::most(&cells).filter(|(_, others)| *others > read);
+    if read == 0 || read * 2 < cells.iter().filter(has_digit).count() || most.is_some() {
+        return Err(most.map(|(format, _)| format));
+    }
+    Ok(Clock::dated(texts.columns.clone(), dates))
 }
 
 /// The parts of the name of a time in small letters, a unit behind a slash too.
@@ -298,7 +329,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         lacks_zone: false,
         zone: None,
         why,
-        other: None,
+        others: Vec::new(),
     };
     let of_number = |ns_per_unit| TimeForm::Numbers { ns_per_unit };
     if let Some(form) = unit.filter(fits) {

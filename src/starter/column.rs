@@ -181,6 +181,13 @@ impl Column {
         })
     }
 
+    /// Takes it for an input of which the last value is held.
+    pub fn hold(&mut self) {
+        self.kind = Kind::Drive;
+        self.why
+            .push_str(", and measured far more rarely than the others");
+    }
+
     /// Leaves it out.
     pub fn leave_out(&mut self, why: impl Into<String>) {
         self.guess = Guess::Unused;
@@ -202,6 +209,26 @@ pub fn columns(described: &Description, time: &[String]) -> Vec<Column> {
         .collect()
 }
 
+/// Letters of tags in plants (ISA-5.1): a temperature and a position, each as an element, an indicator or a transmitter.
+const TEMPERATURE_TAGS: &str = "TT TE TI TIT TIR";
+const POSITION_TAGS: &str = "ZT ZE ZI ZIT ZIR";
+
+/// The letters of a tag such as `TT101`, `TI-3101.PV` or `21ZT004`; nothing of another name.
+fn tag_of(name: &str) -> &str {
+    let tag = name.split(['.', ' ', '/']).next().unwrap_or_default();
+    let tag = tag.trim_start_matches(|c: char| c.is_ascii_digit() || c == '-' || c == '_');
+    let letters = tag
+        .find(|c: char| !c.is_ascii_uppercase())
+        .unwrap_or(tag.len());
+    let number = tag[letters..].trim_start_matches(['-', '_']);
+    let is_tag = number.len() >= 2
+        && number
+            .trim_end_matches(char::is_alphabetic)
+            .bytes()
+            .all(|b| b.is_ascii_digit());
+    if is_tag { &tag[..letters] } else { "" }
+}
+
 /// The guess of a column by its name and by what stands for its unit below it.
 fn guess(name: &str, below: &str) -> Column {
     let parts = words(name);
@@ -213,7 +240,9 @@ fn guess(name: &str, below: &str) -> Column {
         let mut parts = parts.split(' ');
         parts.any(|part| lower.iter().any(|word| word.contains(part)))
     };
-    let temp_named = has(TEMPERATURES) || within("temp");
+    let tag = tag_of(name);
+    let is_position_tag = is_among(POSITION_TAGS, tag);
+    let temp_named = has(TEMPERATURES) || within("temp") || is_among(TEMPERATURE_TAGS, tag);
     // The degrees of a temperature are no angle.
     let is_of_temperature = |unit: &&Unit| {
         let mut known = ["K", "K/s", "V", "A", "Ohm"].into_iter();
@@ -265,7 +294,7 @@ fn guess(name: &str, below: &str) -> Column {
         (Guess::Drive, "by its name")
     } else if has(AMBIENT) || within(WITHIN) {
         (Guess::Ambient, "by its name")
-    } else if is_number && !is_other && has(POSITIONS) && !has(FACTORS) {
+    } else if is_number && !is_other && (has(POSITIONS) || is_position_tag) && !has(FACTORS) {
         (Guess::Position, "by its name")
     } else {
         (Guess::Other, "neither a temperature nor a length")
@@ -389,8 +418,10 @@ pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
             "nothing is left that could explain a drift",
             &[Temperature, Drive, Ambient][..],
             format!(
-                "nothing in it could explain the drift of {}: there is no temperature",
-                drifting.join(", ")
+                "nothing in it could explain the drift of {}: there is no temperature, by name or by unit; log one beside, or name the \
+                 column that drifts, for which the others are then taken as causes: --drifts \"{}\"",
+                drifting.join(", "),
+                drifting.last().unwrap_or(&"")
             ),
         ),
         (true, true) => (

@@ -1,5 +1,7 @@
 //! Decides in which form a column's dates and times are written; whether it is the time is decided beside it.
 
+use std::sync::LazyLock;
+
 use athermal::core::time::TimeFormat;
 use athermal::files::{TimeForm, has_clock, has_zone, zone_of};
 
@@ -7,16 +9,40 @@ use athermal::files::{TimeForm, has_clock, has_zone, zone_of};
 pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, say whose, so that no hour is lost \
      when the clocks go back in autumn: `zone = \"Europe/Berlin\"` in `[time]`";
 
-/// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
-/// month that does, where only the numbers could decide.
-const FORMATS: &str = "%d.%m.%Y %H:%M:%S%.f|%d.%m.%Y %H:%M|%d.%m.%y %H:%M:%S%.f|%d.%m.%y %H:%M|%Y/%m/%d %H:%M:%S%.f|\
-     %Y/%m/%d %H:%M|%Y.%m.%d %H:%M:%S%.f|%Y-%m-%d %H:%M:%S%.f|%d-%m-%Y %H:%M:%S%.f|%d-%b-%Y %H:%M:%S%.f|\
-     %d %b %Y %H:%M:%S%.f|%d/%m/%Y %H:%M:%S%.f|%d/%m/%Y %H:%M|%d/%m/%y %H:%M:%S%.f|%d/%m/%y %H:%M|\
-     %m/%d/%Y %H:%M:%S%.f|%m/%d/%Y %H:%M|%m/%d/%y %H:%M:%S%.f|%m/%d/%y %H:%M|%m/%d/%Y %I:%M:%S%.f %p|\
-     %m/%d/%Y %I:%M %p|%m/%d/%y %I:%M:%S%.f %p|%m/%d/%y %I:%M %p|%Y-%m-%d_%H-%M-%S|%Y-%m-%d %H:%M|\
-     %Y-%m-%d %I:%M:%S%.f %p|%Y/%m/%d %I:%M:%S%.f %p|%d-%b-%y %H:%M:%S%.f|%d.%m.%Y %H:%M:%S%.f %z|\
-     %d/%m/%Y %H:%M:%S%.f %z|%m/%d/%Y %H:%M:%S%.f %z|%a %b %d %H:%M:%S %Y|%b %d, %Y %H:%M:%S%.f|%Y%m%d %H%M%S|\
-     %Y%m%d_%H%M%S";
+/// Dates in numbers, the likeliest first. A day that comes first stands before a month that does, where only the numbers could decide.
+const DATES: &str = "%d.%m.%Y|%d.%m.%y|%Y/%m/%d|%Y.%m.%d|%Y-%m-%d|%d-%m-%Y|%d-%m-%y|%d/%m/%Y|%d/%m/%y|%m/%d/%Y|%m/%d/%y|\
+     %m-%d-%Y|%m-%d-%y|%y/%m/%d|%y-%m-%d|%y.%m.%d|%Y-%d-%m|%Y/%d/%m|%Y.%d.%m";
+
+/// Dates with the name of a month.
+const NAMED_DATES: &str =
+    "%d-%b-%Y|%d %b %Y|%d-%b-%y|%d %b %y|%d/%b/%Y|%b %d, %Y|%b %d %Y|%Y-%b-%d";
+
+/// Times of day behind a date.
+const CLOCKS: &str = "%H:%M:%S%.f|%H:%M|%I:%M:%S%.f %p|%I:%M %p|%H:%M:%S%.f %z|%H:%M %z";
+
+/// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339.
+static FORMATS: LazyLock<Vec<TimeFormat>> = LazyLock::new(|| {
+    let dates = DATES.split('|').chain(NAMED_DATES.split('|'));
+    let with_clocks = |date| {
+        CLOCKS
+            .split('|')
+            .map(move |clock| format!("{date} {clock}"))
+    };
+    let others =
+        "%Y-%m-%d_%H-%M-%S|%a %b %d %H:%M:%S %Y|%Y%m%d %H%M%S|%Y%m%d_%H%M%S|%Y-%d-%mT%H:%M:%S%.f";
+    let all = dates.flat_map(with_clocks);
+    let all = all.chain(others.split('|').map(str::to_owned));
+    all.filter_map(|format| format.parse().ok()).collect()
+});
+
+/// Forms that only rows can speak for, since nobody means them who does not say so.
+pub fn is_rare(format: &TimeFormat) -> bool {
+    let mut orders = ["%Y-%d", "%Y/%d", "%Y.%d"].into_iter();
+    orders.any(|order| format.as_str().starts_with(order))
+}
+
+/// Two digits are no year before this, in ns since 1970, where another form reads a later one: 2010.
+const FIRST_YEAR_NS: i64 = 1_262_304_000_000_000_000;
 
 /// A form of dates and times, with remarks on it.
 pub struct Dates {
@@ -30,8 +56,36 @@ pub struct Dates {
     pub zone: Option<String>,
     /// Why it was taken.
     pub why: String,
-    /// Another form that reads these cells as well, and otherwise.
-    pub other: Option<TimeFormat>,
+    /// Other forms that read these cells as well, and otherwise.
+    pub others: Vec<TimeFormat>,
+}
+
+/// The known forms that nearly all of these cells have.
+fn fitting(cells: &[String]) -> impl Iterator<Item = TimeFormat> + '_ {
+    let fits = |format: &&TimeFormat| {
+        let form = TimeForm::Format(TimeFormat::clone(format));
+        // There are many forms: few of them read any of the first cells.
+        let mut first = cells.iter().take(20);
+        first.any(|cell| form.read(cell.as_bytes()).is_some()) && fits(&form, cells)
+    };
+    FORMATS.iter().filter(fits).cloned()
+}
+
+/// The known form that most of these cells have, and how many.
+pub fn most(cells: &[String]) -> Option<(TimeFormat, usize)> {
+    let read = |format: &TimeFormat| {
+        let form = TimeForm::Format(format.clone());
+        let read = cells
+            .iter()
+            .filter(|cell| form.read(cell.as_bytes()).is_some());
+        (format.clone(), read.count())
+    };
+    // The first of equals is the likeliest.
+    FORMATS
+        .iter()
+        .rev()
+        .map(read)
+        .max_by_key(|(_, count)| *count)
 }
 
 /// The form of these cells, if one is known that nearly all of them have: a log may have been written into by hand.
@@ -49,34 +103,47 @@ pub fn of(cells: &[String]) -> Option<Dates> {
             lacks_zone: !zoned,
             zone: None,
             why: format!("dates and times {which}"),
-            other: None,
+            others: fitting(cells).filter(is_rare).collect(),
         });
     }
-    let known = FORMATS.split('|').filter_map(|format| format.parse().ok());
-    let mut fitting =
-        known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), cells));
+    let mut fitting: Vec<TimeFormat> = fitting(cells).collect();
+    let year = |format: &TimeFormat| {
+        let form = TimeForm::Format(format.clone());
+        cells.iter().find_map(|cell| form.read(cell.as_bytes()))
+    };
+    let is_later = |format: &TimeFormat| year(format) >= Some(FIRST_YEAR_NS);
+    if fitting.iter().any(is_later) {
+        fitting.retain(is_later);
+    }
+    let mut fitting = fitting.into_iter();
     let Some(format) = fitting.next() else {
         return with_word(cells);
     };
     let mut found = by(format);
-    found.other = fitting.find(|other| reads_otherwise(&found.form, other, cells));
+    found.others = fitting
+        .filter(|other| reads_otherwise(&found.form, other, cells))
+        .collect();
     Some(found)
 }
 
 /// That of dates and times with one word for a zone behind each: `2026-03-02 00:00:00 CET`.
 fn with_word(cells: &[String]) -> Option<Dates> {
-    let (_, word) = cells.first()?.rsplit_once(' ')?;
+    let first = cells.first()?;
+    let (before, mut word) = first.rsplit_once(' ')?;
+    // An offset may stand apart from the word before it: `UTC +1`.
+    if let Some(apart) = ["UTC", "GMT"].iter().find(|of| before.ends_with(*of)) {
+        word = &first[before.len() - apart.len()..];
+    }
     let zone = zone_of(word).filter(|_| word.starts_with(|c: char| c.is_ascii_alphabetic()))?;
     let bare = cells.iter().map(|cell| {
         cell.strip_suffix(word)
             .map(|cell| cell.trim_end().to_owned())
     });
     let bare: Vec<String> = bare.collect::<Option<_>>()?;
-    let known = FORMATS.split('|').filter_map(|format| format.parse().ok());
-    let mut known =
-        known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), &bare));
-    let format: TimeFormat = known.next()?;
-    let mut found = by(format!("{format} {word}").parse().ok()?);
+    let behind = |format: &TimeFormat| format!("{format} {word}").parse::<TimeFormat>().ok();
+    let mut known = fitting(&bare);
+    let mut found = by(behind(&known.next()?)?);
+    found.others = known.filter_map(|format| behind(&format)).collect();
     found.zone = Some(zone);
     Some(found)
 }
@@ -104,7 +171,7 @@ pub fn elapsed(cells: &[String], name: &str) -> Option<Dates> {
             "hours, minutes and seconds that have elapsed, from {} on",
             cells[0]
         ),
-        other: None,
+        others: Vec::new(),
     })
 }
 
@@ -123,7 +190,7 @@ pub fn by(format: TimeFormat) -> Dates {
         lacks_zone,
         zone: None,
         why,
-        other: None,
+        others: Vec::new(),
         form: TimeForm::Format(format),
     }
 }
@@ -186,8 +253,9 @@ mod tests {
 
     #[test]
     fn every_format_is_one_and_known_cells_are_read_by_theirs() {
-        let mut formats = FORMATS.split('|');
-        assert!(formats.all(|format| format.parse::<TimeFormat>().is_ok()));
+        let count =
+            (DATES.split('|').count() + NAMED_DATES.split('|').count()) * CLOCKS.split('|').count();
+        assert_eq!(FORMATS.len(), count + 5, "each is a format");
         for (cell, format) in [
             ("01.03.2026 12:00:00", "%d.%m.%Y %H:%M:%S%.f"),
             ("1.3.2026 12:00:00.500", "%d.%m.%Y %H:%M:%S%.f"),
@@ -199,21 +267,31 @@ mod tests {
             ("03/13/2026 12:00:00", "%m/%d/%Y %H:%M:%S%.f"),
             ("3/13/26 12:00", "%m/%d/%y %H:%M"),
             ("3/13/26 12:00:00", "%m/%d/%y %H:%M:%S%.f"),
-            ("3/1/2026 12:00:00 PM", "%m/%d/%Y %I:%M:%S%.f %p"),
+            ("3/13/2026 12:00:00 PM", "%m/%d/%Y %I:%M:%S%.f %p"),
+            ("40/03/13 12:00", "%y/%m/%d %H:%M"),
+            ("2026-13-03 12:00", "%Y-%d-%m %H:%M"),
+            ("13-Mar-2026 1:00 PM", "%d-%b-%Y %I:%M %p"),
             ("20260301_120000", "%Y%m%d_%H%M%S"),
         ] {
             let found = found(&[cell]).unwrap();
             assert_eq!(found.declared, ("format", format.to_owned()), "{cell}");
-            assert_eq!(found.other, None, "{cell}");
+            assert!(found.others.iter().all(is_rare), "{cell}");
         }
+    }
+
+    #[test]
+    fn a_day_before_two_digits_of_a_year_stands_before_a_year_that_may_be_first() {
+        let found = found(&["21/08/16 9:05:00 PM"]).unwrap();
+        assert_eq!(found.declared.1, "%d/%m/%y %I:%M:%S%.f %p");
+        assert_eq!(found.others[0].as_str(), "%y/%m/%d %I:%M:%S%.f %p");
     }
 
     #[test]
     fn a_day_that_may_be_a_month_has_another_form() {
         let found = found(&["01/03/2026 12:00:00", "01/03/2026 12:00:10"]).unwrap();
         assert_eq!(found.declared.1, "%d/%m/%Y %H:%M:%S%.f");
-        let other = found.other.unwrap().to_string();
-        assert_eq!(other, "%m/%d/%Y %H:%M:%S%.f");
+        let others: Vec<&str> = found.others.iter().map(TimeFormat::as_str).collect();
+        assert_eq!(others, ["%m/%d/%Y %H:%M:%S%.f"]);
     }
 
     #[test]

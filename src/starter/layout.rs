@@ -42,6 +42,11 @@ pub(super) fn lay_out(heading: &str, table: &TableFormat, text: &mut String) {
         "lines above the names of the columns",
     );
     key(
+        "names",
+        rows(table.names),
+        "the row below them that names the columns",
+    );
+    key(
         "units",
         rows(table.units),
         "the row below them that has the units",

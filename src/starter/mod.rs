@@ -6,6 +6,7 @@ mod dates;
 mod dropped;
 mod group;
 mod layout;
+mod machines;
 mod name;
 mod own_times;
 mod placeholder;
@@ -42,6 +43,8 @@ pub struct Request {
     pub format: Option<TimeFormat>,
     /// The columns that drift.
     pub drifting: Vec<String>,
+    /// How the text of the log is laid out, as far as it is declared.
+    pub table: TableFormat,
 }
 
 /// A starter graph, and what was found and guessed on the way to it.
@@ -90,8 +93,20 @@ impl Log {
     fn of(path: &Path, request: &Request, remarks: &mut Vec<String>) -> Result<Self, NoStarter> {
         let name = path.display().to_string();
         let unfit = |why: String| NoStarter::Unfit(format!("{name}: {why}"));
-        let mut described = Description::of(path, 500)?;
-        let long = described.long_format();
+        let mut described = Description::laid_out(path, 500, &request.table)?;
+        let long = match &request.table {
+            TableFormat {
+                layout: Arrangement::Long,
+                name: Some(names),
+                value: Some(values),
+                ..
+            } => Some(LongFormat {
+                time: request.time.clone().unwrap_or_default(),
+                names: names.clone(),
+                values: values.clone(),
+            }),
+            _ => described.long_format(),
+        };
         if let (Some(long), Format::JsonLines) = (&long, described.format) {
             return Err(unfit(long.to_string()));
         }
@@ -104,7 +119,8 @@ impl Log {
         let clock = clock::find(of_one.unwrap_or(&described), time, format).map_err(unfit)?;
         let clock = undecided::decided(path, clock)?;
         let times = clock.columns.names();
-        described.table.decimal = described.decimal(times);
+        let decimal = request.table.decimal.or_else(|| described.decimal(times));
+        described.table.decimal = decimal;
         if let Some(long) = &long {
             described = described.of_long(path, long, times)?;
             remarks.push(format!(
@@ -116,7 +132,15 @@ impl Log {
         }
         let own_times = || own_times::refusal(&described, &clock);
         let own_times = (time.is_none() && long.is_none()).then(own_times).flatten();
-        if let Some(why) = dropped::newest_first(&described, &clock).or(own_times) {
+        let machines = || {
+            (long.is_none())
+                .then(|| machines::several(&described, &clock))
+                .flatten()
+        };
+        if let Some(why) = dropped::newest_first(&described, &clock)
+            .or(own_times)
+            .or_else(machines)
+        {
             return Err(unfit(why));
         }
         Ok(Self {
@@ -129,9 +153,9 @@ impl Log {
     /// Whether its time is read by a graph that declares this one.
     fn is_found_by(&self, clock: &Clock) -> bool {
         let own = &self.clock;
-        let is_form = match (&own.other, &clock.form) {
-            (Some(other), TimeForm::Format(form)) if other == form => true,
-            _ => own.form == clock.form,
+        let is_form = match &clock.form {
+            TimeForm::Format(form) if own.others.contains(form) => true,
+            form => own.form == *form,
         };
         let found = || athermal::files::other_time(Path::new(&self.name), &clock.column());
         own.zone == clock.zone && own.columns == clock.columns && is_form
@@ -156,7 +180,7 @@ fn of_one_name(described: &Description, long: &LongFormat) -> Description {
 fn one_clock(logs: &[Log]) -> Result<Clock, NoStarter> {
     let misfit = |by: &&Log| logs.iter().find(|of| !of.is_found_by(&by.clock));
     let mut decided: Vec<&Log> = logs.iter().collect();
-    decided.sort_by_key(|log| log.clock.other.is_some());
+    decided.sort_by_key(|log| !log.clock.others.is_empty());
     if let Some(log) = decided.iter().find(|log| misfit(log).is_none()) {
         return Ok(Clock {
             lacks_zone: logs.iter().any(|log| log.clock.lacks_zone),
@@ -203,10 +227,13 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     let logs = data.paths().iter();
     let logs = logs.map(|path| Log::of(path, request, &mut remarks));
     let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
+    if let Some(why) = machines::same_names(&logs) {
+        return Err(NoStarter::Unfit(why));
+    }
     let clock = one_clock(&logs)?;
     remarks.insert(0, clock.remark());
     let is_other =
-        |of: &Clock| of.columns != clock.columns || of.form != clock.form && of.other.is_none();
+        |of: &Clock| of.columns != clock.columns || of.form != clock.form && of.others.is_empty();
     for log in logs.iter().filter(|log| is_other(&log.clock)) {
         remarks.push(format!("{}: its {}", log.name, log.clock.remark()));
     }
@@ -220,7 +247,22 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     let is_new = |of: &Column| of.name.is_empty() || known.insert(of.name.clone());
     let mut columns: Vec<Column> = columns.filter(is_new).collect();
     let mut tables = tables(&logs);
-    let mut survey = Survey::of(data, &clock, &tables, &columns)?;
+    let survey = Survey::of(data, &clock, &tables, &columns);
+    let mut survey = survey.map_err(|error| match error {
+        NoStarter::File(FileError::Merge(apart)) => {
+            let logs = logs.iter().zip(data.paths());
+            let logs: Vec<_> = logs.map(|(log, path)| (&**path, &log.clock)).collect();
+            match undecided::exchanged(&logs) {
+                Some((path, format)) => NoStarter::Unfit(format!(
+                    "{apart} With day and month exchanged the times of {} overlap those of the others: as `--time-format \"{format}\"` reads \
+                     them. A graph has one form of time: write the dates of both alike",
+                    path.display()
+                )),
+                None => NoStarter::File(FileError::Merge(apart)),
+            }
+        }
+        other => other,
+    })?;
     let mut again = None;
     for (log, path) in logs.iter().zip(data.paths()) {
         let is_long = log.described.table.layout == Arrangement::Long;
@@ -238,8 +280,12 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
         && let Some((in_segments, by_segments, column)) =
             survey.by_segments(data, &clock, &tables, (&names, &columns))
     {
+        let how = match clock.columns.names().contains(&column) {
+            true => "by themselves, as after a reboot".to_owned(),
+            false => format!("where `{column}` changes"),
+        };
         remarks.push(format!(
-            "segments: the times start again where `{column}` changes, {} in all",
+            "segments: the times start again {how}, {} in all",
             in_segments.segments
         ));
         (survey, tables) = (in_segments, by_segments);
@@ -264,6 +310,7 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     survey.take_changes(&mut columns, &clock);
     survey.leave_out_slow(&mut columns, &clock, request);
     survey.leave_out_faults(&mut columns);
+    survey.hold_rare(&mut columns);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     remarks.extend(apart);
     let choice = Choice::of(&survey, &columns);
@@ -273,7 +320,7 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
     let columns_taken = columns.iter().map(Column::facts).collect();
-    tables.base.lenient = survey.needs_lenience(&columns);
+    tables.base.lenient |= survey.needs_lenience(&columns);
     Ok(Starter {
         text: text::graph(data.paths(), (&clock, &tables), &columns, &survey, &choice),
         remarks,

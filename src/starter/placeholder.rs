@@ -10,6 +10,11 @@ use athermal_analysis::figures::{count, number};
 const LEAST_SHARE: f64 = 0.2;
 /// It comes and goes at least so often, and there are at least so many others.
 const OFTEN: usize = 20;
+/// A rarer one is come back from so often, after so many values at most, and is so far aside, as a share of how far nine tenths of all
+/// lie apart.
+const LEAST_RETURNS: usize = 3;
+const LONGEST: usize = 3;
+const ASIDE: f64 = 0.5;
 /// Others are so many times as far from it as from each other.
 const FAR: f64 = 20.0;
 
@@ -63,6 +68,32 @@ fn placeholder(values: &[f64]) -> Option<(f64, u64)> {
     (away > FAR * usual).then_some((value, count as u64))
 }
 
+/// The one value far from all others to which a series leaps again and again, and from which it comes back at once; and how often.
+pub fn nothing(values: &[f64]) -> Option<(f64, u64)> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    // What stands for none is the lowest or the highest.
+    let ends = [sorted.first()?, sorted.last()?].map(|end| *end);
+    let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64).round() as usize];
+    ends.into_iter().find_map(|value| {
+        let others = sorted.iter().filter(|of| **of != value);
+        let away = others
+            .map(|of| (of - value).abs())
+            .fold(f64::INFINITY, f64::min);
+        let mut runs = 0;
+        let mut longest = 0;
+        for run in values.chunk_by(|a, b| (*a == value) == (*b == value)) {
+            if run[0] == value {
+                (runs, longest) = (runs + 1, longest.max(run.len()));
+            }
+        }
+        let count = sorted.iter().filter(|of| **of == value).count();
+        let is_far = away > ASIDE * (at(0.95) - at(0.05));
+        (runs >= LEAST_RETURNS && longest <= LONGEST && is_far && count * 4 < sorted.len())
+            .then_some((value, count as u64))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,6 +109,29 @@ mod tests {
             let found = placeholder(&rows.collect::<Vec<_>>());
             assert_eq!(found, Some((value, 1777)));
         }
+    }
+
+    #[test]
+    fn a_rare_value_far_aside_that_is_come_back_from_stands_for_none() {
+        let with = |value: f64, is_it: &dyn Fn(usize) -> bool| {
+            let rows = (0..2000).map(|row| {
+                if is_it(row) {
+                    value
+                } else {
+                    300.0 + position(row)
+                }
+            });
+            nothing(&rows.collect::<Vec<_>>())
+        };
+        let now_and_then = |row: usize| row % 61 == 7;
+        for value in [0.0, -1.0, 850.0, 65_535.0] {
+            assert_eq!(with(value, &now_and_then), Some((value, 33)));
+        }
+        // Near the others, once alone, and for long.
+        assert_eq!(with(280.0, &now_and_then), None);
+        assert_eq!(with(0.0, &|row| row == 700), None);
+        assert_eq!(with(0.0, &|row| row % 500 < 40), None);
+        assert_eq!(with(0.0, &|_| false), None);
     }
 
     #[test]

@@ -15,7 +15,15 @@ pub fn line(unit: &str, (low, high): (f64, f64), nothing: &[f64]) -> String {
     let per_kelvin = per_kelvin.and_then(|unit| Unit::kelvin().factor_to(&unit));
     if let Some(factor) = per_kelvin {
         let margin = half.max(PLAUSIBLE_K * factor);
-        let (from, to) = ((low - margin).floor(), (high + margin).ceil());
+        let (mut from, mut to) = ((low - margin).floor(), (high + margin).ceil());
+        for &nothing in nothing {
+            // To a tenth, since temperatures may lie near what stands for none.
+            if (from..low).contains(&nothing) {
+                from = (5.0 * (nothing + low)).ceil() / 10.0;
+            } else if nothing > high && nothing <= to {
+                to = (5.0 * (nothing + high)).floor() / 10.0;
+            }
+        }
         let seen = format!("seen: {} to {}", number(low), number(high));
         return format!(
             "range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside is a fault, and left out\n"

@@ -58,6 +58,34 @@ impl Survey {
         }
     }
 
+    /// Takes temperatures that are measured far more rarely than most others, and than what drifts, for inputs of which the last value
+    /// is held: windows wide enough for their slopes would be far too wide for the others.
+    pub fn hold_rare(&self, columns: &mut [Column]) {
+        let gap = |series: &Series| series.gap(0.9).unwrap_or(0.0);
+        let of_kind = |columns: &[Column], kind| -> Vec<f64> {
+            let of = self
+                .series
+                .iter()
+                .zip(columns)
+                .filter(|(_, column)| column.kind == kind);
+            let mut gaps: Vec<f64> = of.map(|(series, _)| gap(series)).collect();
+            gaps.sort_by(f64::total_cmp);
+            gaps
+        };
+        let temperatures = of_kind(columns, Kind::Temperature);
+        let Some(&usual) = temperatures.get(temperatures.len().saturating_sub(1) / 2) else {
+            return;
+        };
+        let drifting = of_kind(columns, Kind::Drifting)
+            .into_iter()
+            .fold(0.0, f64::max);
+        for (series, column) in self.series.iter().zip(columns) {
+            if column.kind == Kind::Temperature && gap(series) > SLOW * usual.max(drifting) {
+                column.hold();
+            }
+        }
+    }
+
     /// Leaves out what drifts and is measured so rarely that windows for it would be far too wide for most others, unless the user named it.
     pub fn leave_out_slow(&self, columns: &mut [Column], clock: &Clock, request: &Request) {
         if !request.drifting.is_empty() {

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use athermal::core::document::TableBase;
 use athermal::files::{
-    CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, has_clock,
+    CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, TimeForm, has_clock,
 };
 
 use athermal::diagnosis::leap::{Finder, Leaps};
@@ -13,7 +13,8 @@ use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::dropped;
-use athermal_analysis::figures::{count, counted};
+use super::placeholder::nothing;
+use athermal_analysis::figures::{count, counted, number};
 
 /// The values of a recording, column by column.
 #[derive(Debug)]
@@ -218,8 +219,11 @@ impl Series {
     }
 
     /// Where it leaps.
-    fn leaps(&self) -> Option<Leaps> {
-        let mut finder = Finder::default();
+    fn leaps(&self, is_temperature: bool) -> Option<Leaps> {
+        let mut finder = match is_temperature {
+            true => Finder::default(),
+            false => Finder::of_position(),
+        };
         for (&time_s, &value) in self.time_s.iter().zip(&self.values) {
             finder.push(time_s, value);
         }
@@ -350,7 +354,10 @@ impl Survey {
         let times = clock.columns.names();
         let names = names.iter().copied();
         let names = names.filter(|name| !name.is_empty() && !times.contains(name));
-        let mut tried = names.take(CANDIDATES).filter_map(|name| {
+        // A time that counts from a start begins anew with each: after a reboot, say.
+        let counts = !matches!(clock.form, TimeForm::Format(_) | TimeForm::Rfc3339);
+        let times = times.iter().filter(|_| counts && times.len() == 1);
+        let mut tried = names.take(CANDIDATES).chain(times).filter_map(|name| {
             let mut table = table.clone();
             let files = table.files.iter_mut().map(|(_, table)| table);
             for table in files.chain([&mut table.base]) {
@@ -444,9 +451,20 @@ impl Survey {
             if column.kind == Kind::Unused || !(is_temperature || drifts) {
                 continue;
             }
-            let Some(leaps) = series.leaps() else {
+            let Some(leaps) = series.leaps(is_temperature) else {
                 continue;
             };
+            if let Some((value, n)) = nothing(&series.values) {
+                let all = count(series.values.len());
+                series.keep(|of| of != value);
+                series.placeholder = Some(value);
+                column.warn(format!(
+                    "it {leaps}: {} in {} of {all} rows, far from all others, is taken for no value",
+                    number(value),
+                    count(n)
+                ));
+                continue;
+            }
             let (lowest, highest) = beyond(leaps.usual);
             let left_out = series.keep(|of| !is_temperature || (lowest..=highest).contains(&of));
             column.warn(match left_out {

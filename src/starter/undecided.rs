@@ -1,18 +1,21 @@
-//! Decides between two forms of dates that both read the first rows of a log, by all of its rows. Not which forms these are.
+//! Decides between forms of dates that all read the first rows of a log, by all of its rows. Not which forms these are.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use athermal::core::document::TableBase;
+use athermal::core::time::TimeFormat;
 use athermal::files::{FileError, Layout, Options, Reader, Row, TimeColumn, TimeForm};
 
 use super::clock::Clock;
 use super::dates;
 
 /// A log that goes on from one day to the next does not leap so far; one whose days are taken for months leaps each night.
-const LEAP_NS: i64 = 20 * 86_400_000_000_000;
+const LEAP_NS: i64 = 20 * DAY_NS;
+/// A day in ns.
+const DAY_NS: i64 = 86_400_000_000_000;
 
-/// How many rows speak against a form.
-fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError> {
+/// The times of a log in a form.
+fn times(path: &Path, clock: &Clock, form: &TimeForm) -> Result<Reader, FileError> {
     let layout = Layout {
         time: TimeColumn {
             columns: clock.columns.clone(),
@@ -26,44 +29,131 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError>
         lenient: true,
         ..Options::default()
     };
-    let mut reader = Reader::open(path, layout, options)?;
-    let (mut row, mut last, mut leaps) = (Row::default(), None, 0);
-    while reader.next_into(&mut row)? {
-        let far = |last: i64| row.time_ns.saturating_sub(last) > LEAP_NS;
-        leaps += u64::from(last.is_some_and(far));
-        last = Some(row.time_ns);
-    }
-    let report = reader.report();
-    Ok(leaps + report.refused_rows.count + report.refused_time.count)
+    Reader::open(path, layout, options)
 }
 
-/// The clock of a log in the form against which fewer rows speak, where rows decide.
+/// From when to when a log goes in a form.
+fn period(path: &Path, clock: &Clock, form: &TimeForm) -> Option<(i64, i64)> {
+    let (mut reader, mut row, mut period) = (times(path, clock, form).ok()?, Row::default(), None);
+    while reader.next_into(&mut row).ok()? {
+        let (from, _) = *period.get_or_insert((row.time_ns, row.time_ns));
+        period = Some((from, row.time_ns));
+    }
+    period
+}
+
+/// The log whose times would overlap those of all others with day and month exchanged, and in which form that is.
+pub fn exchanged(logs: &[(&Path, &Clock)]) -> Option<(PathBuf, TimeFormat)> {
+    let twins = |clock: &Clock| match &clock.form {
+        TimeForm::Rfc3339 => [" ", "T"]
+            .map(|of| format!("%Y-%d-%m{of}%H:%M:%S%.f"))
+            .to_vec(),
+        TimeForm::Format(format) => {
+            let parts: Vec<String> = format
+                .as_str()
+                .split("%d")
+                .map(|of| of.replace("%m", "%d"))
+                .collect();
+            vec![parts.join("%m")]
+        }
+        _ => Vec::new(),
+    };
+    let overlap = |a: (i64, i64), b: (i64, i64)| a.0 <= b.1 && b.0 <= a.1;
+    // That the year comes first and the month last is rarer than any other order.
+    let mut likely: Vec<&(&Path, &Clock)> = logs.iter().collect();
+    likely.sort_by_key(|(_, clock)| match &clock.form {
+        TimeForm::Format(format) => 1 + u8::from(format.as_str().starts_with("%d.")),
+        _ => 0,
+    });
+    likely.into_iter().find_map(|(path, clock)| {
+        let others = logs.iter().filter(|(other, _)| other != path);
+        let others = others.map(|(path, clock)| period(path, clock, &clock.form));
+        let others: Vec<(i64, i64)> = others.collect::<Option<_>>()?;
+        let twins = twins(clock)
+            .into_iter()
+            .filter_map(|of| of.parse::<TimeFormat>().ok());
+        let mut fitting = twins.filter(|twin| {
+            let own = period(path, clock, &TimeForm::Format(twin.clone()));
+            own.is_some_and(|own| others.iter().all(|other| overlap(own, *other)))
+        });
+        fitting.next().map(|twin| (path.to_path_buf(), twin))
+    })
+}
+
+/// What speaks against a form: rows that it does not read, or by which times leap or go back; then steps over midnight that are not as
+/// long as most.
+fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<(u64, usize), FileError> {
+    let mut reader = times(path, clock, form)?;
+    let (mut row, mut last, mut leaps, mut nights) = (Row::default(), None, 0, Vec::new());
+    while reader.next_into(&mut row)? {
+        if let Some(last) = last.replace(row.time_ns) {
+            let step = row.time_ns.saturating_sub(last);
+            leaps += u64::from(step > LEAP_NS);
+            if row.time_ns.div_euclid(DAY_NS) != last.div_euclid(DAY_NS) {
+                nights.push(step);
+            }
+        }
+    }
+    nights.sort_unstable();
+    let usual = nights.get(nights.len() / 2).copied().unwrap_or(0);
+    let odd = nights
+        .iter()
+        .filter(|step| step.abs_diff(usual) > usual.unsigned_abs() / 10);
+    let report = reader.report();
+    Ok((
+        leaps + report.refused_rows.count + report.refused_time.count,
+        odd.count(),
+    ))
+}
+
+/// The clock of a log in the form against which least speaks, where rows decide.
 ///
 /// # Errors
 /// The file cannot be read.
 pub fn decided(path: &Path, mut clock: Clock) -> Result<Clock, FileError> {
-    let Some(other) = clock.other.clone() else {
+    if clock.others.is_empty() {
         return Ok(clock);
+    }
+    let own = clock.form.clone();
+    let others = std::mem::take(&mut clock.others);
+    let others = others.into_iter().map(TimeForm::Format);
+    let mut judged = Vec::new();
+    for form in std::iter::once(own.clone()).chain(others) {
+        judged.push((doubts(path, &clock, &form)?, form));
+    }
+    judged.sort_by_key(|(doubts, _)| *doubts);
+    let least = judged[0].0;
+    let (best, rest): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(of, _)| *of == least);
+    let format = |(_, form): ((u64, usize), TimeForm)| match form {
+        TimeForm::Format(format) => Some(format),
+        _ => None,
     };
-    let other_form = TimeForm::Format(other.clone());
-    let own = doubts(path, &clock, &clock.form)?;
-    let others = doubts(path, &clock, &other_form)?;
-    if own == others {
-        return Ok(clock);
-    }
-    let mut against = other;
-    if others < own {
-        let chosen = dates::by(against);
-        against = match std::mem::replace(&mut clock.form, chosen.form) {
-            TimeForm::Format(format) => format,
-            _ => return Ok(clock),
+    let mut best = best.into_iter();
+    let chosen = best
+        .next()
+        .filter(|(_, form)| *form != own)
+        .and_then(format);
+    if let Some(format) = chosen {
+        let zone = clock.zone.take();
+        clock = Clock {
+            zone,
+            ..Clock::dated(clock.columns, dates::by(format))
         };
-        clock.why = chosen.why;
-        clock.declared = Some(chosen.declared);
     }
-    clock.other = None;
-    clock.why.push_str(&format!(
-        "; as `{against}` they would leap by months, or be none"
-    ));
+    // That nobody else reads otherwise needs no word where it is as RFC 3339 says.
+    let is_plain = clock.form == TimeForm::Rfc3339;
+    let others = best.filter_map(format);
+    clock.others = others
+        .filter(|of| !(is_plain || dates::is_rare(of)))
+        .collect();
+    if let (Some(against), true, false) = (
+        rest.into_iter().find_map(format),
+        clock.others.is_empty(),
+        is_plain,
+    ) {
+        clock.why.push_str(&format!(
+            "; as `{against}` they would leap by months, or be none"
+        ));
+    }
     Ok(clock)
 }

@@ -23,6 +23,10 @@ pub(super) const ENOUGH: f64 = 2.0;
 const FEWEST_OF_FEATURE: f64 = 3.0;
 /// The longest window of a temperature may take up such a share of the log.
 const SHARE_OF_LOG: f64 = 0.15;
+/// What drifts is measured seldom where its values are so many times as far apart as those of temperatures; its levels can be learned
+/// from so many of them.
+const SELDOM: f64 = 5.0;
+const FEWEST_LEVELS: usize = 20;
 /// Windows fit into a log with gaps where rows of such a share of its stretches have them.
 const SHARE_OF_STRETCHES: f64 = 0.1;
 
@@ -115,19 +119,39 @@ impl Choice {
         if widths.is_empty() && narrowest <= widest {
             widths.push(rounded(narrowest));
         }
+        let mut seldom = None;
         if widths.is_empty() {
-            return Err(format!(
-                "it is too short: a drift over {}, the least at the rate of its samples, would fit only {:.0} times into it, \
-                 and {WINDOWS_IN_RECORDING} times are needed",
-                time(narrowest),
-                survey.duration_s / narrowest.max(f64::MIN_POSITIVE)
+            let times = survey.duration_s / narrowest.max(f64::MIN_POSITIVE);
+            let every = slowest(&drifting, 0.5);
+            let of_causes = slowest(&temperatures, 0.5);
+            let fewest = drifting.iter().map(|series| series.values.len()).min();
+            if of_causes == 0.0 || every < SELDOM * of_causes || fewest < Some(FEWEST_LEVELS) {
+                let pairs = survey.series.iter().zip(columns);
+                let measured =
+                    pairs.filter(|(_, of)| matches!(of.kind, Kind::Temperature | Kind::Drifting));
+                let gap = |series: &Series| series.gap(0.9).unwrap_or(0.0);
+                let rarest = measured.max_by(|(a, _), (b, _)| gap(a).total_cmp(&gap(b)));
+                let rarest = rarest.map_or_else(String::new, |(series, of)| {
+                    format!(" ({} has a value every {})", of.name, time(gap(series)))
+                });
+                return Err(format!(
+                    "it is too short: a drift over {}, the least at the rate of its samples{rarest}, would fit only {times:.0} times into \
+                     it, and {WINDOWS_IN_RECORDING} times are needed",
+                    time(narrowest),
+                ));
+            }
+            seldom = Some(format!(
+                "slopes of what is measured every {} would be over {}, which fits only {times:.0} times into the log",
+                time(every),
+                time(narrowest)
             ));
+            widths.push(rounded(narrowest));
         }
         let measured = [&*drifting, &*temperatures].concat();
         let fits = |width: &f64| share(&measured, *width, 2.0) >= SHARE_OF_STRETCHES;
         let between: Vec<f64> = widths.iter().copied().filter(fits).collect();
         let narrowest_try = widths[0];
-        let levels = (between.is_empty() && !temperatures.is_empty()).then(|| {
+        let levels = seldom.or_else(|| (between.is_empty() && !temperatures.is_empty()).then(|| {
             let mut stretches = drifting
                 .iter()
                 .flat_map(|series| series.stretches(narrowest_try))
@@ -140,7 +164,7 @@ impl Choice {
                 stretches.len(),
                 time(stretches.get(stretches.len() / 2).copied().unwrap_or(0.0))
             )
-        });
+        }));
         if !between.is_empty() {
             widths = between;
         }

@@ -95,6 +95,10 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
             score["node"].as_str().unwrap(),
             column,
         );
+        // What is put out is scored wherever it is, and compared where all are.
+        if score["own_instants"] == true {
+            continue;
+        }
         assert!((rmse / score["rmse"].as_f64().unwrap() - 1.0).abs() < 1e-12);
         let truth = &first["truths"][column];
         for key in ["baseline_zero", "baseline_persistence"] {
@@ -460,6 +464,9 @@ predicted = "side"
             let mut scores = scores["scores"].as_array().unwrap().iter();
             let output = format!("{}.{channel}", row["node"].as_str().unwrap());
             let score = scores.find(|of| of["output"] == *output);
+            if score.unwrap()["own_instants"] == true {
+                continue;
+            }
             let (found, expected) = (&row["rmse"][nth], &score.unwrap()["rmse"]);
             assert!((found.as_f64().unwrap() / expected.as_f64().unwrap() - 1.0).abs() < 1e-12);
         }

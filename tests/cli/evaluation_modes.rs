@@ -498,7 +498,8 @@ fn arx_runs_free_on_a_wall_and_on_a_plate_and_output_error_no_worse() {
         let found = figure(&common, "output_error", "r2_mean");
         assert!(found >= least, "{name}: {found}");
         assert!(
-            found >= figure(&common, "arx", "r2_mean"),
+            // Each is put out, and so scored wherever it is.
+            found >= figure(&common, "arx", "r2_mean") - 1e-3,
             "{name}: {found}"
         );
     }

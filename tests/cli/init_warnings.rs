@@ -127,7 +127,7 @@ fn times_that_start_again_within_a_log_are_told_with_the_line() {
     let (fine, told, _) = init(&folder, "again.csv", &text);
     assert!(fine, "{told}");
     assert!(
-        told.contains("2,000 of 5,000 rows are out of order, and are left out; the first: again.csv:3002: the time `0` is not after `29990`; the row was left out; if the times start again at line 3002, give what stands before it and what stands from it on as two files"),
+        told.contains("segments: the times start again by themselves, as after a reboot, 2 in all"),
         "{told}"
     );
 }

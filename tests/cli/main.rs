@@ -11,6 +11,7 @@ mod ageing_services;
 mod architecture_page;
 #[cfg(unix)]
 mod asked_services;
+mod brought;
 mod command_line;
 mod compare;
 mod data_warnings;

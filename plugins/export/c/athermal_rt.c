@@ -883,6 +883,9 @@ static at_real at_read(const at_plan *p, at_memory m, const at_entry *e, int32_t
             /* It counts. */
         }
     }
+    if (at_minus(now, *stamp) <= e->spared) {
+        *stamp = now;
+    }
     return value * e->factor;
 }
 

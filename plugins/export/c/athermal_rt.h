@@ -47,6 +47,7 @@ typedef struct {
     int64_t lag;
     int64_t max_age;
     at_real factor; /* into the unit of the reader; 1 where it is the same */
+    int64_t spared; /* until which age it does not age what is made of it; -1 of what always does */
 } at_entry;
 
 /* Values that are read together; `held` ones count until they are too old, others only at their own tick. */

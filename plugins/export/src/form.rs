@@ -122,6 +122,8 @@ pub struct Entry {
     pub max_age_ns: i64,
     /// What it is multiplied by.
     pub factor: f64,
+    /// Until which age it does not age what is made of it, in nanoseconds; -1 of what always does.
+    pub spared_ns: i64,
 }
 
 /// What is kept of the past of a channel.

@@ -207,7 +207,9 @@ impl Reader {
         } else {
             layout.channels.len()
         };
-        let segment_cell = table.segment.as_ref().map(|_| cells);
+        let is_time = |name: &String| layout.time.columns.names().contains(name);
+        let restarts = table.segment.as_ref().is_some_and(is_time);
+        let segment_cell = table.segment.as_ref().map(|_| cells).filter(|_| !restarts);
         let joins = options.joins || long.is_some();
         let mut ledger = Ledger::new(options.lenient || table.lenient, table.decimal);
         ledger.joins = joins;
@@ -221,6 +223,7 @@ impl Reader {
                 time: Vec::new(),
                 text: String::new(),
                 segment_cell,
+                restarts,
                 segment: Vec::new(),
                 long,
                 ahead: None,

@@ -12,6 +12,7 @@ use athermal::diagnosis::day::Days;
 use athermal::diagnosis::{
     Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
 };
+use athermal::run::recording::{Recording, Table};
 use athermal::run::score::Lack;
 use athermal::{Duration, Model};
 use clap::Args;
@@ -24,7 +25,7 @@ use super::faults::{FaultWatch, Purpose};
 use super::found::{self, Found};
 use super::model::load_fitted;
 use super::report::write_plots;
-use crate::terminal::{Answer, Failure, Format, Terminal};
+use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 use athermal_analysis::figures::counted;
 use offsets::{OfFile, offsets};
 use tables::Tables;
@@ -72,6 +73,10 @@ pub struct Diagnose {
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
+
+/// So many numbers of a recording are kept in memory, where it has no more: 256 MB. A row takes so many beside its values.
+const IN_MEMORY: usize = 32 << 20;
+const ROW: usize = 6;
 
 impl Diagnose {
     /// Works out the facts and prints them.
@@ -128,7 +133,11 @@ impl Diagnose {
                 .set(done);
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let (diagnosis, observation) = diagnose(model, &watch, &options, &mut progress)?;
+        // It is read dozens of times, mostly for fits.
+        let most = IN_MEMORY / (model.plan.sources.len() + ROW);
+        let table = Table::read_up_to(&watch, &model.plan, most).map_err(outside)?;
+        let recording: &dyn Recording = table.as_ref().map_or(&watch, |table| table);
+        let (diagnosis, observation) = diagnose(model, recording, &options, &mut progress)?;
         drop(bar);
         let clocks = match self.no_fit {
             true => Vec::new(),

@@ -51,6 +51,8 @@ impl OfFile {
             "file": self.file,
             "offset_s": self.added.secs() + self.found.offset_s,
             "error_s": self.found.error_s,
+            "from_s": self.added.secs() + self.found.from_s,
+            "to_s": self.added.secs() + self.found.to_s,
             "is_significant": self.found.is_significant,
         })
     }
@@ -66,13 +68,35 @@ impl OfFile {
         let Some(error) = found.error_s else {
             return format!("clock of {file}: fits hardly change with it\n");
         };
-        let total = in_words(self.added.secs() + found.offset_s);
-        let (found_s, error) = (in_words(found.offset_s), in_words(error));
-        match found.is_significant {
-            true => format!(
-                "clock of {file}: fits are best with {found_s} ± {error} added to its times: --offset {file}={total}\n"
+        let (found_s, error_in_words) = (in_words(found.offset_s), in_words(error));
+        let [from, to] = [found.from_s, found.to_s].map(in_words);
+        let total = |seconds| in_words(self.added.secs() + seconds);
+        // What lies within the standard error is not said twice.
+        match (
+            found.is_significant,
+            found.to_s - found.from_s > 4.0 * error,
+        ) {
+            (true, false) => format!(
+                "clock of {file}: fits are best with {found_s} ± {error_in_words} added to its times: --offset {file}={}\n",
+                total(found.offset_s)
             ),
-            false => format!("clock of {file}: as that of the others ({found_s} ± {error})\n"),
+            (true, true) => {
+                let least = match found.from_s > 0.0 {
+                    true => found.from_s,
+                    false => found.to_s,
+                };
+                format!(
+                    "clock of {file}: any shift from {from} to {to} added to its times explains as well, and none does not: --offset \
+                     {file}={} at least; what is more the graph's slopes and lags can express\n",
+                    total(least)
+                )
+            }
+            (false, true) => format!(
+                "clock of {file}: as that of the others, or any shift from {from} to {to} added to its times, which explains as well\n"
+            ),
+            (false, false) => {
+                format!("clock of {file}: as that of the others ({found_s} ± {error_in_words})\n")
+            }
         }
     }
 }

@@ -3,10 +3,14 @@
 //! Temperatures and positions change step by step. A leap is 20 times as large as nineteen in twenty of the changes between two
 //! samples. Where leaps are many, it is 200 times as large as three in four of them. It also stands alone: the changes before and
 //! after it are less than a tenth of it, or take it back. A heater that is switched on makes many large changes in a row.
+//!
+//! A position that is zeroed at each homing may leap by less than it drifts within hours. It goes on after the step as fast as before, so
+//! what is looked at is by how much the step differs from the changes on both sides, whatever the size of these: 20 times as much as
+//! three in four do, or eight times where it comes back to one and the same number again and again.
 
 use std::fmt;
 
-use athermal_core::compile::Plan;
+use athermal_core::compile::{Plan, PlannedChannel};
 use athermal_core::unit::Unit;
 use serde::Serialize;
 
@@ -28,6 +32,15 @@ const BESIDE: f64 = 0.1;
 const FEWEST_CHANGES: usize = 20;
 /// A change over a time so many times as long as the median is no leap, for much may have happened.
 const LONGEST_GAP: f64 = 3.0;
+/// By how much the changes before and after a zeroing may differ, as a share of what it differs from them.
+const ALIKE: f64 = 0.3;
+/// So many times as much as usual a zeroing differs from the changes on both sides; in measured and simulated data, what goes on alike
+/// differs by at most 11 times that. Usual is what three in four do not exceed, and a part of what nineteen in twenty do not.
+const STEP: f64 = 20.0;
+const STEP_TO_ONE: f64 = 8.0;
+const PART_OF_MOST: f64 = 0.2;
+/// So many that come to one and the same number are homings.
+const HOMINGS: usize = 3;
 /// So many of the largest changes are kept.
 const KEPT: usize = 100;
 
@@ -76,9 +89,15 @@ impl fmt::Display for Leaps {
 #[must_use]
 pub fn finders(plan: &Plan) -> Vec<Option<Finder>> {
     let channels = plan.channels.iter().zip(of_truths(plan));
-    let may_leap =
-        channels.map(|(of, of_truth)| of_truth || of.channel.unit.measures_same(&Unit::kelvin()));
-    may_leap.map(|may| may.then(Finder::default)).collect()
+    let finder = |(of, of_truth): (&PlannedChannel, bool)| match of
+        .channel
+        .unit
+        .measures_same(&Unit::kelvin())
+    {
+        true => Some(Finder::default()),
+        false => of_truth.then(Finder::of_position),
+    };
+    channels.map(finder).collect()
 }
 
 /// Finds leaps while samples come, in memory that does not grow with them.
@@ -89,16 +108,29 @@ pub struct Finder {
     newest: Option<(Leap, f64, bool)>,
     /// The largest that stand alone, each with the time it took in s and its place among all.
     alone: Vec<(Leap, f64, u64)>,
+    /// How many samples came.
     met: u64,
     values: Thinned,
     changes: Thinned,
     gaps: Thinned,
+    /// Steps from which a position goes on as before.
+    steps: Option<Steps>,
 }
 
 impl Finder {
+    /// That of a position, which may be zeroed.
+    #[must_use]
+    pub fn of_position() -> Self {
+        Self {
+            steps: Some(Steps::default()),
+            ..Self::default()
+        }
+    }
+
     /// Takes the next sample.
     pub fn push(&mut self, at_s: f64, value: f64) {
         self.values.push(value);
+        self.met += 1;
         let Some((last_s, from)) = self.last.replace((at_s, value)) else {
             return;
         };
@@ -111,6 +143,9 @@ impl Finder {
         self.gaps.push(gap_s);
         if change != 0.0 {
             self.changes.push(change.abs());
+        }
+        if let Some(steps) = &mut self.steps {
+            steps.push(leap, gap_s, self.met);
         }
         let before = self.newest.take();
         let alone = before.is_none_or(|(before, ..)| is_small(before.change(), change));
@@ -125,6 +160,9 @@ impl Finder {
     /// What follows is not set against what was.
     pub fn interrupt(&mut self) {
         (self.last, self.newest) = (None, None);
+        if let Some(steps) = &mut self.steps {
+            steps.last.clear();
+        }
     }
 
     fn keep(&mut self, leap: Leap, gap_s: f64) {
@@ -134,9 +172,9 @@ impl Finder {
             .partition_point(|(kept, ..)| size(kept) >= size(&leap));
         if at < KEPT && leap.change() != 0.0 {
             self.alone.truncate(KEPT - 1);
-            self.alone.insert(at, (leap, gap_s, self.met));
+            // It led to the sample before the newest.
+            self.alone.insert(at, (leap, gap_s, self.met - 1));
         }
-        self.met += 1;
     }
 
     /// The leaps; none where there are none, or too few samples.
@@ -151,13 +189,83 @@ impl Finder {
         let is_leap = |(leap, gap_s, _): &&(Leap, f64, u64)| {
             leap.change().abs() > least && *gap_s <= longest_s
         };
-        let leaps = || self.alone.iter().filter(is_leap);
-        let (first, ..) = leaps().min_by_key(|(.., met)| *met)?;
+        let alone = self.alone.iter().filter(is_leap);
+        let steps = self.steps.iter().flat_map(|steps| steps.found(longest_s));
+        let mut leaps: Vec<(Leap, u64)> = alone
+            .map(|(leap, _, met)| (*leap, *met))
+            .chain(steps)
+            .collect();
+        leaps.sort_by_key(|(_, met)| *met);
+        leaps.dedup_by_key(|(_, met)| *met);
+        let (first, _) = *leaps.first()?;
         Some(Leaps {
-            count: leaps().count(),
-            first: *first,
+            count: leaps.len().min(KEPT),
+            first,
             usual: (self.values.quantile(0.05), self.values.quantile(0.95)),
         })
+    }
+}
+
+/// The steps of a position that differ from the changes on both sides, which are alike.
+#[derive(Debug, Clone, Default)]
+struct Steps {
+    /// The last changes in a row, at most two, each with the time it took in s and the number of its second sample.
+    last: Vec<(Leap, f64, u64)>,
+    /// By how much changes differ from those on both sides.
+    sizes: Thinned,
+    /// The largest such steps: by how much they differ, the longest time in s of the changes, and the number of the sample.
+    kept: Vec<(f64, Leap, f64, u64)>,
+}
+
+impl Steps {
+    fn push(&mut self, next: Leap, gap_s: f64, met: u64) {
+        if let [(before, ..), (step, ..)] = self.last[..] {
+            let size = (step.change() - (before.change() + next.change()) / 2.0).abs();
+            if size != 0.0 {
+                self.sizes.push(size);
+            }
+            let at = self.kept.partition_point(|(kept, ..)| *kept >= size);
+            let is_alike = (next.change() - before.change()).abs() <= ALIKE * size;
+            if is_alike && at < KEPT && size > 0.0 {
+                let longest = self
+                    .last
+                    .iter()
+                    .fold(gap_s, |longest, (_, gap, _)| longest.max(*gap));
+                self.kept.truncate(KEPT - 1);
+                self.kept.insert(at, (size, step, longest, met - 1));
+            }
+            self.last.remove(0);
+        }
+        self.last.push((next, gap_s, met));
+    }
+
+    /// Those that are far from usual, and fall into no gap.
+    fn found(&self, longest_s: f64) -> Vec<(Leap, u64)> {
+        if self.sizes.kept.len() < FEWEST_CHANGES {
+            return Vec::new();
+        }
+        let usual = self
+            .sizes
+            .quantile(MOSTLY)
+            .max(PART_OF_MOST * self.sizes.quantile(USUAL));
+        let far = |times: f64| {
+            let of = move |(size, _, longest, _): &&(f64, Leap, f64, u64)| {
+                *size > times * usual && *longest <= longest_s
+            };
+            self.kept.iter().filter(of)
+        };
+        let comes_back = |leap: &Leap| {
+            far(STEP_TO_ONE)
+                .filter(|(_, of, ..)| of.to == leap.to)
+                .count()
+                >= HOMINGS
+        };
+        let is_zeroing =
+            |(size, leap, ..): &&(f64, Leap, f64, u64)| *size > STEP * usual || comes_back(leap);
+        far(STEP_TO_ONE)
+            .filter(is_zeroing)
+            .map(|(_, leap, _, met)| (*leap, *met))
+            .collect()
     }
 }
 
@@ -265,6 +373,34 @@ mod tests {
                 .to_string()
                 .starts_with("leaps 100 times or more, first from ")
         );
+    }
+
+    /// A position in µm that follows a temperature in tens of minutes, with what it is set to at some minutes.
+    fn position(minutes: usize, zero: impl Fn(usize, f64) -> Option<f64>) -> Option<Leaps> {
+        let (mut finder, mut offset) = (Finder::of_position(), 0.0);
+        for minute in 0..minutes {
+            let at = 9.0 * (minute as f64 / 15.0).sin() + 0.3 * temperature(minute);
+            if let Some(value) = zero(minute, at - offset) {
+                offset = at - value;
+            }
+            finder.push(60.0 * minute as f64, at - offset);
+        }
+        finder.found()
+    }
+
+    #[test]
+    fn a_position_that_is_zeroed_leaps_though_it_drifts_as_far_within_minutes() {
+        let every = |minute: usize, of: usize| minute > 0 && minute % of == of / 3;
+        // At each homing to zero, to a number of the machine, to any place near zero, and only once.
+        let homed = position(2000, |minute, _| every(minute, 100).then_some(0.0));
+        assert!((18..=20).contains(&homed.unwrap().count));
+        let to_one = position(2000, |minute, _| every(minute, 70).then_some(12.5));
+        assert!((25..=29).contains(&to_one.unwrap().count));
+        let moved = position(2000, |minute, at| every(minute, 300).then_some(at - 4.0));
+        assert_eq!(moved.unwrap().count, 7);
+        let once = position(2000, |minute, at| (minute == 777).then_some(at + 5.0));
+        assert_eq!(once.unwrap().count, 1);
+        assert_eq!(position(2000, |_, _| None), None);
     }
 
     #[test]

@@ -15,6 +15,9 @@ const SHIFTS: i64 = 30;
 const HALVINGS: u32 = 7;
 /// By how much the deviance rises two standard errors away from the best shift.
 const RISE: f64 = 4.0;
+/// A shift at which the errors of a fit are larger by less than this share explains as well: what slopes and lags can express, a fit
+/// takes for a delay of the machine.
+const AS_WELL: f64 = 0.02;
 
 /// What is to be added to the times of a logger.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -23,7 +26,11 @@ pub struct Offset {
     pub offset_s: f64,
     /// Its standard error in s; none where fits hardly change with it.
     pub error_s: Option<f64>,
-    /// Whether it is told apart from none: by more than two standard errors.
+    /// All shifts between these, in s, explain as well.
+    pub from_s: f64,
+    /// The last of them.
+    pub to_s: f64,
+    /// Whether it differs from none: by more than two standard errors, and none does not explain as well.
     pub is_significant: bool,
 }
 
@@ -34,7 +41,8 @@ type Deviances = BTreeMap<String, (String, f64)>;
 /// where no fit changes, or no estimator predicts the present: the fit of a forecast gains by a shift of its horizon. A lag of the
 /// machine that the graph cannot express counts as one of the clocks.
 ///
-/// The standard error is that of maximum likelihood, by the curvature of the deviance. Of truths whose windows overlap only as many
+/// The standard error is that of maximum likelihood, by the curvature of the deviance. Wider than that is what lies between the shifts
+/// that explain as well, which slopes and lags of the graph take for a delay. Of truths whose windows overlap only as many
 /// count as lie side by side.
 ///
 /// # Errors
@@ -54,6 +62,9 @@ pub fn offset<R: Recording>(
     let length = to - from;
     let rows = report.estimators.iter().map(|fit| fit.rows).max();
     let between = length.as_ns() / rows.unwrap_or(0).max(1) as i64;
+    // By whole steps from row to row, so that rows which stand side by side do so again.
+    let row = length.as_ns() / (report.ticks as i64 - 1).max(1);
+    let between = row.max(1) * ((between + row / 2) / row.max(1)).max(1);
     let spans = report.estimators.iter().map(|fit| span(plan, &fit.truth));
     let widest = spans.max().map_or(0, |span| span.as_ns());
     let step = (widest / 8).max(between).min(length.as_ns() / 100).max(1);
@@ -72,6 +83,11 @@ pub fn offset<R: Recording>(
     if counts.is_empty() {
         return Ok(None);
     }
+    // What is not looked at need not be fitted over and over.
+    let options = FitOptions {
+        only: Some(counts.keys().cloned().collect()),
+        ..options
+    };
     let mut deviances = |shift: i64| -> Option<Deviances> {
         progress(done, fits);
         done += 1;
@@ -104,6 +120,16 @@ pub fn offset<R: Recording>(
     else {
         return Ok(None);
     };
+    // All that lies side by side around the best and explains as well.
+    let worth: f64 = told.iter().filter_map(|node| counts.get(node)).sum();
+    let explains = |of: &Deviances| total(of) - best.0 <= RISE.max(2.0 * worth * AS_WELL.ln_1p());
+    let around = tried.iter().position(|(shift, _)| *shift == best.1);
+    let around = around.unwrap_or(0);
+    let before = tried[..=around].iter().rev();
+    let before = before.take_while(|(_, of)| explains(of)).last();
+    let behind = tried[around..].iter();
+    let behind = behind.take_while(|(_, of)| explains(of)).last();
+    let [from, to] = [before, behind].map(|of| of.map_or(best.1, |(shift, _)| *shift));
     let mut at = |shift: i64| deviances(shift).map_or(f64::INFINITY, |of| total(&of));
     let ((mut least, mut shift), mut by, mut error) = (best, step, None);
     for _ in 0..HALVINGS {
@@ -124,10 +150,14 @@ pub fn offset<R: Recording>(
     let apart = 2.0 * length.as_ns() as f64 / report.ticks.max(1) as f64;
     let error = error.map(|error| error.hypot(apart / 12.0_f64.sqrt()));
     let seconds = |ns: f64| ns / 1e9;
+    let (from, to) = (from.min(shift), to.max(shift));
+    let is_apart = error.is_some_and(|error| (shift as f64).abs() > 2.0 * error);
     Ok(Some(Offset {
         offset_s: seconds(shift as f64),
         error_s: error.map(seconds),
-        is_significant: error.is_some_and(|error| (shift as f64).abs() > 2.0 * error),
+        from_s: seconds(from as f64),
+        to_s: seconds(to as f64),
+        is_significant: is_apart && !(from..=to).contains(&0),
     }))
 }
 

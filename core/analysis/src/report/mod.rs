@@ -41,7 +41,7 @@ pub use worth::Worth;
 use athermal_core::diagnostic::digits;
 use athermal_run::model::{Card, Model};
 use athermal_run::recording::Recording;
-use athermal_run::score::{Lack, Score, ScoreOptions, Scores, score};
+use athermal_run::score::{FellBack, Lack, Score, ScoreOptions, Scores, score};
 use serde::Serialize;
 
 use crate::diagnosis::lag::{Lags, lags};
@@ -62,6 +62,8 @@ pub struct Facts {
     pub scores: Vec<Score>,
     /// The combiners that went by fewer truths than they take.
     pub lacks: Vec<Lack>,
+    /// How often fallbacks took over.
+    pub fell_back: Vec<FellBack>,
     /// What happened over time.
     pub course: Course,
     /// How far predictions went outside of their fits, and which sensors contradicted the others.
@@ -142,7 +144,12 @@ pub fn gather(
     recording: &dyn Recording,
     data: Vec<String>,
 ) -> Result<Facts, ReportError> {
-    let Scores { scores, lacks, .. } = score(
+    let Scores {
+        scores,
+        lacks,
+        fell_back,
+        ..
+    } = score(
         &model.plan,
         &model.fitted,
         recording,
@@ -175,6 +182,7 @@ pub fn gather(
         responses: responses(model, &observation)?,
         scores,
         lacks,
+        fell_back,
         course,
         worth,
         unjudged,

@@ -54,7 +54,7 @@ pub fn scores(scores: &Scores, asked: &[String]) -> String {
             "largest",
             "valid",
         ];
-        let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row)).collect();
+        let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row, first)).collect();
         text.push_str(&table(&header, &cells));
         let cells: Vec<Vec<String>> = rows.iter().filter_map(|row| interval(row)).collect();
         if !cells.is_empty() {
@@ -77,7 +77,9 @@ fn persistence(rows: &[&Score]) -> String {
         None => or_dash(row.baseline_persistence),
     };
     let mut all: Vec<(f64, String)> = Vec::new();
-    for row in rows.iter().filter(|row| !row.own_instants) {
+    // Where all are scored wherever they are, of all of them.
+    let own = rows.iter().all(|row| row.own_instants);
+    for row in rows.iter().filter(|row| row.own_instants == own) {
         if all.iter().all(|(ahead_s, _)| *ahead_s != row.ahead_s) {
             all.push((row.ahead_s, of(row)));
         }
@@ -147,7 +149,8 @@ fn percent(value: f64) -> String {
     }
 }
 
-fn line(score: &Score) -> Vec<String> {
+/// The line of a score, below the figures of another: those that are the same stand there.
+fn line(score: &Score, above: &Score) -> Vec<String> {
     let ratio = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), share);
     // Nothing that is measured bounds how far a free run is ahead.
     let ahead = score.horizon_s.map_or_else(|| "free".to_owned(), stated);
@@ -172,11 +175,12 @@ fn line(score: &Score) -> Vec<String> {
         remarks.push("no truth to compare with".to_owned());
     } else if score.n == 0 {
         remarks.push("no prediction of any truth".to_owned());
-    } else if score.own_instants {
+    } else if score.n != above.n {
         remarks.push(format!(
-            "on its own {} (no model {})",
+            "on its own {} (no model {}, persistence {})",
             counted(score.n as u64, "instant"),
-            score.baseline_zero.map_or("-".into(), number)
+            or_dash(score.baseline_zero),
+            or_dash(score.baseline_persistence)
         ));
     }
     if !remarks.is_empty() {

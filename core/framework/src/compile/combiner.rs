@@ -61,6 +61,7 @@ impl Resolver<'_> {
         if !agree {
             return None;
         }
+        self.doubt_age(instance, port.name, &voters);
         let unit = truth.map_or(first, |truth| truth);
         let unit = self.channels[unit].channel.unit.clone();
         let gather = self.gather(instance, &port, &voters, &[Duration::ZERO], Some(&unit))?;
@@ -113,6 +114,33 @@ impl Resolver<'_> {
             beside,
         };
         self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// Warns of an age that votes reach while all that they are made of counts: then there is no vote, and nothing says why.
+    fn doubt_age(&mut self, instance: &Instance<'_>, port: &str, voters: &[usize]) {
+        let Some((stated, place)) = instance.input(port).and_then(|input| input.max_age) else {
+            return;
+        };
+        let older = |&slot: &usize| {
+            let counts = self.channels[slot].channel.default_max_age()?;
+            let sources = self.provenance[slot].sources();
+            let ages = sources.filter_map(|(of, _)| Some((self.channels[of].channel.max_age?, of)));
+            // What is rarer than that does not age it.
+            let oldest = ages.filter(|(age, _)| *age <= counts).max()?;
+            (oldest.0 > stated).then_some((slot, oldest))
+        };
+        let Some((slot, (age, of))) = voters.iter().find_map(older) else {
+            return;
+        };
+        let (voter, signal) = (&self.channels[slot].name, &self.channels[of].name);
+        let problem = super::problem::Doubt {
+            message: format!(
+                "no vote older than {stated} counts, while `{voter}` is made of `{signal}`, which counts for {age}: where its samples are that \
+                 far apart, there is no vote"
+            ),
+            help: Some(format!("leave `max_age` out, or set it to {age} at least")),
+        };
+        self.diagnostics.report(place, problem);
     }
 
     /// What comes out of a combiner, and what is read for it beside the votes.

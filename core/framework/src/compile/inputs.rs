@@ -239,6 +239,7 @@ impl Resolver<'_> {
             read,
             entries,
             conversions,
+            rare: Vec::new(),
         };
         Some(self.gathers.insert_full(gather).0)
     }

@@ -25,6 +25,7 @@ mod plan;
 mod port_channels;
 pub mod problem;
 mod provenance;
+mod rare;
 mod reference;
 mod resolver;
 mod row;
@@ -129,6 +130,7 @@ fn planned(
     let closing = resolver.resolve_nodes(&nodes, &order);
     // What loops bring back, and so what each value is made of; then who sees the future.
     resolver.close_loops(closing);
+    resolver.spare_rare();
     resolver.name_sensors();
     resolver.find_leaks();
     let outputs = resolver.outputs();

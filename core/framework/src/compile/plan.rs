@@ -109,6 +109,9 @@ pub struct Gather {
     pub entries: Vec<Entry>,
     /// The values that are given in another unit than their slots have.
     pub conversions: Vec<Conversion>,
+    /// The values, by position, of signals that are measured so rarely that nobody would take what is made of them: until this age they
+    /// do not age it.
+    pub rare: Vec<(usize, Duration)>,
 }
 
 /// A value of a gather that is given in another unit.

@@ -30,7 +30,7 @@ pub(crate) use at_work::{caught, naming};
 use tick::Gathered;
 
 use crate::channel::Extremes;
-use crate::compile::{Plan, Step, admits, origins};
+use crate::compile::{Entry, Plan, Step, admits, origins};
 use crate::diagnostic::NodePanic;
 use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
@@ -375,6 +375,33 @@ impl Engine {
         let first = &plan.channels[behind.find(lacks).unwrap_or(slot)];
         let node = first.node.map(|node| plan.nodes[node].instance());
         node.unwrap_or_else(|| first.name.clone())
+    }
+
+    /// Why nothing of a slot counts at the present tick: what is behind it and gave nothing though all that it reads counts, or the measured
+    /// channel whose last sample is too old.
+    ///
+    /// # Panics
+    /// Where the plan has no such slot.
+    #[must_use]
+    pub fn lacking(&self, slot: usize) -> String {
+        let plan = &*self.plan;
+        let (mut at, mut seen) = (slot, vec![false; plan.channels.len()]);
+        while let Some(node) = plan.channels[at].node.map(|node| &plan.nodes[node]) {
+            seen[at] = true;
+            let span = plan.channels[at].channel.span;
+            let entries = node.role.inputs().flat_map(|of| &plan.gathers[of].entries);
+            let age = |of: &Entry| self.last - of.lag - self.slots.given[of.slot].stamp;
+            let counts = |of: &Entry| {
+                !self.slots.values[of.slot].is_nan() && age(of) <= of.max_age.max(span)
+            };
+            let missing = entries.filter(|of| !seen[of.slot] && !counts(of));
+            let is_absent = |of: &Entry| self.slots.values[of.slot].is_nan();
+            let Some(next) = missing.max_by_key(|of| (is_absent(of), age(of))) else {
+                return node.instance();
+            };
+            at = next.slot;
+        }
+        plan.channels[at].name.clone()
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.

@@ -60,6 +60,37 @@ impl FitReport {
     }
 }
 
+/// Fits of which so many rows lack a regressor leave much to a fallback.
+const OFTEN: f64 = 0.1;
+
+impl FitReport {
+    /// For each `fallback` whose first voter had its regressors in too few rows of the fit: its channel, the voter, and the share of rows
+    /// without.
+    #[must_use]
+    pub fn fallbacks(&self, plan: &Plan) -> Vec<(String, String, f64)> {
+        let lacking = |fit: &EstimatorFit| {
+            let all = fit.rows + fit.dropped.incomplete;
+            (all > 0).then(|| fit.dropped.incomplete as f64 / all as f64)
+        };
+        let nodes = plan
+            .nodes
+            .iter()
+            .filter(|node| node.kind.name == "fallback");
+        let found = nodes.filter_map(|node| {
+            let gather = node.role.inputs().next()?;
+            let first = plan.gathers[gather].entries.first()?.slot;
+            let mut behind = BTreeSet::new();
+            voters(plan, first, &mut behind);
+            let names = behind.into_iter().map(|nth| plan.nodes[nth].instance());
+            let fits = names.filter_map(|name| self.estimators.iter().find(|fit| fit.node == name));
+            let least = fits.filter_map(lacking).reduce(f64::min)?;
+            let name = |slot: usize| plan.channels[slot].name.clone();
+            (least > OFTEN).then(|| (name(node.slots.start), name(first), least))
+        });
+        found.collect()
+    }
+}
+
 /// The estimators behind a slot, through combiners and features; of one that is fed by predictions, those that make them.
 fn voters(plan: &Plan, slot: usize, found: &mut BTreeSet<usize>) {
     let Some(nth) = plan.channels[slot].node else {

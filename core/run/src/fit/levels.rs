@@ -123,7 +123,12 @@ impl<'a> Fitting<'a> {
         options: &'a FitOptions,
         progress: Listener<'a>,
     ) -> Self {
-        let levels = levels(plan);
+        let mut levels = levels(plan);
+        if let (Some(only), [level]) = (&options.only, &mut levels[..]) {
+            level
+                .nodes
+                .retain(|&node| only.contains(&plan.nodes[node].instance()));
+        }
         let above = levels.iter().filter(|level| level.of_predictions);
         let rows = above.flat_map(|level| &level.nodes);
         let rows = rows.filter_map(|&node| plan.nodes[node].rows());

@@ -14,6 +14,7 @@ mod progress;
 mod report;
 mod train;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 pub use bare::BareOutput;
@@ -36,6 +37,8 @@ pub struct FitOptions {
     pub threads: usize,
     /// Into how many parts the data is cut for the out-of-fold predictions that estimators fed by estimators learn from.
     pub folds: usize,
+    /// The estimators that are fitted, where not all are: of no use where some feed others.
+    pub only: Option<BTreeSet<String>>,
 }
 
 impl Default for FitOptions {
@@ -45,6 +48,7 @@ impl Default for FitOptions {
             memory: 64 << 20,
             threads,
             folds: 3,
+            only: None,
         }
     }
 }

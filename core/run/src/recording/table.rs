@@ -28,16 +28,30 @@ impl Table {
     /// # Errors
     /// As its rows.
     pub fn read(recording: &dyn Recording, plan: &Plan) -> Result<Self, SourceError> {
+        let whole = Self::read_up_to(recording, plan, usize::MAX)?;
+        Ok(whole.unwrap_or_default())
+    }
+
+    /// The same of so many rows at most; none where there are more.
+    ///
+    /// # Errors
+    /// As its rows.
+    pub fn read_up_to(
+        recording: &dyn Recording,
+        plan: &Plan,
+        rows: usize,
+    ) -> Result<Option<Self>, SourceError> {
         let mut table = Self::default();
         let mut source = recording.open(plan)?;
         let mut samples = Samples::default();
         while let Some(event) = source.next(&mut samples)? {
             match event {
+                Event::Row(_) if table.events.len() == rows => return Ok(None),
                 Event::Row(time) => table.push(time, &samples.values),
                 Event::Segment => table.segment(),
             }
         }
-        Ok(table)
+        Ok(Some(table))
     }
 
     /// The events, each with the values of its row.

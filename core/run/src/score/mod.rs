@@ -1,6 +1,7 @@
 //! Decides how predictions are scored against the truths measured later; not how they are made.
 
 mod evidence;
+mod fallback;
 mod interval;
 mod no_model;
 mod paired;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 
 pub use crate::engine::Mode;
 pub use evidence::Lack;
+pub use fallback::FellBack;
 pub use interval::IntervalScore;
 pub(crate) use no_model::Means;
 pub use no_model::{Levels, NoModel, is_level};

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::fallback::Fallen;
 use super::watch::{Truth, Watch};
-use super::{IntervalScore, Lack, Mode, NoModel, ScoreOptions, Unscored};
+use super::{FellBack, IntervalScore, Lack, Mode, NoModel, ScoreOptions, Unscored};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedNode};
 use crate::engine::{Engine, SampleRange};
@@ -33,6 +34,8 @@ pub struct Scores {
     pub unscored: Vec<Unscored>,
     /// Combiners that went by fewer truths than they take.
     pub lacks: Vec<Lack>,
+    /// How often fallbacks took over.
+    pub fell_back: Vec<FellBack>,
 }
 
 /// How well one prediction did. Errors are prediction minus truth, in the unit of the truth.
@@ -86,7 +89,7 @@ pub struct Score {
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines: both the
     /// scatter of the samples and the curvature of what they follow count, and a prediction may come below it.
     pub truth_noise: Option<f64>,
-    /// Whether it is scored on instants of its own.
+    /// Whether it is scored on all instants at which it is there, as what is put out is, and not on those common to all.
     pub own_instants: bool,
     /// Instants with a truth and this prediction that are not scored, since another prediction of the truth has no value there.
     pub left_out: usize,
@@ -158,6 +161,7 @@ pub(super) fn table(
         scores: rows,
         unscored,
         lacks: super::evidence::lacks(&watch.tallies),
+        fell_back: Fallen::found(&watch.fallen, plan),
     }
 }
 
@@ -228,7 +232,9 @@ fn scores(
         .iter()
         .enumerate()
         .map(|(nth, prediction)| {
-            let own_instants = options.each_on_its_own || !restricting(nth);
+            // What is put out is put out whether its voters are there or not.
+            let is_put_out = plan.outputs.iter().any(|of| of.slot == prediction.slot);
+            let own_instants = options.each_on_its_own || is_put_out || !restricting(nth);
             let instants: Vec<usize> = if own_instants {
                 counted
                     .iter()

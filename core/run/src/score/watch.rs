@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::evidence::Tally;
+use super::fallback::Fallen;
 use super::interval::Intervals;
 use super::paired::link;
 use crate::compile::{Plan, TruthLink, persistence_lag};
@@ -16,6 +17,7 @@ pub struct Watch {
     /// The truths that are predicted.
     pub truths: Vec<Truth>,
     pub(super) tallies: Vec<Tally>,
+    pub(super) fallen: Vec<Fallen>,
 }
 
 /// A truth and all predictions of it.
@@ -101,6 +103,7 @@ impl Watch {
         Self {
             truths: truths.into_values().collect(),
             tallies: Tally::all(plan),
+            fallen: Fallen::all(plan),
         }
     }
 
@@ -114,6 +117,7 @@ impl Watch {
         }
         if let Event::Row(_) = event {
             self.tallies.iter_mut().for_each(|tally| tally.look(engine));
+            self.fallen.iter_mut().for_each(|of| of.look(engine));
         }
     }
 }

@@ -90,12 +90,13 @@ fn long(value: i64) -> String {
 
 fn entry(entry: &Entry) -> String {
     format!(
-        "{{ {}, {}, {}, {}, {} }}",
+        "{{ {}, {}, {}, {}, {}, {} }}",
         entry.slot,
         entry.history.map_or(-1, |history| history as i64),
         long(entry.lag_ns),
         long(entry.max_age_ns),
-        real(entry.factor)
+        real(entry.factor),
+        long(entry.spared_ns)
     )
 }
 

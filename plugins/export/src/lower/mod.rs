@@ -172,8 +172,12 @@ impl<'a> Lowering<'a> {
                     lag_ns: entry.lag.as_ns(),
                     max_age_ns: entry.max_age.as_ns(),
                     factor: 1.0,
+                    spared_ns: -1,
                 })
                 .collect();
+            for &(entry, age) in &gather.rare {
+                entries[entry].spared_ns = age.as_ns();
+            }
             for conversion in &gather.conversions {
                 entries[conversion.entry].factor = conversion.factor();
             }

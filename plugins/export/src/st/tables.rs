@@ -202,12 +202,13 @@ fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
 
 fn entry(of: &Entry) -> String {
     format!(
-        "(slot := {}, history := {}, lag := {}, max_age := {}, factor := {})",
+        "(slot := {}, history := {}, lag := {}, max_age := {}, factor := {}, spared := {})",
         of.slot,
         of.history.map_or(-1, |history| history as i64),
         long(of.lag_ns),
         long(of.max_age_ns),
-        real(of.factor)
+        real(of.factor),
+        long(of.spared_ns)
     )
 }
 

@@ -41,11 +41,24 @@ impl Description {
     /// # Errors
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
+        Self::laid_out(path, rows, &TableFormat::default())
+    }
+
+    /// The same of a table whose layout is declared in part.
+    ///
+    /// # Errors
+    /// As for [`Description::of`], and where the file is not as declared.
+    pub fn laid_out(
+        path: impl AsRef<Path>,
+        rows: usize,
+        table: &TableFormat,
+    ) -> Result<Self, FileError> {
         let path = path.as_ref();
         if let Some(file) = typed::opened(path) {
             return of_typed(path, file?, rows);
         }
-        let mut described = of_lines(Lines::open(path, None)?, Format::of_file(path), rows)?;
+        let lines = Lines::open(path, table.encoding)?;
+        let mut described = of_lines(lines, Format::of_file(path), rows, table)?;
         if let Some(encoding) = marked(path) {
             described.table.encoding = Some(encoding);
         }
@@ -62,7 +75,8 @@ impl Description {
         format: Option<Format>,
         rows: usize,
     ) -> Result<Self, FileError> {
-        of_lines(Lines::new(name.into(), None, input), format, rows)
+        let lines = Lines::new(name.into(), None, input);
+        of_lines(lines, format, rows, &TableFormat::default())
     }
 
     /// Whether numbers stand where the names of the columns should.
@@ -216,10 +230,11 @@ fn of_lines(
     mut lines: Lines,
     format: Option<Format>,
     rows: usize,
+    table: &TableFormat,
 ) -> Result<Description, FileError> {
     match lines.format_or(format)? {
         Format::JsonLines => of_json(lines, rows),
-        _ => of_csv(lines, rows),
+        _ => of_csv(lines, rows, table),
     }
 }
 
@@ -242,8 +257,8 @@ fn of_typed(path: &Path, file: Box<dyn TypedFile>, rows: usize) -> Result<Descri
     })
 }
 
-fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
-    let mut csv = CsvRows::headed(lines, &TableFormat::default(), None)?;
+fn of_csv(lines: Lines, rows: usize, table: &TableFormat) -> Result<Description, FileError> {
+    let mut csv = CsvRows::headed(lines, table, None)?;
     let mut ledger = Ledger::new(true, None);
     let mut texts = Vec::new();
     while texts.len() < rows && csv.advance(&mut ledger)? {
@@ -264,10 +279,18 @@ fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
             separator: Some(csv.separator())
                 .filter(|of| *of != b',')
                 .map(Separator),
-            encoding: csv.is_windows_1252().then_some(Encoding::Windows1252),
-            skip: Some(csv.skip()).filter(|skip| *skip > 0),
-            units: (!csv.units().is_empty()).then(|| csv.units_row()),
-            ..TableFormat::default()
+            encoding: table
+                .encoding
+                .or(csv.is_windows_1252().then_some(Encoding::Windows1252)),
+            skip: match table.names {
+                Some(_) => table.skip,
+                None => Some(csv.skip()).filter(|skip| *skip > 0),
+            },
+            units: table.units.or_else(|| {
+                let row = csv.units_row() + table.names.unwrap_or(1) - 1;
+                (!csv.units().is_empty()).then_some(row)
+            }),
+            ..table.clone()
         },
         columns: csv.names().to_vec(),
         units: csv.units().to_vec(),

@@ -240,7 +240,13 @@ fn longest_table(seen: &[Line], declared: Option<u8>) -> Option<(usize, u8)> {
             if width < 2 || (length, width) <= longest {
                 continue;
             }
-            let filled = |row: &usize| rows[*row].iter().filter(|cell| !cell.is_empty()).count();
+            // Names of channels may stand above those of columns, and then are not all different, or name no time.
+            let filled = |row: &usize| {
+                let cells: HashSet<&String> =
+                    rows[*row].iter().filter(|cell| !cell.is_empty()).collect();
+                let full = rows[*row].iter().filter(|cell| !cell.is_empty()).count();
+                (full, names_time(&rows[*row]), cells.len() == full)
+            };
             // A spreadsheet fills what stands above a table up with empty cells. The first of equals is to win.
             let of_names = of_width.filter(|&row| can_name(&rows[row]));
             let fullest = of_names.rev().max_by_key(filled);
@@ -262,6 +268,15 @@ fn longest_table(seen: &[Line], declared: Option<u8>) -> Option<(usize, u8)> {
 /// Whether a row has so many cells, or one more that is empty or a note: some loggers end rows, but not the names, with a separator.
 fn is_of_width(row: &[String], width: usize) -> bool {
     row.len() == width || row.len() == width + 1 && !is_value(&row[width])
+}
+
+/// Whether a cell is what loggers call the time.
+fn names_time(row: &[String]) -> bool {
+    const WORDS: &str = "time times timestamp timestamps date datetime zeit datum zeitstempel";
+    let mut words = row
+        .iter()
+        .flat_map(|cell| cell.split(|c: char| !c.is_alphabetic()));
+    words.any(|word| WORDS.split(' ').any(|of| of.eq_ignore_ascii_case(word)))
 }
 
 /// Whether a row may hold the names of columns, and no values.

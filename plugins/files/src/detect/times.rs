@@ -206,16 +206,39 @@ pub fn zone_of(text: &str) -> Option<String> {
     Some(format!("{}{hours:02}:{minutes:02}", &offset[..1]))
 }
 
-/// The zone in the name of a column: `Date Time, GMT-07:00`, `Time (UTC)`.
+/// The zone in the name of a column: `Date Time, GMT-07:00`, `Time - GMT +05:00`, `Time (UTC)`. None of one whose offset has no sign.
 #[must_use]
 pub fn zone_in_name(name: &str) -> Option<String> {
-    let parts = name.split([' ', ',', ';', '(', ')', '[', ']', '_']);
-    let words = ["UTC", "GMT"];
-    let mut parts = parts.filter(|part| {
-        let is_word = zones().any(|(word, _)| word == *part);
-        is_word || words.iter().any(|word| part.starts_with(word))
-    });
-    parts.find_map(zone_of)
+    let is_end = |c: char| " ,;()[]_".contains(c);
+    let mut begins = name
+        .char_indices()
+        .filter(|(at, _)| name[..*at].chars().next_back().is_none_or(is_end));
+    begins.find_map(|(at, _)| {
+        let end = name[at..]
+            .find(is_end)
+            .map_or(name.len(), |length| at + length);
+        let word = &name[at..end];
+        let is_word = zones().any(|(known, _)| known == word);
+        if !is_word && !["UTC", "GMT"].iter().any(|known| word.starts_with(known)) {
+            return None;
+        }
+        // An offset may stand apart from its word, and from its sign.
+        let behind = name[end..].trim_start_matches(' ').replace('\u{2212}', "-");
+        let offset = behind.strip_prefix(['+', '-']).map(|clock| {
+            let clock = clock.trim_start();
+            let length = clock.find(|c: char| !(c.is_ascii_digit() || c == ':'));
+            format!(
+                "{}{}",
+                &behind[..1],
+                &clock[..length.unwrap_or(clock.len())]
+            )
+        });
+        match offset.filter(|offset| is_word && offset.len() > 1) {
+            Some(offset) => zone_of(&offset),
+            None if is_word && behind.starts_with(|c: char| c.is_ascii_digit()) => None,
+            None => zone_of(word),
+        }
+    })
 }
 
 #[cfg(test)]
@@ -292,6 +315,13 @@ mod tests {
             ("timestamp_UTC", Some("UTC")),
             ("Zeit [MEZ]", Some("+01:00")),
             ("Time GMT+0530", Some("+05:30")),
+            ("Date Time - GMT +05:00", Some("+05:00")),
+            ("Time UTC +1", Some("+01:00")),
+            ("Time (UTC +05:30)", Some("+05:30")),
+            ("Time, UTC \u{2212} 3", Some("-03:00")),
+            ("Time UTC - local", Some("UTC")),
+            ("Time GMT 05:00", None),
+            ("Time UTC +", Some("UTC")),
             ("Time", None),
             ("Time GMTX", None),
             ("Time GMT+99", None),

@@ -23,6 +23,8 @@ pub(super) struct Reading {
     pub(super) text: String,
     /// Which cell says the segment of a row, after those of the channels.
     pub(super) segment_cell: Option<usize>,
+    /// Whether a time that goes back begins a segment.
+    pub(super) restarts: bool,
     /// The segment of the row that was read last.
     pub(super) segment: Vec<u8>,
     /// Where a row has one value.
@@ -208,6 +210,7 @@ impl Reading {
                 }
                 changes && !is_first
             });
+            row.begins_segment |= self.restarts && self.ledger.follows(time_ns) == Follows::Behind;
             let follows = self.follows(row);
             if self.ledger.refuses(follows) {
                 if self.long.is_some() && follows == Follows::Behind {

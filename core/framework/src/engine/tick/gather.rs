@@ -27,6 +27,8 @@ pub struct Gathered {
     read: Read,
     origin: Origin,
     conversions: Box<[Conversion]>,
+    /// Those that do not age what is made of them, and until which age.
+    rare: Box<[(usize, Duration)]>,
     /// How long each of them counts, and how long any does at least.
     ages: Box<[Duration]>,
     shortest: Duration,
@@ -137,6 +139,7 @@ impl Gathered {
             read: gather.read,
             origin: Origin::new(&gather.entries),
             conversions: gather.conversions.clone().into(),
+            rare: gather.rare.clone().into(),
             ages: gather.entries.iter().map(|entry| entry.max_age).collect(),
             shortest: shortest(&gather.entries),
         }
@@ -153,6 +156,22 @@ impl Gathered {
         if !self.conversions.is_empty() {
             self.convert();
         }
+        if !self.rare.is_empty() {
+            self.spare(now);
+        }
+    }
+
+    /// Takes what is rare and not too old for new: whoever reads what is made of it would take nothing so old.
+    #[inline(never)]
+    fn spare(&mut self, now: Instant) {
+        for &(place, age) in &self.rare {
+            let stamp = &mut self.stamps[place];
+            if now - *stamp <= age {
+                *stamp = now;
+            }
+        }
+        self.together = false;
+        self.whole = self.whole.and_then(|_| self.stamps.iter().copied().min());
     }
 
     #[inline(never)]
@@ -225,8 +244,8 @@ impl Gathered {
         };
         let (values, stamps) = (&mut *self.values, &mut *self.stamps);
         if now >= past.until {
-            let converted = !self.conversions.is_empty();
-            past.read(values, stamps, histories, now, converted);
+            let changed = !(self.conversions.is_empty() && self.rare.is_empty());
+            past.read(values, stamps, histories, now, changed);
         }
         let mut glance = Glance::NOTHING;
         for &(place, slot) in &past.present {
@@ -334,7 +353,7 @@ impl AllPast {
         stamps: &mut [Instant],
         histories: &[Option<History>],
         now: Instant,
-        converted: bool,
+        changed: bool,
     ) {
         self.until = Instant::MAX;
         self.whole = Some(Instant::MAX);
@@ -354,8 +373,8 @@ impl AllPast {
                 };
                 values[place] = value;
                 stamps[place] = stamp + entry.lag;
-                // A value that is converted is read afresh, lest it be converted twice.
-                past.until = if converted { now } else { until + entry.lag };
+                // A value that is converted, or whose stamp is, is read afresh, lest it be converted twice.
+                past.until = if changed { now } else { until + entry.lag };
             }
             self.until = self.until.min(past.until);
             let there = !values[place].is_nan();

@@ -1,0 +1,7 @@
+//! Logs, scores and messages that users brought: what was wrong, or led nowhere, and others of its kind.
+
+mod ages;
+mod cases;
+mod dates;
+mod random_forms;
+mod scored_outputs;
