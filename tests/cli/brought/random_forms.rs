@@ -2,7 +2,7 @@
 //! cause. `ATHERMAL_LONG=1` writes a hundred thousand, `ATHERMAL_SEED=7` that one.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 
 use athermal::core::prng::Prng;
 use athermal::core::time::{TimeFormat, Zone};
@@ -152,11 +152,11 @@ fn written(random: &mut Prng, truth: &Truth) -> (String, String) {
 }
 
 /// What a graph reads of a log: by column and instant in ns.
-fn read(graph: &str, log: &PathBuf) -> BTreeMap<(String, i64), f64> {
+fn read(graph: &str, log: &Path) -> BTreeMap<(String, i64), f64> {
     let path = log.with_extension("toml");
     std::fs::write(&path, graph).unwrap();
     let model = Model::load(&path).unwrap();
-    let dataset = Dataset::new(vec![log.clone()], Options::default());
+    let dataset = Dataset::new(vec![log.to_path_buf()], Options::default());
     let mut source = dataset.open(&model.plan).unwrap();
     let (mut samples, mut found) = (Samples::default(), BTreeMap::new());
     while let Some(event) = source.next(&mut samples).unwrap() {
