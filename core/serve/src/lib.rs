@@ -23,7 +23,7 @@
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
-//! | [`facts`] | what is known of it, each fact declared once |
+//! | [`mod@facts`] | what is known of it, each fact declared once |
 //! | [`companion`] | what runs beside it and asks it things |
 
 /// Makes errors of other parts into those of one.
