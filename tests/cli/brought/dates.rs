@@ -150,7 +150,7 @@ fn a_form_that_is_given_and_fits_few_or_fewer_than_another_is_refused_with_that_
     for (form, cure) in [
         ("%d|%m|%Y %H:%M:%S", "--time-format \"%d|%m|%Y %H:%M:%S\""),
         ("%Y~%m~%d at %H:%M", "--time-format \"%Y~%m~%d at %H:%M\""),
-        ("", "no form with --time-format fits them all"),
+        ("", "no form of --time-format fits them all"),
     ] {
         let log = match form {
             "" => in_shifts(&scratch, (MARCH, 20), &|at| {

@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
 
 use super::prediction_error::PredictionErrors;
 use super::{Observer, ServiceEvent};
@@ -57,8 +56,7 @@ impl Watcher {
 
 impl Observer for Watcher {
     fn event(&mut self, event: &ServiceEvent) {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-        let host_time_s = now.map_or(0.0, |of| of.as_secs_f64());
+        let host_time_s = crate::host::now().map_or(0.0, |of| of.as_ns() as f64 / 1e9);
         let mut seen = self.seen();
         for (is_fault, message) in event.messages(false) {
             *seen.counts.entry(message.name()).or_default() += message.count();
