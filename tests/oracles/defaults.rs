@@ -121,11 +121,9 @@ fn text(machine: &Machine, kinds: &[&Kind]) -> String {
         text += &node(machine, kind);
     }
     text += "[outputs]\n";
-    // The outputs that a graph has are taken over.
-    for (nth, kind) in kinds.iter().enumerate() {
-        let node = format!("default-{}", kind.name);
-        let name = machine.outputs.get(nth).copied().unwrap_or(&node);
-        text += &format!("{name} = \"{node}\"\n");
+    // The outputs that a graph has are taken over; the others are scored on the instants that they have in common.
+    for (name, kind) in machine.outputs.iter().zip(kinds) {
+        text += &format!("{name} = \"default-{}\"\n", kind.name);
     }
     text
 }

@@ -99,10 +99,14 @@ fn geometric_mean(values: impl IntoIterator<Item = f64>) -> f64 {
     (logs.iter().sum::<f64>() / logs.len() as f64).exp()
 }
 
-/// The starter with a ridge on the features of each output, and with what predicts zero.
+/// The starter with a ridge on the features of each output, and with what predicts zero. Neither is put out, so that all are scored on
+/// the instants that they have in common.
 fn with_ridge(starter: &str) -> String {
     let graph: toml::Table = toml::from_str(starter).unwrap();
-    let mut text = starter.to_owned();
+    let drift = graph["nodes"]["now"]["inputs"]["drift"].as_str().unwrap();
+    let drift = drift.trim_end_matches(".{axis}");
+    let (body, _) = starter.rsplit_once("[outputs]").unwrap();
+    let mut text = format!("{body}[outputs]\ndrift = \"{drift}\"\n");
     for output in ["now", "next"] {
         let node = &graph["nodes"][output];
         let each = node.get("each").map_or("", |_| "each = \"axis\"\n");
