@@ -2,7 +2,7 @@
 //! how good a graph must be beyond that.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::workbench::{Scratch, athermal, data, graph, graphs, simulated};
 use athermal::Model;
@@ -12,6 +12,17 @@ use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::score::trace;
 use serde_json::Value;
+
+/// A graph that puts out its truth in place of these outputs: all of its predictions are then scored on the instants that they have in
+/// common, as `compare` does.
+pub fn scored_together(scratch: &Scratch, graph: &Path, outputs: &[&str], truth: &str) -> PathBuf {
+    let removed = outputs.iter().map(|of| format!("outputs.{of} = false\n"));
+    let removed: String = removed.collect();
+    let text = format!(
+        "schema = 1\nextends = {graph:?}\ntests = []\n{removed}outputs.measured = \"{truth}\"\n"
+    );
+    scratch.file("together.toml", text)
+}
 
 /// Kinds that predict the same whatever was measured: baselines, which others are measured by.
 const BASELINES: [&str; 2] = ["zero", "persistence"];
@@ -74,15 +85,8 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
     );
     // Alone, a graph's figures are those of `evaluate`.
     let model = scratch.path("model.json");
-    athermal(&[
-        &"fit",
-        &graph("die-tester"),
-        &"--data",
-        &train,
-        &"-o",
-        &model,
-    ])
-    .ended(0);
+    let voters = scored_together(&scratch, &graph("die-tester"), &["predicted"], "drift");
+    athermal(&[&"fit", &voters, &"--data", &train, &"-o", &model]).ended(0);
     let scores = athermal(&[&"evaluate", &model, &"--data", &test, &"--format", &"json"]);
     let scores = scores.ended(0).json();
     for score in scores["scores"].as_array().unwrap() {
@@ -95,10 +99,6 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
             score["node"].as_str().unwrap(),
             column,
         );
-        // What is put out is scored wherever it is, and compared where all are.
-        if score["own_instants"] == true {
-            continue;
-        }
         assert!((rmse / score["rmse"].as_f64().unwrap() - 1.0).abs() < 1e-12);
         let truth = &first["truths"][column];
         for key in ["baseline_zero", "baseline_persistence"] {
@@ -436,7 +436,8 @@ predicted = "side"
     );
     let graph = scratch.file("several.toml", text);
     let model = scratch.path("model.json");
-    athermal(&[&"fit", &graph, &"--data", &log, &"-o", &model]).ended(0);
+    let voters = scored_together(&scratch, &graph, &["thermal", "predicted"], "drift");
+    athermal(&[&"fit", &voters, &"--data", &log, &"-o", &model]).ended(0);
     let scores = athermal(&[&"evaluate", &model, &"--data", &log, &"--format", &"json"]);
     let scores = scores.ended(0).json();
     let compared = |format: &str| {
@@ -464,9 +465,6 @@ predicted = "side"
             let mut scores = scores["scores"].as_array().unwrap().iter();
             let output = format!("{}.{channel}", row["node"].as_str().unwrap());
             let score = scores.find(|of| of["output"] == *output);
-            if score.unwrap()["own_instants"] == true {
-                continue;
-            }
             let (found, expected) = (&row["rmse"][nth], &score.unwrap()["rmse"]);
             assert!((found.as_f64().unwrap() / expected.as_f64().unwrap() - 1.0).abs() < 1e-12);
         }
