@@ -177,6 +177,8 @@ pub fn exit(mut error: clap::Error, words: &[OsString]) -> ! {
     if error.use_stderr()
         && let Some(call) = meant(words)
     {
+        // `train` is not `retrain`.
+        error.remove(ContextKind::SuggestedSubcommand);
         let tip = vec![StyledStr::from(format!("`{call}`"))];
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tip));
     }

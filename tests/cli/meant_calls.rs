@@ -109,6 +109,7 @@ fn what_stands_in_the_place_of_another_is_named_with_the_call_that_was_meant() {
         ("init log.csv -o out", [folder, "--output"]),
     ] {
         let told = refused(&scratch, call);
+        assert!(!told.contains("similar subcommand"), "{call}: {told}");
         for part in parts {
             assert!(told.contains(part), "{call}: no `{part}` in\n{told}");
         }

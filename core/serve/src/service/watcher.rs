@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::prediction_error::PredictionErrors;
 use super::{Observer, ServiceEvent};
-use crate::compile::Plan;
-use crate::compile::PlannedRole::Estimator;
+use crate::compile::{Plan, PlannedRole};
 use crate::engine::Engine;
 use crate::event::Event as _;
 use crate::message::Message;
@@ -35,6 +34,8 @@ pub struct Seen {
     pub errors: PredictionErrors,
     /// The novelty of each estimator that gives one, by its name.
     pub novelty: Vec<(String, f64)>,
+    /// The slots of these.
+    novelty_slots: Vec<usize>,
 }
 
 /// The last ticks of each output, of graphs before included.
@@ -69,18 +70,26 @@ impl Observer for Watcher {
 
     fn tick(&mut self, at: Instant, engine: &Engine) {
         let seen = &mut *self.seen();
+        let plan = engine.plan();
+        if !seen
+            .last
+            .plan
+            .as_ref()
+            .is_some_and(|of| Arc::ptr_eq(of, plan))
+        {
+            seen.last.follow(plan);
+            (seen.novelty, seen.novelty_slots) = novelties(plan).unzip();
+        }
         seen.last.tick(at, engine);
         seen.errors.look(at, engine);
-        look_at_novelty(&mut seen.novelty, engine);
+        for ((_, value), slot) in seen.novelty.iter_mut().zip(&seen.novelty_slots) {
+            *value = engine.value(*slot);
+        }
     }
 }
 
 impl LastTicks {
     fn tick(&mut self, at: Instant, engine: &Engine) {
-        let plan = engine.plan();
-        if !self.plan.as_ref().is_some_and(|of| Arc::ptr_eq(of, plan)) {
-            self.follow(plan);
-        }
         let room = (self.ticks.len() == TICKS).then(|| self.ticks.pop_front());
         let mut values = room.flatten().map_or_else(Vec::new, |(_, values)| values);
         values.clear();
@@ -102,24 +111,10 @@ impl LastTicks {
     }
 }
 
-fn look_at_novelty(novelty: &mut Vec<(String, f64)>, engine: &Engine) {
-    let nodes = engine.plan().nodes.iter();
-    let given = nodes.filter_map(|node| match &node.role {
-        Estimator {
-            novelty: Some(slot),
-            ..
-        } => Some((node, *slot)),
+/// The estimators of a graph that give a novelty, without it, and where it stands.
+fn novelties(plan: &Plan) -> impl Iterator<Item = ((String, f64), usize)> + '_ {
+    plan.nodes.iter().filter_map(|node| match &node.role {
+        PlannedRole::Estimator { novelty, .. } => Some(((node.instance(), f64::NAN), (*novelty)?)),
         _ => None,
-    });
-    let mut count = 0;
-    for (nth, (node, slot)) in given.enumerate() {
-        count = nth + 1;
-        let value = engine.value(slot);
-        match novelty.get_mut(nth) {
-            Some((name, known)) if *name == node.instance() => *known = value,
-            Some(place) => *place = (node.instance(), value),
-            None => novelty.push((node.instance(), value)),
-        }
-    }
-    novelty.truncate(count);
+    })
 }
