@@ -16,7 +16,8 @@ use crate::time::{Duration, Instant};
 /// How often is looked whether a checkpoint has been saved, or can be.
 const LOOK: Wait = Wait::from_millis(100);
 
-/// Takes checkpoints from the replica, so that the engine thread never serialises.
+/// Takes checkpoints from the replica, so that the engine thread never serialises; where there is none, from a copy that it hands out in
+/// a moment in which nothing is due.
 #[derive(Debug)]
 pub struct Keeper {
     control: Control,
@@ -73,17 +74,22 @@ impl Keeper {
     /// When it cannot be written. It is tried again after `every`.
     pub fn pump(&mut self) -> Result<Vec<Notice>, CheckpointError> {
         let notices = self.control.pump();
-        if self.waiting.is_none() && self.taken.elapsed() >= self.every {
+        // Where there is no replica, it is there soon.
+        if self.is_due() && self.control.needs_replica() {
             self.take();
         }
         self.save()?;
         Ok(notices)
     }
 
+    fn is_due(&self) -> bool {
+        self.waiting.is_none() && self.taken.elapsed() >= self.every
+    }
+
     /// How long nothing is due for [`pump`](Self::pump), where nothing is stepped.
     #[must_use]
     pub fn due(&self) -> Wait {
-        match self.waiting.is_none() && self.saving.is_free() {
+        match self.waiting.is_none() && self.saving.is_free() && !self.is_due() {
             true => self.every.saturating_sub(self.taken.elapsed()),
             false => LOOK,
         }
@@ -221,7 +227,7 @@ impl Keeper {
     }
 }
 
-/// What a graph keeps of the past: what runs, and its copy on the control thread.
+/// What a graph keeps of the past. While something needs a copy of it, that keeps as much again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
     /// How many bytes that is, as a checkpoint has them.
@@ -248,11 +254,7 @@ impl Held {
         // What an earlier run kept came at this rate too, as far as is known.
         let span = Duration::from_secs_f64(tick as f64 / rate).unwrap_or(Duration::MAX);
         let (bytes, full) = state.held(engine.plan(), span);
-        Some(Self {
-            bytes: 2 * bytes,
-            full: 2 * full,
-            rate,
-        })
+        Some(Self { bytes, full, rate })
     }
 }
 

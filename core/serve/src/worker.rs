@@ -116,9 +116,16 @@ impl Worker {
         self.went_back.take()
     }
 
-    /// Makes the replica anew where ticks could not be mirrored. It takes as long as a checkpoint: for a moment in which nothing is due.
-    pub fn mirror_again(&mut self) {
-        self.stepper.mirror_again();
+    /// Whether the control thread asks for a copy of what runs.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.stepper.is_asked()
+    }
+
+    /// Sends the control thread a copy of what runs, where it asks for one. It takes as long as a checkpoint: for a moment in which
+    /// nothing is due.
+    pub fn mirror(&mut self) {
+        self.stepper.mirror();
     }
 
     /// Steps all that waits, without waiting any longer. For the end of all sources.

@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use athermal_core::compile::Plan;
-use athermal_core::engine::Engine;
 use athermal_core::event::Event as _;
 use athermal_core::time::Instant;
+use athermal_run::live::TickView;
 use athermal_serve::facts::EventFacts;
 use athermal_serve::service::{Observer, ServiceEvent};
 use athermal_serve::{facts, register_facts};
@@ -128,18 +128,25 @@ impl Observer for Looker {
         }
     }
 
-    fn tick(&mut self, at: Instant, engine: &Engine) {
+    fn tick(&mut self, tick: &TickView<'_>) {
+        let Some(engine) = tick.engine else {
+            return;
+        };
         self.0.inner().send(|| {
-            let plan = Arc::clone(engine.plan());
+            let plan = Arc::clone(tick.plan);
             Item::Tick(Tick {
-                at,
-                revision: engine.revision().to_owned(),
-                outputs: engine.outputs().to_vec(),
+                at: tick.at,
+                revision: tick.revision.to_owned(),
+                outputs: tick.outputs.to_vec(),
                 values: (0..plan.channels.len())
                     .map(|slot| engine.value(slot))
                     .collect(),
                 plan,
             })
         });
+    }
+
+    fn looks_inside(&self) -> bool {
+        self.0.inner().listening() > 0
     }
 }

@@ -15,7 +15,7 @@ const PATIENCE: Wait = Wait::from_secs(60);
 
 /// The revision of what runs.
 fn revision(service: &mut Service) -> Option<String> {
-    service.running().map(|of| of.revision().to_owned())
+    service.running().map(|of| of.revision.to_owned())
 }
 
 /// What runs: its revision, and its model where that can be read.

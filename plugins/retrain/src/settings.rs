@@ -5,7 +5,6 @@ use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_core::engine::Engine;
 use athermal_core::time::Duration;
 use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::{ConnectorError, Stop};
@@ -87,7 +86,7 @@ impl Retrain {
     fn retrain(&self, beside: &Beside, stop: &Stop) {
         let frozen = beside
             .handle
-            .ask(PATIENCE, |service| service.running().map(Engine::frozen));
+            .ask(PATIENCE, |service| service.running().map(|of| of.frozen));
         if let Some(reason) = reason_against(frozen) {
             return note(&beside.handle, format!("retrain: {reason}"));
         }

@@ -145,7 +145,7 @@ fn notify(beside: &Beside, stop: &Stop) {
 
 fn line(service: &Service) -> String {
     let snapshot = service.snapshot();
-    let revision = service.running().map_or("none", |of| of.revision());
+    let revision = service.running().map_or("none", |of| of.revision);
     let journal = match service.journal().is_degraded {
         true => ", without a journal",
         false => "",

@@ -4,6 +4,7 @@ mod allocation;
 mod blending;
 mod course;
 mod failures;
+mod mirrored;
 mod model;
 mod planted;
 mod properties;

@@ -6,6 +6,7 @@ mod watching;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -14,6 +15,7 @@ use super::notice::Notice;
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
+use super::tick_view::TickView;
 use super::{LiveOptions, StageError, Stepper};
 use crate::compile::Plan;
 use crate::diagnostic::panic_text;
@@ -32,10 +34,21 @@ pub struct Control {
     ticks: Consumer<f64>,
     departing: Producer<Box<LiveEngine>>,
     returning: Consumer<Box<LiveEngine>>,
-    /// What runs, to the same bits; none after ticks have been missed.
+    /// What runs, to the same bits: for as long as something needs it, and not after ticks have been missed.
     replica: Option<LiveEngine>,
-    /// The plan of what runs.
+    /// Whether something has needed it since the last pump.
+    is_needed: bool,
+    /// Whether ticks were missed, and no copy of what runs has come since.
+    is_lost: bool,
+    /// Asks the engine thread for a copy of what runs.
+    is_asked: Arc<AtomicBool>,
+    /// The plan of what runs, its revision, and the slots of it that are mirrored.
     running: Arc<Plan>,
+    revision: String,
+    shown: Arc<[usize]>,
+    /// The nodes that were given up, as far as they are known here, and how many there are.
+    given_up: Vec<String>,
+    given_up_there: usize,
     retained: Retained,
     staged: Option<Staged>,
     /// What has been committed, until the engine thread has taken it over or sent it back.
@@ -57,7 +70,18 @@ pub struct Control {
     watching: Watching,
 }
 
-type Look = Box<dyn FnMut(Instant, &Engine) + Send>;
+/// What runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Running<'a> {
+    /// Its plan.
+    pub plan: &'a Arc<Plan>,
+    /// Its revision.
+    pub revision: &'a str,
+    /// Whether learning is frozen on command.
+    pub frozen: bool,
+}
+
+type Look = Box<dyn FnMut(&TickView<'_>) + Send>;
 
 /// The graph before the last swap, kept warm for a while yet.
 struct Previous {
@@ -71,6 +95,7 @@ struct Committed {
     live: Option<LiveEngine>,
     revision: String,
     plan: Arc<Plan>,
+    shown: Arc<[usize]>,
     origin: Origin,
 }
 
@@ -106,21 +131,31 @@ pub(super) fn pair(
     let feed: Arc<[Feed]> = feed.into();
     let seat =
         |engine| LiveEngine::new(engine, &feed, 0).expect("the feed has all channels of the plan");
-    let record = feed.len() + Mark::WIDTH;
+    let live = seat(engine);
+    let record = Mark::WIDTH + feed.len() + running.outputs.len() + live.shown.len();
     let (mirror, ticks) = RingBuffer::new(options.mirrored.max(1) * record);
     let (departing, arriving) = RingBuffer::new(ON_THE_WAY);
     let (leaving, returning) = RingBuffer::new(ON_THE_WAY);
-    let frozen = engine.frozen();
-    let stepper = Stepper::new(seat(engine), Arc::clone(&feed), mirror, arriving, leaving);
+    let (frozen, revision) = (live.engine.frozen(), live.revision.clone());
+    let (shown, is_asked) = (Arc::clone(&live.shown), Arc::<AtomicBool>::default());
+    let ends = (arriving, leaving);
+    let stepper = Stepper::new(live, Arc::clone(&feed), mirror, ends, Arc::clone(&is_asked));
     let span = options.retain.max(running.warm_up);
     let control = Control {
         retained: Retained::new(feed.len(), span, options.memory),
-        row: vec![f64::NAN; record],
+        row: Vec::new(),
         notices: Vec::new(),
         look: None,
         watching: Watching::default(),
         replica: Some(seat(replica)),
+        is_needed: true,
+        is_lost: false,
+        is_asked,
         running,
+        revision,
+        shown,
+        given_up: Vec::new(),
+        given_up_there: 0,
         options,
         feed,
         ticks,
@@ -144,11 +179,34 @@ impl Control {
     /// Call it often enough that the ring does not fill: at least once in so many ticks.
     pub fn pump(&mut self) -> Vec<Notice> {
         self.catch_up();
+        let is_kept = self.options.mirrors
+            || self.is_lost
+            || std::mem::take(&mut self.is_needed)
+            || self.staged.is_some()
+            || self.committed.is_some()
+            || self.previous.is_some()
+            || self.watching.looks_inside()
+            || self.given_up.len() < self.given_up_there;
+        if !is_kept {
+            self.replica = None;
+        }
+        self.is_asked
+            .store(is_kept && self.replica.is_none(), Ordering::Relaxed);
         std::mem::take(&mut self.notices)
     }
 
-    /// From now on `look` sees each tick, and what runs as it is after it. Ticks that are missed are not seen.
-    pub fn look_on(&mut self, look: impl FnMut(Instant, &Engine) + Send + 'static) {
+    /// Asks for the replica, until the next [`pump`](Self::pump) but one: whether it is there. Until then the engine thread is to
+    /// [`mirror`](Stepper::mirror) what runs.
+    pub fn needs_replica(&mut self) -> bool {
+        self.is_needed = true;
+        self.catch_up();
+        self.is_asked
+            .store(self.replica.is_none(), Ordering::Relaxed);
+        self.replica.is_some()
+    }
+
+    /// From now on `look` sees each tick. Ticks that are missed are not seen.
+    pub fn look_on(&mut self, look: impl FnMut(&TickView<'_>) + Send + 'static) {
         self.look = Some(Box::new(look));
     }
 
@@ -156,14 +214,11 @@ impl Control {
     fn catch_up(&mut self) {
         let mut notices = std::mem::take(&mut self.notices);
         for _ in 0..self.options.mirrored.max(1) {
-            let Ok(chunk) = self.ticks.read_chunk(self.row.len()) else {
+            let mut mark = [f64::NAN; Mark::WIDTH];
+            if self.ticks.pop_entire_slice(&mut mark).is_err() {
                 break;
-            };
-            let (first, second) = chunk.as_slices();
-            self.row[..first.len()].copy_from_slice(first);
-            self.row[first.len()..].copy_from_slice(second);
-            chunk.commit_all();
-            self.take_in(&mut notices);
+            }
+            self.take_in(Mark::read(mark), &mut notices);
         }
         self.take_back(&mut notices);
         self.take_copy_at_rest(&mut notices);
@@ -175,13 +230,17 @@ impl Control {
     /// With `carry_learned`, what was learned of an estimator is carried although it has been fitted anew.
     ///
     /// # Errors
-    /// When it cannot take over, or another graph is on its way; what runs, and what was staged before, is untouched.
+    /// When it cannot take over, another graph is on its way, or there is no [replica](Self::needs_replica) yet; what runs, and what was
+    /// staged before, is untouched.
     pub fn stage(&mut self, model: &Model, carry_learned: bool) -> Result<&Staged, StageError> {
         self.catch_up();
         if self.committed.is_some() {
             return Err(StageError::Busy);
         }
         StageError::between(&self.running, &model.plan).map_or(Ok(()), Err)?;
+        if !self.needs_replica() && !self.is_lost {
+            return Err(StageError::NoCopy);
+        }
         // What runs goes on whatever the code of a node does to what is being made.
         let made = catch_unwind(AssertUnwindSafe(|| self.made_ready(model, carry_learned)));
         let staged = made.unwrap_or_else(|panic| {
@@ -315,10 +374,26 @@ impl Control {
         Ok(())
     }
 
-    /// The graph that runs, to the same bits; none after ticks have been missed.
+    /// The graph that runs, to the same bits; none while nothing needs it, and after ticks have been missed.
     #[must_use]
     pub fn replica(&self) -> Option<&Engine> {
         self.replica.as_ref().map(|replica| &replica.engine)
+    }
+
+    /// What runs, after the ticks that have been taken in; none after ticks have been missed.
+    #[must_use]
+    pub fn running(&self) -> Option<Running<'_>> {
+        (!self.is_lost).then_some(Running {
+            plan: &self.running,
+            revision: &self.revision,
+            frozen: self.frozen,
+        })
+    }
+
+    /// The nodes of what runs that were given up, in the order of their panics, and why.
+    #[must_use]
+    pub fn given_up(&self) -> &[String] {
+        &self.given_up
     }
 
     /// How many ticks, segment breaks and freezes have been taken in: the replica is that of the running graph after so many.
@@ -374,15 +449,17 @@ impl Control {
     }
 
     /// Does to the engines here what an event did on the engine thread.
-    fn take_in(&mut self, notices: &mut Vec<Notice>) {
-        let row = std::mem::take(&mut self.row);
-        self.take_in_row(&row, notices);
+    fn take_in(&mut self, mark: Mark, notices: &mut Vec<Notice>) {
+        let mut row = std::mem::take(&mut self.row);
+        row.resize(mark.width as usize, f64::NAN);
+        // It was put there together with its mark.
+        if self.ticks.pop_entire_slice(&mut row).is_ok() {
+            self.take_in_row(mark, &row, notices);
+        }
         self.row = row;
     }
 
-    fn take_in_row(&mut self, row: &[f64], notices: &mut Vec<Notice>) {
-        let (mark, samples) = row.split_at(Mark::WIDTH);
-        let mark = Mark::read([mark[0], mark[1], mark[2], mark[3]]);
+    fn take_in_row(&mut self, mark: Mark, row: &[f64], notices: &mut Vec<Notice>) {
         let missed = mark.event - self.event - 1;
         if missed > 0 {
             self.lose(missed, notices);
@@ -396,7 +473,7 @@ impl Control {
         match mark.what {
             Happening::Break => self.segment(),
             Happening::Freeze(frozen) => self.freeze(frozen),
-            Happening::Tick(time) => self.tick(mark, time, samples, notices),
+            Happening::Tick(time) => self.tick(mark, time, row, notices),
         }
     }
 
@@ -419,7 +496,8 @@ impl Control {
         self.for_all(|live| live.freeze(frozen));
     }
 
-    fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {
+    fn tick(&mut self, mark: Mark, time: Instant, row: &[f64], notices: &mut Vec<Notice>) {
+        let (samples, made) = row.split_at(self.feed.len());
         let elapsed = self.last.map_or(Duration::ZERO, |last| time - last);
         self.last = Some(time);
         self.watching.row(time, samples);
@@ -438,16 +516,36 @@ impl Control {
             let _ = live.step(time, samples);
         });
         self.retained.push(time, samples);
-        if let Some(replica) = &self.replica {
-            self.watching.stepped(time, replica);
-            if let Some(look) = &mut self.look {
-                look(time, &replica.engine);
-            }
+        self.given_up_there = mark.given_up as usize;
+        self.find_given_up();
+        let (outputs, values) = made.split_at(self.running.outputs.len());
+        let view = TickView {
+            at: time,
+            revision: &self.revision,
+            plan: &self.running,
+            outputs,
+            engine: self.replica.as_ref().map(|of| &of.engine),
+            shown: &self.shown,
+            values,
+        };
+        self.watching.stepped(&view);
+        if let Some(look) = &mut self.look {
+            look(&view);
         }
         if let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica)
             && let Some(shadow) = &mut staged.shadow
         {
             shadow.look(&replica.engine, &staged.live.engine, time, elapsed);
+        }
+    }
+
+    /// Finds out which nodes were given up, where what runs is known as it is.
+    fn find_given_up(&mut self) {
+        if let Some(replica) = &self.replica
+            && replica.engine.panics().len() > self.given_up.len()
+        {
+            let panics = replica.engine.panics().iter();
+            self.given_up = panics.map(ToString::to_string).collect();
         }
     }
 
@@ -470,6 +568,7 @@ impl Control {
             live,
             revision,
             plan,
+            shown,
             ..
         }) = self.committed.take()
         else {
@@ -484,12 +583,14 @@ impl Control {
                 .filter(|returned| returned.event + 1 == mark.event)
         });
         notices.push(Notice::TookOver {
-            revision,
+            revision: revision.clone(),
             tick: mark.tick,
             time,
         });
         self.retained.keep(self.options.retain.max(plan.warm_up));
-        self.running = plan;
+        (self.running, self.revision, self.shown) = (plan, revision, shown);
+        self.given_up.clear();
+        self.is_lost |= live.is_none() && copy.is_none();
         self.replica = copy;
         if let (Some(mut live), Some(old)) = (live, old) {
             live.take_over(&old.engine);
@@ -540,6 +641,7 @@ impl Control {
     fn lose(&mut self, ticks: u64, notices: &mut Vec<Notice>) {
         notices.push(Notice::Missed { ticks });
         self.last = None;
+        self.is_lost = true;
         self.replica = None;
         self.staged = None;
         self.previous = None;
@@ -556,6 +658,7 @@ impl Committed {
         Self {
             revision: live.revision.clone(),
             plan: Arc::clone(live.engine.plan()),
+            shown: Arc::clone(&live.shown),
             live: Some(live),
             origin,
         }

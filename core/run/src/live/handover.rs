@@ -1,5 +1,8 @@
 //! Decides what passes between the engine thread and the control thread: ticks one way, engines both ways.
 
+use std::sync::Arc;
+
+use super::tick_view::shown;
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
@@ -45,6 +48,8 @@ pub(super) struct LiveEngine {
     pub(super) outputs: Vec<Option<usize>>,
     /// The number of the event up to which the engine has been taken.
     pub(super) event: u64,
+    /// The slots that are mirrored with each tick.
+    pub(super) shown: Arc<[usize]>,
     /// Where samples lay in its fit, as far as the control thread knows it.
     pub(super) usual: Vec<SampleRange>,
     /// Whether it was sent back without having taken over.
@@ -73,6 +78,7 @@ impl LiveEngine {
             places: places.into_iter().flatten().collect(),
             outputs: vec![None; engine.plan().outputs.len()],
             event,
+            shown: shown(engine.plan()),
             usual: Vec::new(),
             refused: false,
             is_replica: false,
@@ -163,7 +169,7 @@ impl Happening {
     }
 }
 
-/// What is mirrored of a happening beside the samples.
+/// What is mirrored of a happening before the samples and what came of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Mark {
     /// What happened.
@@ -174,25 +180,39 @@ pub(super) struct Mark {
     pub(super) tick: u64,
     /// How many hand-overs there have been.
     pub(super) generation: u64,
+    /// How many nodes have been given up.
+    pub(super) given_up: u64,
+    /// How many numbers follow: samples and what came of them.
+    pub(super) width: u64,
 }
 
 impl Mark {
     /// How many numbers a mark takes.
-    pub(super) const WIDTH: usize = 4;
+    pub(super) const WIDTH: usize = 6;
 
     /// The mark as numbers: their bits carry integers, none of which is rounded.
     pub(super) fn write(self) -> [f64; Self::WIDTH] {
-        let [event, tick, generation] =
-            [self.event, self.tick, self.generation].map(f64::from_bits);
-        [self.what.write(), event, tick, generation]
+        let Self {
+            event,
+            tick,
+            generation,
+            given_up,
+            width,
+            ..
+        } = self;
+        let what = self.what.write().to_bits();
+        [what, event, tick, generation, given_up, width].map(f64::from_bits)
     }
 
-    pub(super) fn read([what, event, tick, generation]: [f64; Self::WIDTH]) -> Self {
+    pub(super) fn read(numbers: [f64; Self::WIDTH]) -> Self {
+        let [_, event, tick, generation, given_up, width] = numbers.map(f64::to_bits);
         Self {
-            what: Happening::read(what),
-            event: event.to_bits(),
-            tick: tick.to_bits(),
-            generation: generation.to_bits(),
+            what: Happening::read(numbers[0]),
+            event,
+            tick,
+            generation,
+            given_up,
+            width,
         }
     }
 }
@@ -218,6 +238,8 @@ mod tests {
                 event: u64::MAX,
                 tick: u64::MAX - 1,
                 generation: 7,
+                given_up: 1,
+                width: 40,
             };
             assert_eq!(Mark::read(mark.write()), mark);
         }

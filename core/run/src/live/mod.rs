@@ -28,8 +28,9 @@ mod stage_error;
 mod staged;
 mod stepper;
 pub mod store;
+mod tick_view;
 
-pub use control::Control;
+pub use control::{Control, Running};
 pub use handover::Feed;
 pub use notice::Notice;
 pub use refit::Refit;
@@ -41,6 +42,7 @@ pub use stage_error::StageError;
 pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};
 pub use store::{StateError, StateStore};
+pub use tick_view::{Slots, TickView};
 
 use std::sync::Arc;
 
@@ -59,6 +61,8 @@ pub struct LiveOptions {
     pub memory: usize,
     /// How long a replaced graph is kept warm, so that it can be taken back.
     pub keep_warm: Duration,
+    /// Whether there is a replica all the time, and not only while something needs it.
+    pub mirrors: bool,
     /// Whether a node that panics is given up, so that the graph goes on without it.
     pub isolates: bool,
     /// Channels that samples are given for, beyond those that the graph reads: what later graphs may read.
@@ -72,6 +76,7 @@ impl Default for LiveOptions {
             retain: Duration::from_ns(3_600_000_000_000),
             memory: 256 << 20,
             keep_warm: Duration::from_ns(3_600_000_000_000),
+            mirrors: true,
             isolates: false,
             channels: Vec::new(),
         }

@@ -44,6 +44,8 @@ pub enum StageError {
     NothingToTakeBack,
     /// Ticks were missed, so that what runs is not known here.
     NotMirrored,
+    /// What runs has not been copied in time.
+    NoCopy,
     /// A node does not take its own state back, so that the graph cannot be copied to the engine thread.
     NotCopied(RestoreError),
     /// Another graph has been committed and not yet taken over.
@@ -104,6 +106,10 @@ impl fmt::Display for StageError {
             Self::NotMirrored => write!(
                 f,
                 "ticks were missed, so that there is nothing to compare with: commit without a comparison"
+            ),
+            Self::NoCopy => write!(
+                f,
+                "what runs could not be copied in time, since there is no pause between its ticks: try again"
             ),
             Self::NotCopied(error) => write!(f, "the new graph cannot be handed over: {error}"),
             Self::Busy => write!(

@@ -2,10 +2,12 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use rtrb::{Consumer, Producer};
 
 use super::handover::{Feed, Happening, LiveEngine, Mark};
+use super::tick_view::values;
 use crate::compile::Plan;
 use crate::engine::EngineError;
 use crate::time::Instant;
@@ -28,8 +30,8 @@ pub struct Stepper {
     tick: u64,
     generation: u64,
     missed: u64,
-    /// Whether something has been missed since the replica was made.
-    is_lost: bool,
+    /// Whether the control thread asks for a copy of what runs.
+    is_asked: Arc<AtomicBool>,
 }
 
 /// What came of a tick.
@@ -50,8 +52,8 @@ impl Stepper {
         live: LiveEngine,
         feed: Arc<[Feed]>,
         ticks: Producer<f64>,
-        arriving: Consumer<Box<LiveEngine>>,
-        leaving: Producer<Box<LiveEngine>>,
+        (arriving, leaving): (Consumer<Box<LiveEngine>>, Producer<Box<LiveEngine>>),
+        is_asked: Arc<AtomicBool>,
     ) -> Self {
         let width = feed.len() + 1;
         Self {
@@ -66,7 +68,7 @@ impl Stepper {
             tick: 0,
             generation: 0,
             missed: 0,
-            is_lost: false,
+            is_asked,
         }
     }
 
@@ -88,16 +90,22 @@ impl Stepper {
         self.ticks.slots() < self.ticks.buffer().capacity() / 2
     }
 
-    /// Sends the control thread a copy of what runs, where it has missed something and there is room for what follows. It takes as long
-    /// as a snapshot, and asks for memory: for a moment in which nothing is due. True where it was sent.
-    pub fn mirror_again(&mut self) -> bool {
+    /// Whether the control thread asks for a copy of what runs: [`mirror`](Self::mirror) sends one.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.is_asked.load(Ordering::Relaxed)
+    }
+
+    /// Sends the control thread a copy of what runs, where it asks for one and there is room for what follows. It takes as long as a
+    /// snapshot, and asks for memory: for a moment in which nothing is due. True where it was sent.
+    pub fn mirror(&mut self) -> bool {
         let LiveEngine { engine, places, .. } = &*self.live;
         let can_copy = !self.leaving.is_full();
-        if !self.is_lost || self.is_crowded() || !can_copy {
+        if !self.is_asked() || self.is_crowded() || !can_copy {
             return false;
         }
         // One that cannot be copied now is not tried again at each turn.
-        self.is_lost = false;
+        self.is_asked.store(false, Ordering::Relaxed);
         let twin = catch_unwind(AssertUnwindSafe(|| engine.twin()));
         let Ok(Ok(engine)) = twin else {
             return false;
@@ -108,6 +116,7 @@ impl Stepper {
             places: places.clone(),
             outputs: self.live.outputs.clone(),
             event: self.event,
+            shown: Arc::clone(&self.live.shown),
             usual: Vec::new(),
             refused: false,
             is_replica: true,
@@ -197,8 +206,6 @@ impl Stepper {
         next.take_over(&self.live.engine);
         std::mem::swap(&mut self.live, next);
         self.generation += 1;
-        // Of one that was committed before something was missed the control thread has nothing.
-        self.is_lost |= self.missed > 0;
         self.release();
     }
 
@@ -226,33 +233,34 @@ impl Stepper {
         self.recent[row] = what.write();
         self.recent[row + 1..row + 1 + samples.len()].copy_from_slice(samples);
         self.event += 1;
-        self.mirror(what, samples);
+        self.pass_on(what, samples);
     }
 
-    fn mirror(&mut self, what: Happening, samples: &[f64]) {
-        let width = self.feed.len() + Mark::WIDTH;
+    fn pass_on(&mut self, what: Happening, samples: &[f64]) {
+        let LiveEngine { engine, shown, .. } = &*self.live;
+        let width = match what {
+            Happening::Tick(_) => samples.len() + engine.outputs().len() + shown.len(),
+            Happening::Break | Happening::Freeze(_) => 0,
+        };
         let mark = Mark {
             what,
             event: self.event,
             tick: self.tick,
             generation: self.generation,
+            given_up: engine.panics().len() as u64,
+            width: width as u64,
+        };
+        let Ok(mut chunk) = self.ticks.write_chunk(Mark::WIDTH + width) else {
+            self.missed += 1;
+            return;
+        };
+        let (first, second) = chunk.as_mut_slices();
+        let places = first.iter_mut().chain(second);
+        let numbers = mark.write().into_iter().chain(samples.iter().copied());
+        for (place, number) in places.zip(numbers.chain(values(engine, shown))) {
+            *place = number;
         }
-        .write();
-        match self.ticks.write_chunk(width) {
-            Ok(mut chunk) => {
-                let (first, second) = chunk.as_mut_slices();
-                let places = first.iter_mut().chain(second);
-                let nothing = std::iter::repeat(&f64::NAN);
-                for (place, number) in places.zip(mark.iter().chain(samples).chain(nothing)) {
-                    *place = *number;
-                }
-                chunk.commit_all();
-            }
-            Err(_) => {
-                self.missed += 1;
-                self.is_lost = true;
-            }
-        }
+        chunk.commit_all();
     }
 }
 

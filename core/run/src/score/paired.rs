@@ -1,7 +1,8 @@
 //! Which truth a channel predicts, and how far off it was once that truth is measured.
 
 use crate::compile::{Plan, TruthLink};
-use crate::engine::{Engine, Pairing};
+use crate::engine::Pairing;
+use crate::live::Slots;
 use crate::time::Instant;
 
 /// The truth that a channel predicts; none where it predicts none, or where nothing says how old a prediction of it may be.
@@ -35,9 +36,9 @@ impl PairedPrediction {
     }
 
     /// Looks at a tick: by how much what had been predicted for this truth is off; NaN where there is no truth, or nothing was predicted.
-    pub fn error(&mut self, engine: &Engine, now: Instant, truth: f64) -> f64 {
-        if engine.ran(self.slot) {
-            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
+    pub fn error(&mut self, at: &impl Slots, now: Instant, truth: f64) -> f64 {
+        if at.ran(self.slot) {
+            self.pairing.run(now, [&[at.value(self.slot)][..]]);
         }
         let pair = (!truth.is_nan()).then(|| self.pairing.truth(now)).flatten();
         pair.map_or(f64::NAN, |pair| pair.row[0] - truth)

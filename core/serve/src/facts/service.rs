@@ -9,9 +9,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{Counts, Known, Reasons, Sections, words};
-use crate::compile::{PlannedNode, PlannedOutput};
+use crate::compile::{Plan, PlannedNode, PlannedOutput};
 use crate::connector::{Connection, SourceCounts};
-use crate::engine::{Engine, NodeCarry};
+use crate::engine::NodeCarry;
 use crate::journal::JournalStatus;
 use crate::message::Message;
 use crate::service::{ChannelSamples, Held, Seen, Service, SinkCounts, Snapshot};
@@ -30,11 +30,10 @@ impl<'a> Look<'a> {
     /// Looks at a service.
     #[must_use]
     pub fn at(service: &'a Service) -> Self {
-        let panics = service.running().map_or(&[][..], Engine::panics);
         Self {
             snapshot: service.snapshot(),
             journal: service.journal(),
-            panics: panics.iter().map(ToString::to_string).collect(),
+            panics: service.given_up().to_vec(),
             service,
         }
     }
@@ -79,7 +78,7 @@ crate::facts! {
         /// Time since the service started.
         uptime_s: f64 [gauge "athermal_uptime_seconds"] = of.service.uptime().as_secs_f64();
         /// The revision of the graph that runs; `null` after ticks were missed.
-        revision: Option<String> [info "athermal_graph_info"] = revision(of.service.running());
+        revision: Option<String> [info "athermal_graph_info"] = of.service.running().map(|of| of.revision.to_owned());
         /// When the model that runs was fitted.
         fitted_s: Option<f64> [gauge "athermal_model_fitted_timestamp_seconds"] = of.service.fitted_s();
         /// Ticks that samples made since the service started.
@@ -101,10 +100,10 @@ crate::facts! {
         host_clock_synchronised: bool = of.snapshot.is_synchronised;
         /// How often the engine thread has gone round.
         beat: u64 [counter "athermal_engine_beats_total"] = of.service.beat();
-        /// What the graph and its copy keep of the past at the last checkpoint; `null` before the second one.
+        /// What the graph keeps of the past at the last checkpoint; `null` before the second one.
         held: Option<HeldFacts> [made words::held] = of.service.held().map(|of| HeldFacts::read(&of));
         /// Whether learning is frozen.
-        frozen: Option<bool> [gauge "athermal_learning_frozen"] [line "learning is frozen"] = of.service.running().map(Engine::frozen);
+        frozen: Option<bool> [gauge "athermal_learning_frozen"] [line "learning is frozen"] = of.service.running().map(|of| of.frozen);
         /// The graph that is staged.
         staged: Option<StagedFacts> [gauge "athermal_graph_staged" |of: &Self| Some(f64::from(u8::from(of.staged.is_some())))]
             [line "staged: {staged.revision}"]
@@ -112,7 +111,7 @@ crate::facts! {
         /// What the comparison of the staged graph has come to.
         verdict: Option<Verdict> [made words::verdict] = of.service.verdict();
         /// The revision of the graph that can be taken back.
-        previous: Option<String> [line "can be taken back to {previous}"] = revision(of.service.previous());
+        previous: Option<String> [line "can be taken back to {previous}"] = of.service.previous().map(|of| of.revision().to_owned());
         /// After how many ticks, beats, breaks and freezes the last checkpoint was saved.
         last_checkpoint: u64 = of.service.last_checkpoint();
         /// Ticks, beats, breaks and freezes since the last checkpoint.
@@ -128,7 +127,7 @@ crate::facts! {
         /// The sinks.
         sinks: Vec<SinkFacts> = of.service.sinks().iter().map(|(name, of)| SinkFacts::read(name, of)).collect();
         /// What monitors have found of the graph that runs, as a run reports it.
-        watched: Option<WatchedFacts> = of.service.watched().map(|watch| WatchedFacts::read(watch, of.service.running()));
+        watched: Option<WatchedFacts> = of.service.watched().map(|watch| WatchedFacts::read(watch, of.service));
         /// What companions know.
         companions: Sections = of.service.sections();
         /// How many events there were, by their names.
@@ -140,7 +139,7 @@ crate::facts! {
         };
     }
 
-    /// What a graph and its copy keep of the past.
+    /// What a graph keeps of the past.
     HeldFacts(of: &Held) {
         /// How many bytes, as a checkpoint has them.
         bytes: u64 = of.bytes;
@@ -221,7 +220,7 @@ crate::facts! {
     }
 
     /// What monitors have found.
-    WatchedFacts(watch: &Watch, running: Option<&Engine>) {
+    WatchedFacts(watch: &Watch, service: &Service) {
         /// Warnings about the data and the graph, as the log has them.
         warnings: Vec<WarningFacts> = watch.warnings().map(WarningFacts::read).collect();
         /// Sensors that fail at present.
@@ -232,11 +231,11 @@ crate::facts! {
         no_output: Option<NoOutputFacts>
             [gauge "athermal_no_output" |of: &Self| of.is_known.then(|| f64::from(u8::from(of.no_output.is_some())))]
             [line "no output has had a value in {no_output.ticks} ticks and beats; the first to lack one is {no_output.first_silent}"]
-            = running.and_then(|of| watch.no_output(of)).map(|of| NoOutputFacts::read(of.rows, of.first_silent));
+            = service.replica().and_then(|of| watch.no_output(of)).map(|of| NoOutputFacts::read(of.rows, of.first_silent));
         /// Channels that the correction moves and goes by.
         feeds_back: Vec<String> [gauge "athermal_fed_back_channels"] [made words::feeds_back] = watch.fed_back().to_vec();
         /// Whether it is known what runs.
-        is_known: bool = running.is_some();
+        is_known: bool = service.running().is_some();
     }
 
     /// How often was warned of something.
@@ -329,25 +328,23 @@ crate::facts! {
     /// The outputs.
     OutputsFacts(of: &Look<'_>) {
         /// The outputs of what runs, with their values after the last tick that was taken in.
-        outputs: Vec<OutputFacts> = of.service.running().map_or_else(Vec::new, |engine| {
-            let outputs = engine.plan().outputs.iter().zip(engine.outputs());
-            outputs.map(|(of, value)| OutputFacts::read(of, *value, engine)).collect()
+        outputs: Vec<OutputFacts> = of.service.running().map_or_else(Vec::new, |runs| {
+            let seen = of.service.watcher().seen();
+            let outputs = runs.plan.outputs.iter();
+            outputs.map(|of| OutputFacts::read(of, seen.last.value(&of.name), runs.plan)).collect()
         });
     }
 
     /// An output.
-    OutputFacts(of: &PlannedOutput, value: f64, engine: &Engine) {
+    OutputFacts(of: &PlannedOutput, value: Option<f64>, plan: &Plan) {
         /// Its name.
         output: String = of.name.clone();
         /// The unit of its values.
-        unit: String = engine.plan().channels[of.slot].channel.unit.text().to_owned();
+        unit: String = plan.channels[of.slot].channel.unit.text().to_owned();
         /// The channel that it predicts.
-        predicts: Option<String> = {
-            let channels = &engine.plan().channels;
-            channels[of.slot].predicts.map(|slot| channels[slot].name.clone())
-        };
+        predicts: Option<String> = plan.channels[of.slot].predicts.map(|slot| plan.channels[slot].name.clone());
         /// Its value; `null` where it has none.
-        value: Option<f64> = Some(value).filter(|of| !of.is_nan());
+        value: Option<f64> = value;
     }
 
     /// The last ticks.
@@ -372,24 +369,24 @@ crate::facts! {
     /// The nodes.
     NodesFacts(of: &Look<'_>) {
         /// The nodes of what runs, and what is known of their predictions.
-        nodes: Vec<NodeFacts> = of.service.running().map_or_else(Vec::new, |engine| {
+        nodes: Vec<NodeFacts> = of.service.running().map_or_else(Vec::new, |runs| {
             let seen = of.service.watcher().seen();
-            engine.plan().nodes.iter().map(|node| NodeFacts::read(node, engine, &seen)).collect()
+            runs.plan.nodes.iter().map(|node| NodeFacts::read(node, runs.plan, &seen)).collect()
         });
     }
 
     /// A node.
-    NodeFacts(of: &PlannedNode, engine: &Engine, seen: &Seen) {
+    NodeFacts(of: &PlannedNode, plan: &Plan, seen: &Seen) {
         /// Its name.
         node: String [label] = of.instance();
         /// The channels that it gives.
-        channels: Vec<String> = of.slots.clone().map(|slot| engine.plan().channels[slot].name.clone()).collect();
+        channels: Vec<String> = of.slots.clone().map(|slot| plan.channels[slot].name.clone()).collect();
         /// How far the regressors of an estimator lie outside of those of its fit; above 1 they do.
         novelty: Option<f64> [gauge "athermal_novelty_ratio"]
             = seen.novelty.iter().find(|(name, _)| *name == of.instance()).map(|(_, value)| *value).filter(|of| !of.is_nan());
         /// The errors of its predictions.
         errors: Vec<ErrorFacts> [apart] = {
-            let channel = |name: &str| of.slots.clone().any(|slot| engine.plan().channels[slot].name == name);
+            let channel = |name: &str| of.slots.clone().any(|slot| plan.channels[slot].name == name);
             let own = seen.errors.iter().filter(|of| channel(&of.name));
             own.map(|of| ErrorFacts::read(&of.name, &of.unit, of.rmse())).collect()
         };
@@ -404,10 +401,6 @@ crate::facts! {
         /// Root mean square error of a prediction over the last hours, in the unit of its label.
         rmse: Option<f64> [gauge "athermal_prediction_error_rms"] = rmse;
     }
-}
-
-fn revision(engine: Option<&Engine>) -> Option<String> {
-    engine.map(|of| of.revision().to_owned())
 }
 
 fn seconds(at: Instant) -> Option<f64> {

@@ -46,7 +46,7 @@ impl Service {
     /// When the model that runs was fitted, in s since 1970.
     #[must_use]
     pub fn fitted_s(&self) -> Option<f64> {
-        self.fitted.get(self.running()?.revision()).copied()
+        self.fitted.get(self.running()?.revision).copied()
     }
 
     /// What is kept in mind of it.

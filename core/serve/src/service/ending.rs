@@ -92,7 +92,9 @@ impl Service {
         let worker = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
         let mut snapshot = self.shared.read();
-        if let Some(Ok(worker)) = worker {
+        if let Some(Ok(mut worker)) = worker {
+            self.keeper.control().needs_replica();
+            worker.mirror();
             worker.publish(&mut snapshot, Moment::START);
             worker.into_parts().2.finish();
         } else {

@@ -32,7 +32,8 @@ const SOON: Wait = Wait::from_millis(250);
 const GAP: Wait = Wait::from_millis(100);
 /// The longest sleep where sources are held back until the journal thread or the replica has caught up.
 const HOLD: Wait = Wait::from_millis(1);
-/// For how long the replica is waited for at most: the thread that has it may hang.
+/// For how long the control thread is waited for at most, which may hang; and for how long a copy for it may wait for a moment at which
+/// nothing is due.
 const PATIENCE: Duration = Duration::from_ns(1_000_000_000);
 
 /// What the control thread asks of the engine thread.
@@ -147,6 +148,8 @@ impl EngineThread {
     fn work(&mut self) -> Result<(), EngineError> {
         let mut left = self.sources.len();
         let (mut published, mut sound) = (Moment::START, self.clock.now());
+        // Since when no copy has been asked for in vain.
+        let mut copied = self.clock.now();
         let mut is_stopped = false;
         // When something came the last two times.
         let mut came = [Moment::START; 2];
@@ -210,6 +213,11 @@ impl EngineThread {
                 published = now;
                 self.publish();
             }
+            copied = if self.worker.is_asked() { copied } else { now };
+            if now - copied >= PATIENCE {
+                copied = now;
+                self.worker.mirror();
+            }
             if has_more {
                 continue;
             }
@@ -224,7 +232,7 @@ impl EngineThread {
             let now = self.clock.now();
             let nap = due.map_or(longest, |due| until(due, now).min(longest));
             if !nap.is_zero() && !is_held {
-                self.worker.mirror_again();
+                self.worker.mirror();
             }
             if nap > SOON || is_held {
                 self.worker.rest();

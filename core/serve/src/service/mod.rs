@@ -228,6 +228,7 @@ impl Service {
             sequencer.synchronise(time, now);
         }
         let live = LiveOptions {
+            mirrors: false,
             isolates: true,
             retain: runtime.retain,
             channels: given.clone(),
@@ -244,7 +245,7 @@ impl Service {
         observers.add(Box::new(watcher.clone()));
         control.watch(recovered.model.sample_ranges());
         let looking = observers.clone();
-        control.look_on(move |at, engine| looking.tick(at, engine));
+        control.look_on(move |tick| looking.tick(tick));
         let every = wait(runtime.checkpoint);
         let keeper = Keeper::new(
             control,
@@ -419,12 +420,13 @@ impl Service {
             self.has_failed |= matches!(event, ServiceEvent::EngineFailed(_));
             events.push(event);
         }
-        let replica = self.keeper.control().replica();
-        let panics = replica.map_or(&[][..], crate::engine::Engine::panics);
-        for panic in panics.iter().skip(self.given_up) {
-            events.push(ServiceEvent::NodeGivenUp(panic.to_string()));
+        let given_up = self.keeper.look().given_up();
+        let new = given_up.iter().skip(self.given_up).cloned();
+        events.extend(new.map(ServiceEvent::NodeGivenUp));
+        self.given_up = given_up.len();
+        if self.observers.look_inside() && !self.keeper.control().needs_replica() {
+            self.engine.thread().unpark();
         }
-        self.given_up = panics.len();
         let status = self.progress.status();
         if status.is_degraded != self.is_degraded {
             self.is_degraded = status.is_degraded;
@@ -495,6 +497,7 @@ impl Service {
     /// none where none can be taken.
     pub fn checkpoint(&mut self, by: &str) -> Option<u64> {
         self.note(&format!("{by}: checkpoint"));
+        self.await_replica();
         self.keeper.take_now()
     }
 

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use athermal_run::live::TickView;
+
 use super::ServiceEvent;
-use crate::engine::Engine;
-use crate::time::Instant;
 
 /// Looks on at a service, on its control thread: it must not wait. What is slow takes copies away through a bounded queue.
 pub trait Observer: Send {
@@ -13,9 +13,15 @@ pub trait Observer: Send {
         let _ = event;
     }
 
-    /// A tick, and what runs as it is after it. Ticks that the control thread missed are not seen.
-    fn tick(&mut self, at: Instant, engine: &Engine) {
-        let _ = (at, engine);
+    /// A tick. Ticks that the control thread missed are not seen.
+    fn tick(&mut self, tick: &TickView<'_>) {
+        let _ = tick;
+    }
+
+    /// Whether it looks at more of a tick than outputs, predictions, truths and novelties. What runs is stepped again for it, from one
+    /// of the next ticks on: its [engine](TickView::engine) is there then.
+    fn looks_inside(&self) -> bool {
+        false
     }
 
     /// Whether it looks on no longer.
@@ -33,8 +39,12 @@ impl Observers {
         self.all().push(observer);
     }
 
-    pub(super) fn tick(&self, at: Instant, engine: &Engine) {
-        self.all().iter_mut().for_each(|of| of.tick(at, engine));
+    pub(super) fn tick(&self, tick: &TickView<'_>) {
+        self.all().iter_mut().for_each(|of| of.tick(tick));
+    }
+
+    pub(super) fn look_inside(&self) -> bool {
+        self.all().iter().any(|of| of.looks_inside())
     }
 
     pub(super) fn events(&self, events: &[ServiceEvent]) {

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use athermal_run::live::{Slots as _, TickView};
 use athermal_run::score::{PairedPrediction, link};
 
 use crate::compile::{Plan, PlannedChannel};
-use crate::engine::Engine;
 use crate::time::Instant;
 
 /// After so many seconds an error counts half.
@@ -41,8 +41,8 @@ impl PredictionErrors {
     }
 
     /// Looks at what a tick did.
-    pub fn look(&mut self, now: Instant, engine: &Engine) {
-        let plan = engine.plan();
+    pub fn look(&mut self, tick: &TickView<'_>) {
+        let (now, plan) = (tick.at, tick.plan);
         if !self.plan.as_ref().is_some_and(|of| Arc::ptr_eq(of, plan)) {
             self.all = predictions(plan);
             self.plan = Some(Arc::clone(plan));
@@ -54,7 +54,7 @@ impl PredictionErrors {
                 error.paired.clear();
                 error.last = None;
             }
-            error.look(now, engine);
+            error.look(tick);
         }
     }
 }
@@ -65,8 +65,9 @@ impl PredictionError {
         (self.weight > 0.0).then(|| (self.squares / self.weight).sqrt())
     }
 
-    fn look(&mut self, now: Instant, engine: &Engine) {
-        let error = self.paired.error(engine, now, engine.value(self.truth));
+    fn look(&mut self, tick: &TickView<'_>) {
+        let now = tick.at;
+        let error = self.paired.error(tick, now, tick.value(self.truth));
         if error.is_nan() {
             return;
         }

@@ -1,10 +1,12 @@
 //! How the graph of a running service is replaced: staged, compared, handed over, taken back. Who does it stands in the journal.
 
-use athermal_run::live::{StageError, Staged, Verdict};
+use std::time::{Duration as Wait, Instant as Clock};
+
+use athermal_run::live::{Running, StageError, Staged, Verdict};
 use athermal_run::model::Model;
 
 use super::{Service, ServiceEvent};
-use crate::aside::within;
+use crate::aside::{PATIENCE, within};
 use crate::engine::Engine;
 use crate::figures::unix_seconds;
 use crate::folder::StatePaths;
@@ -31,6 +33,7 @@ impl Service {
             let (folder, model) = (StatePaths::clone(&self.folder), model.clone());
             within(move || folder.keep_model(&model, &revision)).ok_or(CommitError::Hangs)??;
         }
+        self.await_replica();
         let staged = self.keeper.control().stage(model, false)?;
         let revision = staged.revision().to_owned();
         self.note_fit(model);
@@ -108,10 +111,31 @@ impl Service {
         self.keeper.look().verdict()
     }
 
-    /// The graph that runs, as it is after the ticks that have been taken in; none after ticks have been missed.
+    /// What runs, after the ticks that have been taken in; none after ticks have been missed.
     #[must_use]
-    pub fn running(&self) -> Option<&Engine> {
+    pub fn running(&self) -> Option<Running<'_>> {
+        self.keeper.look().running()
+    }
+
+    /// The nodes of it that were given up, and why.
+    #[must_use]
+    pub fn given_up(&self) -> &[String] {
+        self.keeper.look().given_up()
+    }
+
+    /// A copy of it, to the same bits, while something needs one.
+    #[must_use]
+    pub fn replica(&self) -> Option<&Engine> {
         self.keeper.look().replica()
+    }
+
+    /// Waits until there is a copy of what runs, for as long as the engine thread may take.
+    pub(super) fn await_replica(&mut self) {
+        let began = Clock::now();
+        while !self.keeper.control().needs_replica() && began.elapsed() < PATIENCE {
+            self.engine.thread().unpark();
+            std::thread::sleep(Wait::from_millis(1));
+        }
     }
 
     /// The graph before the last swap, while it is warm: it can be taken back.

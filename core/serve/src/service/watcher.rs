@@ -4,10 +4,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use athermal_run::live::{Slots as _, TickView};
+
 use super::prediction_error::PredictionErrors;
 use super::{Observer, ServiceEvent};
 use crate::compile::{Plan, PlannedRole};
-use crate::engine::Engine;
 use crate::event::Event as _;
 use crate::message::Message;
 use crate::time::Instant;
@@ -68,9 +69,9 @@ impl Observer for Watcher {
         }
     }
 
-    fn tick(&mut self, at: Instant, engine: &Engine) {
+    fn tick(&mut self, tick: &TickView<'_>) {
         let seen = &mut *self.seen();
-        let plan = engine.plan();
+        let plan = tick.plan;
         if !seen
             .last
             .plan
@@ -80,21 +81,29 @@ impl Observer for Watcher {
             seen.last.follow(plan);
             (seen.novelty, seen.novelty_slots) = novelties(plan).unzip();
         }
-        seen.last.tick(at, engine);
-        seen.errors.look(at, engine);
+        seen.last.tick(tick);
+        seen.errors.look(tick);
         for ((_, value), slot) in seen.novelty.iter_mut().zip(&seen.novelty_slots) {
-            *value = engine.value(*slot);
+            *value = tick.value(*slot);
         }
     }
 }
 
 impl LastTicks {
-    fn tick(&mut self, at: Instant, engine: &Engine) {
+    /// The value of an output at the last tick.
+    #[must_use]
+    pub fn value(&self, output: &str) -> Option<f64> {
+        let place = self.outputs.iter().position(|of| of == output)?;
+        let value = self.ticks.back()?.1[place];
+        (!value.is_nan()).then_some(value)
+    }
+
+    fn tick(&mut self, tick: &TickView<'_>) {
         let room = (self.ticks.len() == TICKS).then(|| self.ticks.pop_front());
         let mut values = room.flatten().map_or_else(Vec::new, |(_, values)| values);
         values.clear();
-        values.extend_from_slice(engine.outputs());
-        self.ticks.push_back((at, values));
+        values.extend_from_slice(tick.outputs);
+        self.ticks.push_back((tick.at, values));
     }
 
     /// Goes on with the outputs of another graph.

@@ -4,17 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::prng::Prng;
-use athermal_run::live::Notice;
+use athermal_run::live::{Notice, TickView};
 use athermal_run::model::Model;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Folder, GRAPH, copy_tree};
+use super::{Folder, GRAPH, bits, copy_tree};
 use crate::companion::{Beside, Companion};
 use crate::compile::Wanted;
 use crate::connector::{
@@ -344,7 +344,7 @@ fn a_graph_takes_over_and_is_taken_back_with_every_tick_and_a_replay_has_the_sam
     let bench = Bench::new();
     let mut service = bench.start(GRAPH);
     bench.more(&mut service, 300);
-    let first = service.running().unwrap().revision().to_owned();
+    let first = service.running().unwrap().revision.to_owned();
     let next = bench.model(&other_windows());
     let second = next.revision().unwrap();
     let staged = service.stage(&next, "uid 7").unwrap();
@@ -393,7 +393,7 @@ fn what_took_over_goes_on_after_a_restart_with_the_same_file_and_another_file_ta
     let mut service = bench.start(GRAPH);
     assert_eq!(took_over(&bench.more(&mut service, 50)), [""; 0]);
     assert_eq!(
-        service.running().unwrap().revision(),
+        service.running().unwrap().revision,
         next.revision().unwrap()
     );
     service.stop().unwrap();
@@ -470,23 +470,43 @@ fn an_observer_sees_every_tick_and_what_happens_until_it_goes() {
     struct Counts(
         Arc<std::sync::Mutex<(Vec<Instant>, usize)>>,
         Arc<AtomicBool>,
+        Arc<AtomicU64>,
     );
     impl crate::service::Observer for Counts {
         fn event(&mut self, _: &ServiceEvent) {
             self.0.lock().unwrap().1 += 1;
         }
-        fn tick(&mut self, at: Instant, engine: &crate::engine::Engine) {
-            assert_eq!(engine.last(), Some(at));
-            self.0.lock().unwrap().0.push(at);
+        fn tick(&mut self, tick: &TickView<'_>) {
+            if let Some(engine) = tick.engine {
+                assert_eq!(engine.last(), Some(tick.at));
+                assert_eq!(bits(engine.outputs()), bits(tick.outputs));
+                self.2.fetch_add(1, Ordering::SeqCst);
+            }
+            self.0.lock().unwrap().0.push(tick.at);
+        }
+        fn looks_inside(&self) -> bool {
+            self.0.lock().unwrap().0.len() > 100
         }
         fn is_gone(&self) -> bool {
             self.1.load(Ordering::SeqCst)
         }
     }
-    let bench = Bench::new();
+    let mut bench = Bench::new();
+    bench.sections = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\n\
+                      [sources.in]\ntype = \"metronome\"\n[sinks.out]\ntype = \"lines\"\n";
     let mut service = bench.start(GRAPH);
-    let (seen, gone) = (Arc::default(), Arc::default());
-    service.observe(Box::new(Counts(Arc::clone(&seen), Arc::clone(&gone))));
+    let (seen, gone, inside) = (Arc::default(), Arc::default(), Arc::default());
+    let observer = Counts(Arc::clone(&seen), Arc::clone(&gone), Arc::clone(&inside));
+    service.observe(Box::new(observer));
+    bench.more(&mut service, 50);
+    assert!(service.replica().is_none(), "nothing needs one");
+    let stepped_again = inside.load(Ordering::SeqCst);
+    bench.more(&mut service, 30);
+    assert_eq!(inside.load(Ordering::SeqCst), stepped_again);
+    bench.more(&mut service, 60);
+    let before = inside.load(Ordering::SeqCst);
+    bench.more(&mut service, 50);
+    assert!(inside.load(Ordering::SeqCst) >= before + 50);
     service.stage(&bench.model(&other_windows()), "it").unwrap();
     bench.more(&mut service, 50);
     service.commit("it").unwrap();

@@ -7,6 +7,7 @@ use athermal_core::engine::Engine;
 use athermal_core::event::Event as _;
 use athermal_core::events;
 use athermal_core::time::Instant;
+use athermal_run::live::TickView;
 use athermal_serve::facts::{Known as _, StatusFacts, guide};
 use athermal_serve::service::{PredictionErrors, Service, ServiceEvent};
 use athermal_serve::{facts, register_events, register_facts};
@@ -189,7 +190,7 @@ fn what_was_predicted_before_a_break_is_no_prediction_of_what_comes_after_it() {
             engine.segment();
         }
         engine.step(now, &[20.5, 21.5, z]).unwrap();
-        errors.look(now, &engine);
+        errors.look(&TickView::of(now, &engine));
         errors.iter().filter(|of| of.rmse().is_some()).count()
     };
     for tick in 0..30 {

@@ -1,7 +1,8 @@
 //! What is watched of the graph that runs, on the control thread: the engine thread has no part in it.
 
-use super::{Control, LiveEngine};
+use super::Control;
 use crate::engine::SampleRange;
+use crate::live::TickView;
 use crate::live::monitor::{Finding, Monitor, Watch};
 use crate::time::Instant;
 
@@ -21,11 +22,16 @@ impl Watching {
         }
     }
 
-    pub(super) fn stepped(&mut self, time: Instant, live: &LiveEngine) {
+    pub(super) fn stepped(&mut self, tick: &TickView<'_>) {
         if let Some(watch) = &mut self.watch {
-            watch.stepped(time, &live.engine, &mut self.new);
-            self.keep(time);
+            watch.stepped(tick, &mut self.new);
+            self.keep(tick.at);
         }
+    }
+
+    /// Whether what is found next takes more of the graph than is mirrored.
+    pub(super) fn looks_inside(&self) -> bool {
+        self.watch.as_ref().is_some_and(Watch::looks_inside)
     }
 
     pub(super) fn segment(&mut self) {

@@ -18,7 +18,7 @@ pub use range::{OutsideFit, RangeMonitor, usual};
 pub use sensor::{SensorChange, SensorFault, SensorMonitor};
 pub use watch::Watch;
 
-use super::Feed;
+use super::{Feed, TickView};
 use crate::compile::Plan;
 use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
@@ -29,7 +29,7 @@ pub trait Monitor {
     fn row(&mut self, now: Instant, values: &[f64], found: &mut Vec<Finding>);
 
     /// The row was stepped.
-    fn stepped(&mut self, _now: Instant, _engine: &Engine, _found: &mut Vec<Finding>) {}
+    fn stepped(&mut self, _tick: &TickView<'_>, _found: &mut Vec<Finding>) {}
 
     /// No row follows.
     fn end(&mut self, _engine: &Engine, _found: &mut Vec<Finding>) {}

@@ -3,7 +3,7 @@
 use super::{Finding, Monitor};
 use crate::compile::Plan;
 use crate::engine::{Engine, SampleRange};
-use crate::live::Feed;
+use crate::live::{Feed, TickView};
 use crate::time::{Duration, Instant};
 
 /// A graph is given so long beyond its warm-up until that is reported, as a sensor that has not had a sample yet.
@@ -59,6 +59,12 @@ impl OutputMonitor {
         self.rows
     }
 
+    /// Whether no output has had a value so far.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        !self.any
+    }
+
     /// Whether all of them are empty, which looks like an output that works.
     #[must_use]
     pub fn none(&self, engine: &Engine) -> Option<NoOutput> {
@@ -75,10 +81,13 @@ impl OutputMonitor {
 impl Monitor for OutputMonitor {
     fn row(&mut self, _: Instant, _: &[f64], _: &mut Vec<Finding>) {}
 
-    fn stepped(&mut self, now: Instant, engine: &Engine, found: &mut Vec<Finding>) {
-        self.look(now, engine.outputs());
+    fn stepped(&mut self, tick: &TickView<'_>, found: &mut Vec<Finding>) {
+        self.look(tick.at, tick.outputs);
         let is_long = |(first, last)| last - first >= self.warm_up + PATIENCE;
-        if self.rows >= FEWEST && self.times.is_some_and(is_long) {
+        if self.rows >= FEWEST
+            && self.times.is_some_and(is_long)
+            && let Some(engine) = tick.engine
+        {
             self.end(engine, found);
         }
     }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::{Engine, SampleRange};
-use crate::live::Feed;
+use crate::live::{Feed, TickView};
 use crate::time::Instant;
 
 /// What is watched of a graph at work, what was found, and what goes on.
@@ -68,6 +68,12 @@ impl Watch {
         self.output.none(engine)
     }
 
+    /// Whether what is found next takes more of the graph than its outputs: none has had a value.
+    #[must_use]
+    pub fn looks_inside(&self) -> bool {
+        self.output.is_empty()
+    }
+
     /// The channels that a correction moves and goes by.
     #[must_use]
     pub fn fed_back(&self) -> &[String] {
@@ -90,9 +96,9 @@ impl Monitor for Watch {
         self.count(&found[before..]);
     }
 
-    fn stepped(&mut self, now: Instant, engine: &Engine, found: &mut Vec<Finding>) {
+    fn stepped(&mut self, tick: &TickView<'_>, found: &mut Vec<Finding>) {
         let before = found.len();
-        self.output.stepped(now, engine, found);
+        self.output.stepped(tick, found);
         self.count(&found[before..]);
     }
 

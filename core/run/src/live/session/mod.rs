@@ -18,7 +18,7 @@ use std::time::{Duration, Instant as Clock};
 
 use super::monitor::{Finding, Monitor, OutputMonitor};
 use super::store::{OutputIdentity, StateStore};
-use super::{Feed, Frame, RunError, Sink};
+use super::{Feed, Frame, RunError, Sink, TickView};
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::model::Model;
@@ -209,7 +209,8 @@ impl<'a> Session<'a> {
             return Ok(false);
         }
         let (engine, monitors) = (self.runner.engine(), self.monitors.iter_mut());
-        monitors.for_each(|monitor| monitor.stepped(time, engine, &mut self.found));
+        let tick = TickView::of(time, engine);
+        monitors.for_each(|monitor| monitor.stepped(&tick, &mut self.found));
         self.report_found(time, &samples.time_text);
         let (revision, outputs) = self.runner.made();
         let frame = Frame {

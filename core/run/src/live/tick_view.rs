@@ -1,0 +1,112 @@
+//! What is known of a tick by whoever looks on, without stepping it again.
+
+use std::sync::Arc;
+
+use crate::compile::{Plan, PlannedRole};
+use crate::engine::Engine;
+use crate::score::link;
+use crate::time::Instant;
+
+/// Stands for a slot that was given nothing, not even that it has no value: a NaN of bits that no arithmetic makes.
+const IDLE: u64 = f64::NAN.to_bits() | 0x1d1e;
+
+/// What a slot was given at a tick.
+pub trait Slots {
+    /// Whether a slot was given something, be it nothing.
+    fn ran(&self, slot: usize) -> bool;
+
+    /// The value that it was given; NaN where its node did not run or gave nothing.
+    fn value(&self, slot: usize) -> f64;
+}
+
+impl Slots for Engine {
+    fn ran(&self, slot: usize) -> bool {
+        self.ran(slot)
+    }
+
+    fn value(&self, slot: usize) -> f64 {
+        self.value(slot)
+    }
+}
+
+/// The slots that are mirrored with each tick, in order: all that predict, their truths, and novelties.
+pub(super) fn shown(plan: &Plan) -> Arc<[usize]> {
+    let predicts = |slot: usize| Some([slot, link(plan, slot)?.slot]);
+    let novelty = plan.nodes.iter().filter_map(|node| match &node.role {
+        PlannedRole::Estimator { novelty, .. } => *novelty,
+        _ => None,
+    });
+    let predict = (0..plan.channels.len()).filter_map(predicts).flatten();
+    let mut slots: Vec<usize> = predict.chain(novelty).collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots.into()
+}
+
+/// What is mirrored of a tick beside its samples: outputs, then the slots that are shown.
+pub(super) fn values<'a>(engine: &'a Engine, shown: &'a [usize]) -> impl Iterator<Item = f64> + 'a {
+    let slot = |slot: &usize| match engine.ran(*slot) {
+        true => engine.value(*slot),
+        false => f64::from_bits(IDLE),
+    };
+    engine
+        .outputs()
+        .iter()
+        .copied()
+        .chain(shown.iter().map(slot))
+}
+
+/// A tick of the graph that runs, as the control thread knows it.
+#[derive(Debug, Clone, Copy)]
+pub struct TickView<'a> {
+    /// The instant.
+    pub at: Instant,
+    /// The revision of the graph.
+    pub revision: &'a str,
+    /// Its plan.
+    pub plan: &'a Arc<Plan>,
+    /// The outputs, in the order of the plan's.
+    pub outputs: &'a [f64],
+    /// What runs as it is after the tick, where there is a replica of it.
+    pub engine: Option<&'a Engine>,
+    pub(super) shown: &'a [usize],
+    pub(super) values: &'a [f64],
+}
+
+/// Of slots that predict, their truths and novelties; of others where there is a replica.
+impl Slots for TickView<'_> {
+    fn ran(&self, slot: usize) -> bool {
+        match self.engine {
+            Some(engine) => engine.ran(slot),
+            None => self.mirrored(slot).to_bits() != IDLE,
+        }
+    }
+
+    fn value(&self, slot: usize) -> f64 {
+        match self.engine {
+            Some(engine) => engine.value(slot),
+            None => self.mirrored(slot),
+        }
+    }
+}
+
+impl<'a> TickView<'a> {
+    /// The last tick of an engine.
+    #[must_use]
+    pub fn of(at: Instant, engine: &'a Engine) -> Self {
+        Self {
+            at,
+            revision: engine.revision(),
+            plan: engine.plan(),
+            outputs: engine.outputs(),
+            engine: Some(engine),
+            shown: &[],
+            values: &[],
+        }
+    }
+
+    fn mirrored(&self, slot: usize) -> f64 {
+        let place = self.shown.binary_search(&slot);
+        place.map_or(f64::from_bits(IDLE), |place| self.values[place])
+    }
+}

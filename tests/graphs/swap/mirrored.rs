@@ -1,0 +1,87 @@
+//! What is mirrored of a tick where it is not stepped again.
+
+use std::sync::{Arc, Mutex};
+
+use athermal::core::prng::Prng;
+use athermal::run::live::{LiveOptions, Slots, pair};
+use athermal::run::score::link;
+use athermal::serve::service::PredictionErrors;
+
+use super::course::rows;
+use super::model::model;
+
+const DIE_TESTER: &str = include_str!("../../../graphs/die-tester.toml");
+
+/// What is put out, and all that predicts with its truths, to the bit.
+fn made(outputs: &[f64], plan: &athermal::core::compile::Plan, at: &impl Slots) -> Vec<u64> {
+    let slots = (0..plan.channels.len()).filter_map(|slot| Some([slot, link(plan, slot)?.slot]));
+    let slots = slots.flatten();
+    let values = slots.flat_map(|slot| [at.value(slot), f64::from(u8::from(at.ran(slot)))]);
+    outputs
+        .iter()
+        .copied()
+        .chain(values)
+        .map(f64::to_bits)
+        .collect()
+}
+
+#[test]
+fn what_is_mirrored_of_a_tick_is_what_the_engine_made_and_it_is_stepped_again_only_for_what_is_staged()
+ {
+    let (first, second) = (model(DIE_TESTER, "0"), model(DIE_TESTER, "1"));
+    let options = LiveOptions {
+        mirrors: false,
+        ..LiveOptions::default()
+    };
+    let (mut stepper, mut control) = pair(&first, options).unwrap();
+    let seen = Arc::<Mutex<Vec<(Vec<u64>, bool)>>>::default();
+    let errors = Arc::<Mutex<(PredictionErrors, PredictionErrors)>>::default();
+    let (looking, scoring) = (Arc::clone(&seen), Arc::clone(&errors));
+    control.look_on(move |tick| {
+        let values = made(tick.outputs, tick.plan, tick);
+        looking
+            .lock()
+            .unwrap()
+            .push((values, tick.engine.is_some()));
+        scoring.lock().unwrap().0.look(tick);
+    });
+    let mut expected = Vec::new();
+    let channels = stepper.feed().len();
+    for (nth, (time, row)) in rows(&mut Prng::stream(9, "rows"), channels, 6, 900)
+        .into_iter()
+        .enumerate()
+    {
+        match nth {
+            400 => {
+                while control.stage(&second, false).is_err() {
+                    assert!(stepper.mirror());
+                }
+                control.commit().unwrap();
+            }
+            600 => stepper.segment(),
+            _ => {}
+        }
+        stepper.step(time, &row).unwrap();
+        control.pump();
+        let engine = stepper.engine();
+        expected.push(made(engine.outputs(), engine.plan(), engine));
+        let tick = athermal::run::live::TickView::of(time, engine);
+        errors.lock().unwrap().1.look(&tick);
+    }
+    let (values, again): (Vec<_>, Vec<_>) = seen.lock().unwrap().iter().cloned().unzip();
+    assert_eq!(values.len(), expected.len());
+    let differs = values
+        .iter()
+        .zip(&expected)
+        .position(|(one, other)| one != other);
+    assert_eq!(differs, None);
+    assert!(!again[399] && again[401], "{again:?}");
+    let errors = errors.lock().unwrap();
+    let rmse = |of: &PredictionErrors| {
+        of.iter()
+            .map(|of| (of.name.clone(), of.rmse()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(rmse(&errors.0), rmse(&errors.1));
+    assert!(rmse(&errors.0).iter().any(|(_, of)| of.is_some()));
+}
