@@ -5,13 +5,15 @@ use std::fs;
 use std::io;
 use std::ops::RangeBounds;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use athermal_run::live::store::write_whole;
 
+use crate::compile::Plan;
 use crate::engine::{Engine, EngineState};
 use crate::journal::sync_folder;
+use crate::time::Instant;
 
 const MAGIC: &[u8; 8] = b"athermC\n";
 
@@ -87,6 +89,52 @@ impl Checkpoint {
                 path,
                 reason: error.to_string(),
             }),
+        }
+    }
+}
+
+/// What an engine knew, as the engine thread leaves it for the control thread, which makes a checkpoint of it.
+#[derive(Debug)]
+pub(crate) struct LeftState {
+    /// After how many ticks, beats, breaks and freezes.
+    pub(crate) happenings: u64,
+    pub(crate) state: EngineState,
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) last: Option<Instant>,
+}
+
+/// Where it is asked for, and left.
+#[derive(Debug, Default)]
+pub(crate) struct StateDesk {
+    is_asked: AtomicBool,
+    left: Mutex<Option<LeftState>>,
+}
+
+impl StateDesk {
+    /// Asks for what the engine knows now.
+    pub(crate) fn ask(&self) {
+        self.is_asked.store(true, Ordering::Release);
+    }
+
+    /// What was left, once.
+    pub(crate) fn take(&self) -> Option<LeftState> {
+        self.left.lock().ok()?.take()
+    }
+
+    pub(crate) fn is_asked(&self) -> bool {
+        self.is_asked.load(Ordering::Acquire)
+    }
+
+    /// Leaves what an engine knows, unless somebody is looking at this moment: then it is asked again.
+    pub(crate) fn leave(&self, engine: &Engine, happenings: u64) {
+        if let Ok(mut left) = self.left.try_lock() {
+            *left = Some(LeftState {
+                happenings,
+                state: engine.state(),
+                plan: Arc::clone(engine.plan()),
+                last: engine.last(),
+            });
+            self.is_asked.store(false, Ordering::Release);
         }
     }
 }

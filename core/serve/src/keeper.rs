@@ -1,4 +1,4 @@
-//! What the control thread does beside the engine: checkpoints of the replica, at intervals.
+//! What the control thread does beside the engine: checkpoints at intervals.
 
 use std::io;
 use std::sync::Arc;
@@ -8,7 +8,8 @@ use athermal_run::live::{Control, Notice, StageError};
 
 use crate::aside::{Aside, PATIENCE, within};
 use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
-use crate::engine::{Engine, EngineState};
+use crate::compile::Plan;
+use crate::engine::EngineState;
 use crate::folder::FolderError;
 use crate::journal::Progress;
 use crate::time::{Duration, Instant};
@@ -29,6 +30,8 @@ pub struct Keeper {
     before: u64,
     every: Wait,
     taken: Clock,
+    /// Whether the engine thread has been asked for what it knows, and no graph was sent to it since.
+    is_asking: bool,
     /// One that waits until the journal is synced up to it.
     waiting: Option<Checkpoint>,
     /// One that is being saved, on a disk that may hang.
@@ -57,6 +60,7 @@ impl Keeper {
             before,
             every,
             taken: Clock::now(),
+            is_asking: false,
             waiting: None,
             saving: Aside::default(),
             last: before,
@@ -74,9 +78,11 @@ impl Keeper {
     /// When it cannot be written. It is tried again after `every`.
     pub fn pump(&mut self) -> Result<Vec<Notice>, CheckpointError> {
         let notices = self.control.pump();
-        // Where there is no replica, it is there soon.
-        if self.is_due() && self.control.needs_replica() {
-            self.take();
+        if self.is_due() {
+            match self.control.replica() {
+                Some(_) => self.take(),
+                None => self.take_left(),
+            }
         }
         self.save()?;
         Ok(notices)
@@ -125,6 +131,8 @@ impl Keeper {
             let (swaps, checkpoint) = (self.swaps.clone(), Checkpoint::of(engine, happenings));
             within(move || swaps.save(&checkpoint)).ok_or(CommitError::Hangs)??;
         }
+        // What the engine thread leaves from here on may be from before it takes over.
+        self.is_asking = false;
         let sent = send(&mut self.control);
         if sent.is_err() {
             let swaps = self.swaps.clone();
@@ -189,6 +197,24 @@ impl Keeper {
         &mut self.control
     }
 
+    /// Takes what the engine thread has left, or asks for it.
+    fn take_left(&mut self) {
+        let left = self.progress.desk.take();
+        // A graph that was committed meanwhile is not in it.
+        let Some(left) = left.filter(|_| std::mem::take(&mut self.is_asking)) else {
+            self.is_asking = !self.control.is_on_the_way();
+            if self.is_asking {
+                self.progress.desk.ask();
+            }
+            return;
+        };
+        self.taken = Clock::now();
+        if left.happenings > self.last {
+            self.held = Held::of(&left.state, (&left.plan, left.last), &mut self.first);
+            self.waiting = Some(Checkpoint::of_state(&left.state, left.happenings));
+        }
+    }
+
     fn take(&mut self) {
         self.taken = Clock::now();
         // Until what is on its way has taken over, the replica is not what a start is to go on from.
@@ -201,7 +227,7 @@ impl Keeper {
             && replica.panics().is_empty()
         {
             let state = replica.state();
-            self.held = Held::of(&state, replica, &mut self.first);
+            self.held = Held::of(&state, (replica.plan(), replica.last()), &mut self.first);
             self.waiting = Some(Checkpoint::of_state(&state, happenings));
         }
     }
@@ -241,10 +267,10 @@ pub struct Held {
 impl Held {
     fn of(
         state: &EngineState,
-        engine: &Engine,
+        (plan, last): (&Plan, Option<Instant>),
         first: &mut Option<(u64, Instant)>,
     ) -> Option<Self> {
-        let (tick, last) = (state.tick(), engine.last()?);
+        let (tick, last) = (state.tick(), last?);
         let (begin, since) = *first.get_or_insert((tick, last));
         let passed = (last - since).secs();
         if tick <= begin || passed <= 0.0 {
@@ -253,7 +279,7 @@ impl Held {
         let rate = (tick - begin) as f64 / passed;
         // What an earlier run kept came at this rate too, as far as is known.
         let span = Duration::from_secs_f64(tick as f64 / rate).unwrap_or(Duration::MAX);
-        let (bytes, full) = state.held(engine.plan(), span);
+        let (bytes, full) = state.held(plan, span);
         Some(Self { bytes, full, rate })
     }
 }

@@ -4,8 +4,8 @@
 //!
 //! # A reader's path
 //!
-//! [`sequencer::Sequencer`] first: it decides which samples make a tick, and when. Then [`journal::Record`], which is such a decision in
-//! the journal, and [`replay::Replay`], which applies it again. [`worker::Worker`] is all that the engine thread does at a tick,
+//! [`LiveGraph`](athermal_run::live::LiveGraph) first: a graph at work, without a thread, a file or a clock. Then [`journal::Record`], which
+//! is a decision of it in the journal, and [`replay::Replay`], which applies it again. [`service`] is its host with threads,
 //! [`keeper::Keeper`] what the control thread does beside it, and [`recovery::Recovered`] what a start does.
 //!
 //! # The layers
@@ -16,10 +16,8 @@
 //! | [`deployment`] | what a machine file says of them, and of time |
 //! | [`moment`] | time that the host's clock does not touch |
 //! | [`host`] | the host's clock, and whether it is right |
-//! | [`sequencer`] | when ticks are cut, and which samples are late, repeated or refused |
 //! | [`journal`] | how decisions are written, how much of them survives what, and how damage is noticed |
 //! | [`replay`] | a log through an engine, to the same bits |
-//! | [`worker`] | the engine thread: samples in, ticks through the engine, decisions into the journal |
 //! | [`folder`], [`checkpoint`], [`keeper`] | what a state folder holds, and when it is written |
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
@@ -49,19 +47,17 @@ pub mod host;
 pub mod journal;
 pub mod keeper;
 pub mod moment;
-mod outside;
 pub mod recovery;
 pub mod replay;
-pub mod sequencer;
 pub mod service;
 pub mod testkit;
-pub mod worker;
 
 // The layers below, by the names that they have for everybody.
 use athermal_core::{
     channel, compile, diagnostic, document, engine, event, figures, message, node, quantity, time,
     unit,
 };
+pub use athermal_run::live::sequencer;
 
 #[cfg(test)]
 mod tests;

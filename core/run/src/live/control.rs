@@ -139,7 +139,13 @@ pub(super) fn pair(
     let (frozen, revision) = (live.engine.frozen(), live.revision.clone());
     let (shown, is_asked) = (Arc::clone(&live.shown), Arc::<AtomicBool>::default());
     let ends = (arriving, leaving);
-    let stepper = Stepper::new(live, Arc::clone(&feed), mirror, ends, Arc::clone(&is_asked));
+    let stepper = Stepper::new(
+        live,
+        Arc::clone(&feed),
+        Some(mirror),
+        ends,
+        Arc::clone(&is_asked),
+    );
     let span = options.retain.max(running.warm_up);
     let control = Control {
         retained: Retained::new(feed.len(), span, options.memory),

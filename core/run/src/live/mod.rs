@@ -15,12 +15,18 @@
 //! ```
 
 mod control;
+mod graph;
 mod handover;
+mod keep;
+mod moment;
 pub mod monitor;
 mod notice;
+mod outside;
+mod record;
 mod refit;
 mod retained;
 mod run;
+pub mod sequencer;
 pub mod session;
 mod shadow;
 mod sink;
@@ -31,8 +37,12 @@ pub mod store;
 mod tick_view;
 
 pub use control::{Control, Running};
+pub use graph::{LiveGraph, Order, Output, Snapshot};
 pub use handover::Feed;
+pub use keep::Keep;
+pub use moment::Moment;
 pub use notice::Notice;
+pub use record::{Record, output_hash};
 pub use refit::Refit;
 pub use run::{RunError, run};
 pub use session::{Replacement, Report, Reporter, Session, SessionOptions};

@@ -4,12 +4,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rtrb::{Consumer, Producer};
+use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::handover::{Feed, Happening, LiveEngine, Mark};
 use super::tick_view::values;
 use crate::compile::Plan;
-use crate::engine::EngineError;
+use crate::engine::{Engine, EngineError};
 use crate::time::Instant;
 
 /// Ticks and what else happens that are kept for an engine that comes a little late.
@@ -21,7 +21,8 @@ const CATCH_UP: u64 = 4;
 pub struct Stepper {
     pub(super) live: Box<LiveEngine>,
     feed: Arc<[Feed]>,
-    ticks: Producer<f64>,
+    /// None where there is no control.
+    ticks: Option<Producer<f64>>,
     arriving: Consumer<Box<LiveEngine>>,
     leaving: Producer<Box<LiveEngine>>,
     next: Option<Box<LiveEngine>>,
@@ -48,10 +49,22 @@ pub struct Stepped<'a> {
 }
 
 impl Stepper {
+    /// An engine without a control: it is never replaced.
+    ///
+    /// # Panics
+    /// Never: it reads what its plan reads.
+    #[must_use]
+    pub fn alone(engine: Engine) -> Self {
+        let feed: Arc<[Feed]> = Feed::of(engine.plan()).into();
+        let live = LiveEngine::new(engine, &feed, 0).expect("the feed is that of the plan");
+        let (leaving, arriving) = RingBuffer::new(1);
+        Self::new(live, feed, None, (arriving, leaving), Arc::default())
+    }
+
     pub(super) fn new(
         live: LiveEngine,
         feed: Arc<[Feed]>,
-        ticks: Producer<f64>,
+        ticks: Option<Producer<f64>>,
         (arriving, leaving): (Consumer<Box<LiveEngine>>, Producer<Box<LiveEngine>>),
         is_asked: Arc<AtomicBool>,
     ) -> Self {
@@ -87,13 +100,20 @@ impl Stepper {
     /// Whether the control thread is far behind: what is beyond the ring is missed.
     #[must_use]
     pub fn is_crowded(&self) -> bool {
-        self.ticks.slots() < self.ticks.buffer().capacity() / 2
+        let ticks = self.ticks.as_ref();
+        ticks.is_some_and(|of| of.slots() < of.buffer().capacity() / 2)
     }
 
     /// Whether the control thread asks for a copy of what runs: [`mirror`](Self::mirror) sends one.
     #[must_use]
     pub fn is_asked(&self) -> bool {
         self.is_asked.load(Ordering::Relaxed)
+    }
+
+    /// Whether a graph has been committed, or is catching up, and has not taken over.
+    #[must_use]
+    pub fn has_next(&self) -> bool {
+        self.next.is_some() || !self.arriving.is_empty()
     }
 
     /// Sends the control thread a copy of what runs, where it asks for one and there is room for what follows. It takes as long as a
@@ -127,7 +147,7 @@ impl Stepper {
 
     /// The engine that runs.
     #[must_use]
-    pub fn engine(&self) -> &crate::engine::Engine {
+    pub fn engine(&self) -> &Engine {
         &self.live.engine
     }
 
@@ -250,7 +270,8 @@ impl Stepper {
             given_up: engine.panics().len() as u64,
             width: width as u64,
         };
-        let Ok(mut chunk) = self.ticks.write_chunk(Mark::WIDTH + width) else {
+        let Some(ticks) = &mut self.ticks else { return };
+        let Ok(mut chunk) = ticks.write_chunk(Mark::WIDTH + width) else {
             self.missed += 1;
             return;
         };

@@ -25,11 +25,11 @@ mod segment;
 mod sync;
 mod writer;
 
+pub use athermal_run::live::{Record, output_hash};
 pub use begin::{Begin, FeedNames};
 pub use error::{Damage, DamageKind, JournalError};
 pub use log::{Entry, Gap, Log, Torn};
 pub use progress::{JournalStatus, Progress};
-pub use record::{Record, output_hash};
 pub use recorder::{JournalOptions, Recorder};
 pub use recording::JournalRecording;
 pub use retention::{Keep, oldest, retire};

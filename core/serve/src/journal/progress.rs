@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant as Clock};
 
 use crate::bell::{Bell, Bells};
+use crate::checkpoint::StateDesk;
 
 /// How far the journal is. Shared by all threads.
 #[derive(Debug, Default)]
@@ -23,6 +24,8 @@ pub struct Progress {
     error: Mutex<Option<String>>,
     /// Of those who wait for more to be written.
     bells: Bells,
+    /// Where the control thread gets checkpoints from.
+    pub(crate) desk: StateDesk,
 }
 
 /// How the journal is, for a status.

@@ -6,15 +6,19 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration as Wait, Instant as Clock};
 
+use athermal_run::live::Keep;
 use rtrb::{Producer, RingBuffer};
 
 use super::writer::Writer;
-use super::{Begin, JournalError, Progress, Record};
+use super::{Begin, JournalError, Progress, Record, output_hash};
+use crate::engine::Engine;
 use crate::sequencer::{Sample, Timeline};
 use crate::time::{Duration, Instant};
 
 /// The journal thread is woken at the latest after so many records, so that what comes of a long pass need not wait for its end.
 const EARLY: u64 = 64;
+/// So many records are worth waking it for, without a tick.
+const FEW: u64 = 8;
 /// How long writing and syncing the rest may take.
 const ENDS: Wait = Wait::from_secs(3);
 
@@ -136,44 +140,34 @@ impl Recorder {
         })
     }
 
-    /// Hands a record over, and returns how many there are then. It may leave once [`Progress::written`] is as many.
-    pub fn record(&mut self, record: Record) -> u64 {
-        self.happenings += u64::from(record.is_happening());
-        if let Record::Freeze(frozen) = record {
-            self.frozen = frozen;
-        }
-        self.has_gap |= self.progress.failures() != self.failures;
-        let pushed = if self.has_gap {
-            false
-        } else {
-            let message = Message::Record(self.event, record);
-            self.queue.push(message).is_ok()
-        };
-        if !pushed {
-            self.has_gap = true;
-            self.progress.lose(1);
-        }
-        self.event += 1;
-        self.new += 1;
-        if self.new >= EARLY {
-            self.wake();
-        }
+    /// How many records there are, those of gaps included.
+    #[must_use]
+    pub fn event(&self) -> u64 {
         self.event
     }
 
-    /// Wakes the journal thread, where it has something to write. After a tick, so that its outputs may leave.
-    pub fn wake(&mut self) {
-        if std::mem::take(&mut self.new) > 0
-            && let Some(thread) = &self.thread
-        {
-            thread.thread().unpark();
-        }
+    /// Whether the journal thread is far behind, and gets on: whatever can wait is better held back.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        let half = self.queue.buffer().capacity() / 2;
+        self.queue.slots() < half && !self.has_gap && !self.progress.is_degraded()
     }
 
-    /// How much was handed over since the journal thread was [woken](Self::wake).
+    /// Whether records are lost at the moment.
     #[must_use]
-    pub fn new_records(&self) -> u64 {
-        self.new
+    pub fn has_gap(&self) -> bool {
+        self.has_gap
+    }
+
+    /// How far the journal is.
+    #[must_use]
+    pub fn progress(&self) -> &Arc<Progress> {
+        &self.progress
+    }
+
+    /// Writes and syncs all that is on its way, and ends the threads.
+    pub fn finish(self) {
+        drop(self);
     }
 
     /// Ends a gap where that is possible: the journal goes on from where the log is now. Between two decisions.
@@ -217,53 +211,82 @@ impl Recorder {
             }
         }
         (self.has_gap, self.failures, self.new) = (false, failures, 1);
-        self.wake();
-    }
-
-    /// How many records there are, those of gaps included.
-    #[must_use]
-    pub fn event(&self) -> u64 {
-        self.event
-    }
-
-    /// How many ticks, beats, breaks and freezes there are.
-    #[must_use]
-    pub fn happenings(&self) -> u64 {
-        self.happenings
-    }
-
-    /// Whether the journal thread is far behind, and gets on: whatever can wait is better held back.
-    #[must_use]
-    pub fn is_crowded(&self) -> bool {
-        let half = self.queue.buffer().capacity() / 2;
-        self.queue.slots() < half && !self.has_gap && !self.progress.is_degraded()
-    }
-
-    /// Whether records are lost at the moment.
-    #[must_use]
-    pub fn has_gap(&self) -> bool {
-        self.has_gap
-    }
-
-    /// How far the journal is.
-    #[must_use]
-    pub fn progress(&self) -> &Arc<Progress> {
-        &self.progress
-    }
-
-    /// Writes and syncs all that is on its way, and ends the threads.
-    pub fn finish(self) {
-        drop(self);
+        self.sync();
     }
 }
 
+/// The journal as a graph at work knows it. A record may leave once [`Progress::written`] is as many as there were after it.
+impl Keep for Recorder {
+    fn record(&mut self, record: Record) -> u64 {
+        self.happenings += u64::from(record.is_happening());
+        if let Record::Freeze(frozen) = record {
+            self.frozen = frozen;
+        }
+        self.has_gap |= self.progress.failures() != self.failures;
+        let pushed = if self.has_gap {
+            false
+        } else {
+            let message = Message::Record(self.event, record);
+            self.queue.push(message).is_ok()
+        };
+        if !pushed {
+            self.has_gap = true;
+            self.progress.lose(1);
+        }
+        self.event += 1;
+        self.new += 1;
+        if self.new >= EARLY {
+            self.sync();
+        }
+        self.event
+    }
+
+    fn tick(&mut self, at: Instant, is_beat: bool, outputs: &[f64]) -> u64 {
+        let hash = output_hash(outputs);
+        self.record(match is_beat {
+            true => Record::Beat { at, hash },
+            false => Record::Tick { at, hash },
+        })
+    }
+
+    fn happenings(&self) -> u64 {
+        self.happenings
+    }
+
+    /// Wakes the journal thread, where it has something to write.
+    fn sync(&mut self) {
+        if std::mem::take(&mut self.new) > 0
+            && let Some(thread) = &self.thread
+        {
+            thread.thread().unpark();
+        }
+    }
+
+    fn passed(&mut self, has_ticked: bool, timeline: &Timeline) {
+        if has_ticked || self.new >= FEW {
+            self.sync();
+        }
+        self.mend(timeline);
+    }
+
+    fn wants_checkpoint(&self) -> bool {
+        self.progress.desk.is_asked()
+    }
+
+    fn checkpoint(&mut self, engine: &Engine) {
+        // What a node that was given up had learned is not whole: the journal goes on from before.
+        if engine.panics().is_empty() {
+            self.progress.desk.leave(engine, self.happenings);
+        }
+    }
+}
 impl Drop for Recorder {
     fn drop(&mut self) {
         // The journal thread ends once the ring is abandoned and empty.
         let (queue, _) = RingBuffer::new(1);
         drop(std::mem::replace(&mut self.queue, queue));
         self.new = 1;
-        self.wake();
+        self.sync();
         // A disk that hangs does not keep the program from ending.
         let began = Clock::now();
         while let Some(thread) = &self.thread

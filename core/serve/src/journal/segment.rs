@@ -9,6 +9,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::record::{decode, encode};
 use super::{Begin, Damage, DamageKind, JournalError, Record};
 
 pub(super) const VERSION: u32 = 1;
@@ -53,7 +54,7 @@ pub(super) fn header(begin: &Begin) -> Vec<u8> {
 
 /// Appends a record of a number.
 pub(super) fn append(bytes: &mut Vec<u8>, event: u64, record: &Record) {
-    frame(bytes, event, |bytes| record.encode(bytes));
+    frame(bytes, event, |bytes| encode(record, bytes));
 }
 
 /// Appends that all before a place in the file has been synced.
@@ -192,7 +193,7 @@ impl Segment {
             if !is_right(&self.bytes, self.at, end, self.event) {
                 return Err(damage(DamageKind::Checksum));
             }
-            let record = Record::decode(kind, body).ok_or(damage(DamageKind::Content))?;
+            let record = decode(kind, body).ok_or(damage(DamageKind::Content))?;
             (self.at, self.event) = (end, self.event + 1);
             return Ok(Some(record));
         }

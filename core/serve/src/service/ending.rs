@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use super::asked::samples;
-use super::engine_thread::Order;
+use super::engine_thread::Request;
 use super::watch::Watch;
 use super::{ChannelSamples, Service, ServiceError, ServiceEvent, ServiceHandle};
 use crate::journal::JournalStatus;
@@ -76,7 +76,7 @@ impl Service {
         drop(std::mem::replace(&mut self.asked, ServiceHandle::new().1));
         self.companions.clear();
         self.stop_sources.ask();
-        self.order(Order::Stop);
+        self.request(Request::Stop);
         let mut events = Vec::new();
         let began = Clock::now();
         while !self.engine.is_finished() && began.elapsed() < ENDS {
@@ -89,14 +89,14 @@ impl Service {
         let found: Vec<_> = self.found().collect();
         self.observers.events(&found);
         events.extend(found);
-        let worker = self.engine.is_finished().then(|| self.engine.join());
+        let graph = self.engine.is_finished().then(|| self.engine.join());
         let mut has_failed = self.has_failed;
         let mut snapshot = self.shared.read();
-        if let Some(Ok(mut worker)) = worker {
+        if let Some(Ok(mut graph)) = graph {
             self.keeper.control().needs_replica();
-            worker.mirror();
-            worker.publish(&mut snapshot, Moment::START);
-            worker.into_parts().2.finish();
+            graph.rest();
+            graph.facts(&mut snapshot, Moment::START);
+            graph.into_parts().2.finish();
         } else {
             has_failed = true;
         }

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
+use athermal_run::live::{Keep as _, LiveGraph, Order, Output};
 use rtrb::{Consumer, Producer};
 
 use super::ServiceEvent;
@@ -17,10 +18,10 @@ use crate::compile::Plan;
 use crate::connector::{Arrival, SourceLink};
 use crate::diagnostic::panic_text;
 use crate::engine::EngineError;
+use crate::journal::Recorder;
 use crate::moment::{Moment, MonotonicClock};
-use crate::sequencer::{Admission, Leader};
+use crate::sequencer::{Admission, Leader, Sequencer};
 use crate::time::{Duration, Instant};
-use crate::worker::{Output, Worker};
 
 /// How many arrivals of a source are taken before time is looked at again.
 const BATCH: usize = 256;
@@ -38,11 +39,8 @@ const PATIENCE: Duration = Duration::from_ns(1_000_000_000);
 
 /// What the control thread asks of the engine thread.
 #[derive(Debug)]
-pub(super) enum Order {
-    Freeze(bool),
-    Note(Box<str>),
-    /// The host's time, which is known to be right.
-    Synchronise(Instant, Moment),
+pub(super) enum Request {
+    Order(Order),
     /// To step what waits, and end.
     Stop,
 }
@@ -58,11 +56,11 @@ pub(super) enum Remark {
 
 /// All that the engine thread has.
 pub(super) struct EngineThread {
-    pub(super) worker: Worker,
+    pub(super) graph: LiveGraph<Recorder>,
     pub(super) clock: MonotonicClock,
     pub(super) sources: Vec<SourceLink>,
     pub(super) sinks: Sinks,
-    pub(super) orders: Consumer<Order>,
+    pub(super) orders: Consumer<Request>,
     pub(super) remarks: Producer<Remark>,
     pub(super) shared: Arc<Shared>,
     pub(super) events: Mailbox<ServiceEvent>,
@@ -127,8 +125,8 @@ impl Sinks {
 }
 
 impl EngineThread {
-    /// Runs until it is to stop, or all sources have ended. Gives the worker back.
-    pub(super) fn run(mut self) -> Worker {
+    /// Runs until it is to stop, or all sources have ended. Gives the graph back.
+    pub(super) fn run(mut self) -> LiveGraph<Recorder> {
         let ran = catch_unwind(AssertUnwindSafe(|| self.work()));
         let failure = match ran {
             Ok(Ok(())) => None,
@@ -142,7 +140,7 @@ impl EngineThread {
         self.sinks.end();
         self.shared.has_ended.store(true, Ordering::Release);
         self.control.ring();
-        self.worker
+        self.graph
     }
 
     fn work(&mut self) -> Result<(), EngineError> {
@@ -156,27 +154,24 @@ impl EngineThread {
         loop {
             self.shared.beat.fetch_add(1, Ordering::Relaxed);
             let was_stopped = is_stopped;
-            let before = self.worker.recorder().happenings();
-            let records = self.worker.recorder().event();
-            while let Ok(order) = self.orders.pop() {
-                match order {
-                    Order::Freeze(frozen) => self.worker.freeze(frozen),
-                    Order::Note(text) => self.worker.note(text),
-                    Order::Synchronise(host, now) => {
-                        self.worker.sequencer().synchronise(host, now);
-                    }
-                    Order::Stop => is_stopped = true,
+            let before = self.graph.keep().happenings();
+            let records = self.graph.keep().event();
+            while let Ok(request) = self.orders.pop() {
+                match request {
+                    Request::Order(order) => self.graph.order(order),
+                    Request::Stop => is_stopped = true,
                 }
             }
             let mut has_more = false;
             let now = self.clock.now();
-            let is_ahead = self.worker.is_crowded();
+            let is_ahead = self.graph.is_crowded();
             sound = if is_ahead { sound } else { now };
             let is_patient = now - sound < PATIENCE;
-            let is_crowded = self.worker.recorder().is_crowded() || is_ahead && is_patient;
+            let is_behind = self.graph.keep().is_crowded();
+            let is_crowded = is_behind || is_ahead && is_patient;
             // Sources of clocks too wait for a journal thread that gets on.
-            let is_full =
-                self.worker.sequencer().is_crowded() || self.worker.recorder().is_crowded();
+            let sequencer = self.graph.sequencer();
+            let is_full = is_behind || sequencer.is_some_and(Sequencer::is_crowded);
             for nth in 0..self.sources.len() {
                 let source = &self.sources[nth];
                 let is_held = was_stopped || is_full && source.is_giving();
@@ -185,57 +180,57 @@ impl EngineThread {
                 }
             }
             let now = self.clock.now();
-            if self.worker.recorder().event() != records {
+            if self.graph.keep().event() != records {
                 // Where much comes it is acknowledged soon: a broker may wait for that.
                 if now - came[0] < BUSY {
-                    self.worker.rest();
+                    self.graph.keep().sync();
                 }
                 came = [came[1], now];
             }
             let sinks = &mut self.sinks;
             // What the replica cannot take in is stepped later: a backlog of any length.
-            let goes_on = |worker: &Worker| !is_patient || !worker.is_crowded();
-            self.worker
+            let goes_on = |graph: &LiveGraph<_>| !is_patient || !graph.is_crowded();
+            self.graph
                 .pass_while(now, goes_on, |output| sinks.put(output))?;
-            if let Some((last, to)) = self.worker.went_back() {
+            if let Some((last, to)) = self.graph.went_back() {
                 let _ = self.remarks.push(Remark::WentBack(last, to));
                 self.sources.iter().for_each(SourceLink::turn);
             }
-            if self.worker.recorder().happenings() != before {
+            if self.graph.keep().happenings() != before {
                 self.control.ring();
             }
             let is_over = is_stopped || left == 0;
             let put = |output: &Output<'_>| sinks.put(output);
-            if is_over && self.worker.finish_while(now, goes_on, put)? {
+            if is_over && self.graph.finish_while(now, goes_on, put)? {
                 return Ok(());
             }
             if now - published >= Shared::EVERY.0 {
                 published = now;
                 self.publish();
             }
-            copied = if self.worker.is_asked() { copied } else { now };
+            copied = if self.graph.is_asked() { copied } else { now };
             if now - copied >= PATIENCE {
                 copied = now;
-                self.worker.mirror();
+                self.graph.rest();
             }
             if has_more {
                 continue;
             }
             // What is due waits for the replica, and sources for what is due.
-            let is_held = is_crowded || self.worker.is_crowded();
-            let longest = match (is_held || is_full, self.worker.recorder().has_gap()) {
+            let is_held = is_crowded || self.graph.is_crowded();
+            let longest = match (is_held || is_full, self.graph.keep().has_gap()) {
                 (true, _) => HOLD,
                 (false, true) => GAP,
                 (false, false) => until(published + Shared::EVERY.1, self.clock.now()),
             };
-            let due = self.worker.due().filter(|_| !is_held);
+            let due = self.graph.due().filter(|_| !is_held);
             let now = self.clock.now();
             let nap = due.map_or(longest, |due| until(due, now).min(longest));
             if !nap.is_zero() && !is_held {
-                self.worker.mirror();
+                self.graph.rest();
             }
             if nap > SOON || is_held {
-                self.worker.rest();
+                self.graph.keep().sync();
             }
             if !nap.is_zero() {
                 std::thread::park_timeout(nap);
@@ -256,10 +251,10 @@ impl EngineThread {
             let now = self.clock.now();
             match arrival {
                 Arrival::Row(samples) => together = samples,
-                Arrival::Thinned(samples) => self.worker.thinned(nth, samples),
+                Arrival::Thinned(samples) => self.graph.order(Order::Thinned(nth, samples)),
                 Arrival::Sample(sample) => {
                     together = together.saturating_sub(1);
-                    let admission = self.worker.arrive(sample, now);
+                    let admission = self.graph.arrive(sample, now);
                     if !matches!(
                         admission,
                         Admission::Accepted(_) | Admission::Waits(_) | Admission::Held
@@ -267,14 +262,15 @@ impl EngineThread {
                         self.remark(sample.channel as usize, admission);
                     }
                 }
-                Arrival::Connected => self.worker.sequencer().connected(nth, now),
-                Arrival::Away => self.worker.sequencer().away(nth, now),
+                Arrival::Connected => self.graph.order(Order::Connected(nth, now)),
+                Arrival::Away => self.graph.order(Order::Away(nth, now)),
                 Arrival::Segment => {
                     let sinks = &mut self.sinks;
-                    self.worker.segment(now, |output| sinks.put(output))?;
+                    self.graph.finish(now, |output| sinks.put(output))?;
+                    self.graph.segment();
                 }
                 Arrival::Ended => {
-                    self.worker.sequencer().ended(nth);
+                    self.graph.order(Order::Ended(nth));
                     *left -= 1;
                 }
             }
@@ -284,20 +280,22 @@ impl EngineThread {
     }
 
     fn recorded(&mut self, nth: usize) {
-        if !self.worker.sequencer().holds(nth) {
-            self.sources[nth].recorded(self.worker.recorder().event());
+        let sequencer = self.graph.sequencer();
+        if !sequencer.is_some_and(|of| of.holds(nth)) {
+            self.sources[nth].recorded(self.graph.keep().event());
         }
     }
 
     /// Hands the first of a reason on, the tenth, the hundredth …
     fn remark(&mut self, channel: usize, admission: Admission) {
-        let counts = self.worker.sequencer().counts().get(channel);
+        let sequencer = self.graph.sequencer();
+        let counts = sequencer.and_then(|of| of.counts().get(channel));
         let count = counts.map_or(1, |counts| counts.of(admission));
         if count
             .checked_ilog10()
             .is_some_and(|of| 10_u64.pow(of) == count)
         {
-            let leader = self.worker.sequencer().leader(admission, self.clock.now());
+            let leader = self.graph.leader(admission, self.clock.now());
             let remark = Remark::NotAccepted(channel, admission, count, leader);
             let _ = self.remarks.push(remark);
             self.control.ring();
@@ -308,7 +306,7 @@ impl EngineThread {
         let now = self.clock.now();
         // Whoever reads does so for a moment; otherwise a second later does.
         if let Ok(mut snapshot) = self.shared.snapshot.try_lock() {
-            self.worker.publish(&mut snapshot, now);
+            self.graph.facts(&mut snapshot, now);
         }
     }
 }

@@ -3,11 +3,11 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+use athermal_run::live::Output;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::connector::OutRow;
 use crate::time::{Duration, Instant};
-use crate::worker::Output;
 
 /// The words before the outputs.
 const HEAD: usize = 7;

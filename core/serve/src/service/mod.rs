@@ -39,12 +39,13 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle, Thread};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_run::live::{Feed, LiveOptions, Notice, pair_from};
+use athermal_run::live::{Feed, LiveGraph, LiveOptions, Notice, Order, pair_from};
 use athermal_run::model::Model;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::{CommitError, Held};
 pub use asked::ChannelSamples;
+pub use athermal_run::live::Snapshot;
 pub use ending::Ended;
 pub use error::ServiceError;
 pub use event::{Ahead, OwnEvents, ServiceEvent, event_kinds};
@@ -52,7 +53,6 @@ pub use frames::SinkCounts;
 pub use handle::{NoAnswer, ServiceHandle};
 pub use observer::Observer;
 pub use prediction_error::{PredictionError, PredictionErrors};
-pub use status::Snapshot;
 pub use watcher::{LastTicks, Seen, Watcher};
 
 use crate::aside::{Aside, within};
@@ -71,8 +71,7 @@ use crate::moment::MonotonicClock;
 use crate::recovery::{Recovered, RecoveryReport};
 use crate::sequencer::Sequencer;
 use crate::time::{Duration, Instant};
-use crate::worker::Worker;
-use engine_thread::{EngineThread, Order, Remark};
+use engine_thread::{EngineThread, Remark, Request};
 use handle::Work;
 use host_clock::HostClock;
 use observer::Observers;
@@ -133,8 +132,8 @@ pub struct Service {
     /// The revision of the graph that the machine file gave.
     given: String,
     keeper: Keeper,
-    engine: JoinHandle<Worker>,
-    orders: Producer<Order>,
+    engine: JoinHandle<LiveGraph<Recorder>>,
+    orders: Producer<Request>,
     remarks: Consumer<Remark>,
     /// What sources left out, by their names.
     heard: Receiver<(String, String)>,
@@ -254,9 +253,9 @@ impl Service {
             happenings,
             every,
         );
-        let mut worker = Worker::new(sequencer, stepper, recorder);
+        let mut graph = LiveGraph::new(Some(sequencer), stepper, recorder);
         if was_frozen != options.frozen {
-            worker.freeze(options.frozen);
+            graph.order(Order::Freeze(options.frozen));
         }
         let (to_engine, orders) = RingBuffer::new(64);
         let (remarks, from_engine) = RingBuffer::new(256);
@@ -275,7 +274,7 @@ impl Service {
             spawn("engine", move || {
                 let sources = links.recv().unwrap_or_default();
                 let thread = EngineThread {
-                    worker,
+                    graph,
                     clock,
                     sources,
                     sinks: out,
@@ -517,7 +516,11 @@ impl Service {
     }
 
     fn order(&mut self, order: Order) {
-        if self.orders.push(order).is_ok() {
+        self.request(Request::Order(order));
+    }
+
+    fn request(&mut self, request: Request) {
+        if self.orders.push(request).is_ok() {
             self.engine.thread().unpark();
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 
-use athermal_run::live::{LiveOptions, pair};
+use athermal_run::live::{LiveGraph, LiveOptions, pair};
 use rtrb::RingBuffer;
 
 use super::engine_thread::{EngineThread, Sinks};
@@ -17,7 +17,6 @@ use crate::moment::MonotonicClock;
 use crate::sequencer::{Rules, Sequencer, Timeline};
 use crate::tests::{Folder, feed, model, rules};
 use crate::time::{Duration, Instant};
-use crate::worker::Worker;
 
 /// What an engine thread does that is given so many rows and then the end.
 struct Work {
@@ -106,7 +105,7 @@ fn work(rows: usize) -> Work {
     sinks.add(sender, columns, std::thread::current());
     let shared = Arc::new(Shared::new(3));
     let thread = EngineThread {
-        worker: Worker::new(sequencer, stepper, recorder),
+        graph: LiveGraph::new(Some(sequencer), stepper, recorder),
         clock,
         sources: vec![source],
         sinks,

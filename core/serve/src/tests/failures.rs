@@ -4,6 +4,8 @@ use std::fs;
 use std::process::Command;
 use std::time::{Duration as Wait, Instant as Clock};
 
+use athermal_run::live::Keep as _;
+
 use super::*;
 
 fn patient(done: impl Fn() -> bool, what: &str) {
@@ -202,7 +204,7 @@ fn the_engine_thread_allocates_nothing_for_records() {
             recorder.record(Record::Sample(sample));
             let at = Instant::from_ns(nth);
             recorder.record(Record::Tick { at, hash: 1 });
-            recorder.wake();
+            recorder.sync();
             recorder.mend(line.sequencer.timeline());
         }
     });

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration as Wait, Instant as Clock};
 
-use athermal_run::live::{LiveOptions, pair_from};
+use athermal_run::live::{LiveGraph, LiveOptions, Output, pair_from};
 
 use super::recoveries::{nth, steady, uninterrupted};
 use super::*;
@@ -13,7 +13,6 @@ use crate::checkpoint::Checkpoints;
 use crate::folder::StateFolder;
 use crate::keeper::Keeper;
 use crate::recovery::Recovered;
-use crate::worker::{Output, Worker};
 
 const FOLDER: &str = "ATHERMAL_SERVE_FOLDER";
 const PACE: &str = "ATHERMAL_SERVE_PACE";
@@ -90,7 +89,11 @@ fn child() {
     let restarted = now;
     let mut sequencer = Sequencer::resume(steady(), recovered.timeline, now);
     sequencer.connected(0, now);
-    let (stepper, control) = pair_from(recovered.engine, LiveOptions::default()).unwrap();
+    let live = LiveOptions {
+        mirrors: false,
+        ..LiveOptions::default()
+    };
+    let (stepper, control) = pair_from(recovered.engine, live).unwrap();
     let every = Wait::from_millis(5);
     let known = Arc::clone(&progress);
     let mut keeper = Keeper::new(
@@ -100,7 +103,7 @@ fn child() {
         happenings,
         every,
     );
-    let mut worker = Worker::new(sequencer, stepper, recorder);
+    let mut worker = LiveGraph::new(Some(sequencer), stepper, recorder);
     let mut text = String::new();
     for count in from..SAMPLES {
         let (came, sample) = nth(count);
@@ -119,11 +122,14 @@ fn child() {
             sink.write_all(text.as_bytes()).unwrap();
             text.clear();
         }
+        worker.rest();
         if count % 10 == 0 {
             keeper.pump().unwrap();
         }
         std::thread::sleep(Wait::from_micros(pace));
     }
+    keeper.control().needs_replica();
+    worker.rest();
     let (_, _, recorder) = worker.into_parts();
     recorder.finish();
     keeper.finish().unwrap();

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use athermal_core::prng::Prng;
 use athermal_features as _;
 use athermal_run::live::Feed;
+use athermal_run::live::Keep as _;
 use athermal_run::model::Model;
 
 use crate::engine::Engine;
@@ -154,7 +155,7 @@ impl Line {
             } else {
                 Record::Tick { at, hash }
             });
-            self.recorder.wake();
+            self.recorder.sync();
             self.recorder.mend(self.sequencer.timeline());
         }
     }

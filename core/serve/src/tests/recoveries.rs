@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::Duration as Wait;
 
-use athermal_run::live::{LiveOptions, pair_from};
+use athermal_run::live::{Keep as _, LiveGraph, LiveOptions, Output, pair_from};
 
 use super::*;
 use crate::checkpoint::{Checkpoint, Checkpoints};
@@ -11,7 +11,6 @@ use crate::folder::{FolderError, StateFolder};
 use crate::journal::{Keep, retire};
 use crate::keeper::Keeper;
 use crate::recovery::{Recovered, RecoveryError, Start};
-use crate::worker::Worker;
 
 /// The nth of many samples, and when it comes: always within `wait`.
 pub(super) fn nth(nth: u64) -> (Moment, Sample) {
@@ -36,7 +35,7 @@ pub(super) fn steady() -> Rules {
 
 /// A service with its state in a folder.
 struct Service {
-    worker: Worker,
+    worker: LiveGraph<Recorder>,
     keeper: Keeper,
     outputs: Outputs,
     _folder: StateFolder,
@@ -85,7 +84,7 @@ impl Service {
                 before,
                 every,
             ),
-            worker: Worker::new(sequencer, stepper, recorder),
+            worker: LiveGraph::new(Some(sequencer), stepper, recorder),
             outputs: Vec::new(),
             _folder: folder,
         }
@@ -96,7 +95,7 @@ impl Service {
         for (count, (now, sample)) in samples.map(nth).enumerate() {
             if count % 100 == 99 {
                 // As much time as a checkpoint takes.
-                let recorder = self.worker.recorder();
+                let recorder = self.worker.keep();
                 let event = recorder.event();
                 while recorder.progress().synced() < event {
                     std::thread::sleep(Wait::from_millis(1));
@@ -104,7 +103,7 @@ impl Service {
                 }
                 self.keeper.pump().unwrap();
             }
-            let mut put = |of: &crate::worker::Output<'_>| {
+            let mut put = |of: &Output<'_>| {
                 outputs.push((of.at, bits(of.stepped.outputs)));
             };
             self.worker.pass(now, &mut put).unwrap();
@@ -116,7 +115,7 @@ impl Service {
 
     /// What a kill leaves: all that was written, and nothing else.
     fn kill(mut self, path: &Path) -> (Folder, Outputs) {
-        let recorder = self.worker.recorder();
+        let recorder = self.worker.keep();
         assert!(
             recorder
                 .progress()
@@ -463,7 +462,7 @@ fn a_checkpoint_waits_for_the_journal() {
     let all = checkpoints(&service._folder);
     let saved = all.read().unwrap();
     let newest = saved.map(|of| of.unwrap().happenings).max().unwrap_or(0);
-    assert!(newest <= service.worker.recorder().progress().synced_happenings());
+    assert!(newest <= service.worker.keep().progress().synced_happenings());
     let (_, _, recorder) = service.worker.into_parts();
     let happenings = recorder.happenings();
     recorder.finish();

@@ -4,7 +4,6 @@
 mod replacement;
 mod report;
 mod restart;
-mod runner;
 mod swap_schedule;
 mod watched_graph;
 
@@ -18,14 +17,14 @@ use std::time::{Duration, Instant as Clock};
 
 use super::monitor::{Finding, Monitor, OutputMonitor};
 use super::store::{OutputIdentity, StateStore};
-use super::{Feed, Frame, RunError, Sink, TickView};
+use super::{Feed, Frame, LiveGraph, LiveOptions, Order, RunError, Sink, TickView};
 use crate::compile::Plan;
-use crate::engine::Engine;
+use crate::engine::{Engine, EngineError};
 use crate::model::Model;
 use crate::recording::{Event, Samples, Source, Steps, drive};
 use crate::time::Instant;
 use restart::Restart;
-use runner::Runner;
+use swap_schedule::SwapSchedule;
 
 /// How long a run that is killed may have learned in vain.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
@@ -67,7 +66,9 @@ impl SessionOptions {
 /// A graph at work.
 pub struct Session<'a> {
     reporter: &'a dyn Reporter,
-    runner: Runner,
+    live: LiveGraph,
+    model: Model,
+    swaps: Option<SwapSchedule>,
     state: Option<StateStore>,
     restart: Restart,
     monitors: Vec<&'a mut dyn Monitor>,
@@ -110,18 +111,30 @@ impl<'a> Session<'a> {
                 saved => saved?,
             }
         }
-        let union = options.union(&model);
-        let runner = match options.replacement {
-            None => Runner::fixed(engine, model, options.frozen),
-            Some(of) => Runner::replaceable(engine, model, of, union, options.frozen)?,
+        let (feed, columns) = options.union(&model);
+        let width = feed.len();
+        let (mut live, swaps) = match options.replacement {
+            None => (LiveGraph::of_rows(engine), None),
+            Some(of) => {
+                let channels = feed.clone();
+                let options = LiveOptions {
+                    channels,
+                    ..LiveOptions::default()
+                };
+                let live = LiveGraph::replaceable(engine, options)?;
+                (live, Some(SwapSchedule::new(of, feed, columns)))
+            }
         };
+        live.order(Order::Freeze(options.frozen));
         Ok(Self {
             reporter,
             empty: Samples {
                 time_text: String::new(),
-                values: vec![f64::NAN; runner.width()],
+                values: vec![f64::NAN; width],
             },
-            runner,
+            live,
+            model,
+            swaps,
             state: options.state,
             restart,
             monitors: Vec::new(),
@@ -142,7 +155,9 @@ impl<'a> Session<'a> {
     /// Puts out these columns: more than those of its graphs, where an output has them already. A graph that cannot be replaced has
     /// columns of its own.
     pub fn set_columns(&mut self, columns: Vec<String>) {
-        self.runner.set_columns(columns);
+        if let Some(swaps) = &mut self.swaps {
+            swaps.set_columns(columns);
+        }
     }
 
     /// Goes on with an output whose last row is at `written`, which only a session with a state does. Returns the instant up to which
@@ -165,13 +180,13 @@ impl<'a> Session<'a> {
     /// The engine at work.
     #[must_use]
     pub fn engine(&self) -> &Engine {
-        self.runner.engine()
+        self.live.engine()
     }
 
     /// The model at work.
     #[must_use]
     pub fn model(&self) -> &Model {
-        self.runner.model()
+        &self.model
     }
 
     /// What has been put out.
@@ -198,26 +213,39 @@ impl<'a> Session<'a> {
         let monitors = self.monitors.iter_mut();
         let Event::Row(time) = event else {
             monitors.for_each(|monitor| monitor.segment());
-            self.runner.segment();
+            self.live.segment();
             return Ok(true);
         };
         let values = &samples.values;
         monitors.for_each(|monitor| monitor.row(time, values, &mut self.found));
         self.report_found(time, &samples.time_text);
-        let watching = (&mut *self.monitors, &mut self.found);
-        if !self.runner.step(time, values, watching, reporter)? {
-            return Ok(false);
+        if let Some(swaps) = &mut self.swaps {
+            swaps.before(&mut self.live, &mut self.model, time, reporter)?;
         }
-        let (engine, monitors) = (self.runner.engine(), self.monitors.iter_mut());
+        let stepped = match self.live.row(time, values) {
+            Ok(stepped) => stepped,
+            Err(EngineError::NotAfter { .. }) => return Ok(false),
+            Err(error) => return Err(error.into()),
+        };
+        if let Some(swaps) = &mut self.swaps
+            && swaps.show(&stepped)
+        {
+            let usual = self.model.sample_ranges();
+            for monitor in &mut self.monitors {
+                monitor.follow(stepped.plan, swaps.feed(), usual, &mut self.found);
+            }
+        }
+        let (engine, monitors) = (self.live.engine(), self.monitors.iter_mut());
         let tick = TickView::of(time, engine);
         monitors.for_each(|monitor| monitor.stepped(&tick, &mut self.found));
         self.report_found(time, &samples.time_text);
-        let (revision, outputs) = self.runner.made();
+        let engine = self.live.engine();
+        let swaps = self.swaps.as_ref();
         let frame = Frame {
             time,
             time_text: &samples.time_text,
-            revision,
-            outputs,
+            revision: engine.revision(),
+            outputs: swaps.map_or(engine.outputs(), SwapSchedule::shown),
         };
         self.output.look(time, frame.outputs);
         sink.put(&frame).map_err(RunError::Sink)?;
@@ -238,7 +266,7 @@ impl<'a> Session<'a> {
 
     /// Freezes what estimators learn while they run, or lets it go on.
     pub fn freeze(&mut self, frozen: bool) {
-        self.runner.freeze(frozen);
+        self.live.order(Order::Freeze(frozen));
     }
 
     /// Lets a graph take over before the next row, or after its time in the shadow. `path` names it in reports.
@@ -246,7 +274,11 @@ impl<'a> Session<'a> {
     /// # Errors
     /// The model again, where the session has no [`Replacement`].
     pub fn swap(&mut self, path: PathBuf, model: Model) -> Result<(), Box<Model>> {
-        self.runner.swap(path, model)
+        match &mut self.swaps {
+            Some(swaps) => swaps.add(path, model),
+            None => return Err(Box::new(model)),
+        }
+        Ok(())
     }
 
     /// Takes all events of a source, and finishes.
@@ -279,11 +311,13 @@ impl<'a> Session<'a> {
     pub fn finish(&mut self, sink: &mut dyn Sink) -> Result<(), RunError> {
         sink.finish().map_err(RunError::Sink)?;
         self.save_at_the_end(sink)?;
-        let (engine, monitors) = (self.runner.engine(), self.monitors.iter_mut());
+        let (engine, monitors) = (self.live.engine(), self.monitors.iter_mut());
         monitors.for_each(|monitor| monitor.end(engine, &mut self.found));
         let last = engine.last().unwrap_or(Instant::MIN);
         self.report_found(last, "");
-        self.runner.end(self.reporter);
+        if let Some(swaps) = &mut self.swaps {
+            swaps.end(&mut self.live, self.reporter);
+        }
         Ok(())
     }
 
@@ -300,13 +334,13 @@ impl<'a> Session<'a> {
         let Some(state) = &mut self.state else {
             return Ok(());
         };
-        let engine = self.runner.engine();
+        let engine = self.live.engine();
         if !is_time && !state.is_outdated(engine) {
             return Ok(());
         }
         sink.flush().map_err(RunError::Sink)?;
         self.saved = Clock::now();
-        if let Err(error) = state.save(engine, self.runner.model()) {
+        if let Err(error) = state.save(engine, &self.model) {
             let at_start = false;
             self.reporter.report(Report::NotSaved { error, at_start });
         }
@@ -317,7 +351,7 @@ impl<'a> Session<'a> {
         self.look_at_output();
         if let Some(state) = &mut self.state {
             sink.flush().map_err(RunError::Sink)?;
-            state.save(self.runner.engine(), self.runner.model())?;
+            state.save(self.live.engine(), &self.model)?;
         }
         Ok(())
     }

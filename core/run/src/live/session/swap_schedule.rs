@@ -6,7 +6,7 @@ use super::watched_graph::Went;
 use super::{
     Refusal, Replacement, Report, Reporter, Swap, SwapTime, WatchedGraph, load_replacement,
 };
-use crate::live::{Control, StageError, Staged};
+use crate::live::{Control, Feed, LiveGraph, StageError, Staged, Stepped};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
 
@@ -22,57 +22,79 @@ pub(super) struct SwapSchedule {
     /// Latest first, once there has been a row.
     waiting: Vec<Swap>,
     first: Option<Instant>,
-    running: Model,
     staged: Option<(Model, PathBuf)>,
     watched: Option<WatchedGraph>,
     shadow: Option<Duration>,
     margin: f64,
     looked: std::time::Instant,
-    /// The outputs that are put out.
+    /// The channels of a row.
+    feed: Vec<Feed>,
+    /// The outputs that are put out, and where they stand among those of the graph.
     columns: Vec<String>,
+    places: Vec<Option<usize>>,
+    shown: Vec<f64>,
+    /// How many graphs had taken over when the places were found.
+    generation: Option<u64>,
     /// At how many rows each of them had a value, of whichever graph.
     gave: Vec<u64>,
     rows: u64,
 }
 
 impl SwapSchedule {
-    pub(super) fn new(running: Model, replacement: Replacement) -> Self {
-        Self {
+    pub(super) fn new(replacement: Replacement, feed: Vec<Feed>, columns: Vec<String>) -> Self {
+        let mut schedule = Self {
             waiting: replacement.swaps,
             first: None,
-            running,
             staged: None,
             watched: replacement.watched,
             shadow: replacement.shadow,
             margin: replacement.margin,
             looked: std::time::Instant::now(),
+            feed,
             columns: Vec::new(),
+            places: Vec::new(),
+            shown: Vec::new(),
+            generation: None,
             gave: Vec::new(),
             rows: 0,
-        }
+        };
+        schedule.set_columns(columns);
+        schedule
     }
 
-    /// The graph that runs, once the row has been stepped before which it took over.
-    pub(super) fn running(&self) -> &Model {
-        &self.running
+    /// The channels of a row.
+    pub(super) fn feed(&self) -> &[Feed] {
+        &self.feed
     }
 
-    /// The outputs that are put out.
-    pub(super) fn columns(&self) -> &[String] {
-        &self.columns
+    /// The outputs in the order of the columns.
+    pub(super) fn shown(&self) -> &[f64] {
+        &self.shown
     }
 
     /// Puts out these outputs.
     pub(super) fn set_columns(&mut self, columns: Vec<String>) {
         self.gave = vec![0; columns.len()];
+        self.shown = vec![f64::NAN; columns.len()];
         self.columns = columns;
+        self.generation = None;
     }
 
-    /// Counts which columns have a value at a row.
-    pub(super) fn count(&mut self, values: &[f64]) {
-        for (gave, value) in self.gave.iter_mut().zip(values) {
-            *gave += u64::from(!value.is_nan());
+    /// Takes what came of a row, and counts which columns have a value; whether it is the first of a graph.
+    pub(super) fn show(&mut self, stepped: &Stepped<'_>) -> bool {
+        // Two graphs of one revision may give their outputs in another order.
+        let is_first = self.generation.replace(stepped.generation) != Some(stepped.generation);
+        if is_first {
+            let outputs = &stepped.plan.outputs;
+            let place = |name: &String| outputs.iter().position(|of| of.name == *name);
+            self.places = self.columns.iter().map(place).collect();
         }
+        let shown = self.shown.iter_mut().zip(&mut self.gave);
+        for ((shown, gave), place) in shown.zip(&self.places) {
+            *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
+            *gave += u64::from(!shown.is_nan());
+        }
+        is_first
     }
 
     /// Adds a graph that takes over as soon as it may, after those added before.
@@ -91,7 +113,8 @@ impl SwapSchedule {
     /// When a graph named at the start cannot take over.
     pub(super) fn before(
         &mut self,
-        control: &mut Control,
+        live: &mut LiveGraph,
+        running: &mut Model,
         now: Instant,
         reporter: &dyn Reporter,
     ) -> Result<(), StageError> {
@@ -109,15 +132,15 @@ impl SwapSchedule {
         if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
             return Ok(());
         }
-        pump(control, reporter);
+        pump(live, reporter);
         if look {
-            self.look(control, now, reporter);
+            self.look(live, running, now, reporter);
         }
         // One at a time: what is committed takes over with this row, and only then may the next be staged.
         if self.staged.is_some() {
-            return match self.judge(control, reporter) {
+            return match self.judge(live, running, reporter) {
                 Err(error) if self.watched.is_some() => {
-                    self.refuse(control, &error, reporter);
+                    self.refuse(live, &error, reporter);
                     Ok(())
                 }
                 judged => judged,
@@ -128,15 +151,21 @@ impl SwapSchedule {
                 path, mut model, ..
             }) = self.waiting.pop()
         {
-            model.take_fits_of(&self.running);
-            return self.stage(control, model, path, now, reporter);
+            model.take_fits_of(running);
+            return self.stage(live, running, (model, path), now, reporter);
         }
         Ok(())
     }
 
     /// Stages the watched file where it has changed; with a mistake in it, what runs goes on. What is in the shadow goes when it
     /// stands in the file no more.
-    fn look(&mut self, control: &mut Control, now: Instant, reporter: &dyn Reporter) {
+    fn look(
+        &mut self,
+        live: &mut LiveGraph,
+        running: &mut Model,
+        now: Instant,
+        reporter: &dyn Reporter,
+    ) {
         self.looked = std::time::Instant::now();
         let Some(watched) = &mut self.watched else {
             return;
@@ -147,7 +176,7 @@ impl SwapSchedule {
                 Some(Went::Away(away)) => {
                     reporter.report(Report::FileGone(&away));
                     if self.staged.is_some() {
-                        self.withdraw(control, &path, Refusal::Gone, reporter);
+                        self.withdraw(live, &path, Refusal::Gone, reporter);
                     }
                 }
                 Some(Went::Back(back)) => reporter.report(Report::FileBack(&back)),
@@ -156,16 +185,17 @@ impl SwapSchedule {
             return;
         }
         *watched = WatchedGraph::of(&path);
-        let loaded = load_replacement(&path, std::iter::once(&self.running), reporter);
+        let loaded = load_replacement(&path, std::iter::once(&*running), reporter);
         if self.staged.is_some() {
             let revision = loaded.as_ref().ok().and_then(Model::revision);
-            let staged = control.staged().map(Staged::revision);
+            let staged = live.control().and_then(|of| of.staged());
+            let staged = staged.map(Staged::revision);
             if revision.is_some() && revision.as_deref() == staged {
                 self.staged = loaded.ok().zip(Some(path));
                 return;
             }
-            self.withdraw(control, &path, Refusal::Changed, reporter);
-            if revision.is_some() && revision == self.running.revision() {
+            self.withdraw(live, &path, Refusal::Changed, reporter);
+            if revision.is_some() && revision == running.revision() {
                 reporter.report(Report::RunsAlready(&path));
                 return;
             }
@@ -182,47 +212,47 @@ impl SwapSchedule {
         let is_new = |name: &String| !self.columns.contains(name);
         if let Some(new) = outputs.find(|output| is_new(&output.name)) {
             refused(Refusal::NoColumn(&new.name));
-        } else if let Err(error) = self.stage(control, model, path, now, reporter) {
-            self.refuse(control, &error, reporter);
+        } else if let Err(error) = self.stage(live, running, (model, path), now, reporter) {
+            self.refuse(live, &error, reporter);
         }
     }
 
     /// Lets go of what is in the shadow, since its file is no more what it was.
     fn withdraw(
         &mut self,
-        control: &mut Control,
+        live: &mut LiveGraph,
         path: &Path,
         reason: Refusal<'_>,
         reporter: &dyn Reporter,
     ) {
         self.staged = None;
-        control.discard();
+        discard(live);
         reporter.report(Report::NotTakenOver { path, reason });
     }
 
     /// Lets go of the watched file as it has become.
-    fn refuse(&mut self, control: &mut Control, error: &StageError, reporter: &dyn Reporter) {
+    fn refuse(&mut self, live: &mut LiveGraph, error: &StageError, reporter: &dyn Reporter) {
         if let Some(path) = self.watched.as_ref().map(|of| of.path().to_owned()) {
-            self.withdraw(control, &path, Refusal::Stage(error), reporter);
+            self.withdraw(live, &path, Refusal::Stage(error), reporter);
         }
     }
 
     fn stage(
         &mut self,
-        control: &mut Control,
-        model: Model,
-        path: PathBuf,
+        live: &mut LiveGraph,
+        running: &mut Model,
+        (model, path): (Model, PathBuf),
         now: Instant,
         reporter: &dyn Reporter,
     ) -> Result<(), StageError> {
-        let staged = control.stage(&model, false)?;
+        let staged = live.stage(&model, false)?;
         let (past, mut silent) = staged.silent();
         // What runs seldom gives any either, as a settle time, which there is when the set point has changed.
-        silent.retain(|name| !self.gives_seldom(name, now, past));
+        silent.retain(|name| !self.gives_seldom(name, running, now, past));
         let has = |name: &str| model.plan.outputs.iter().any(|output| output.name == name);
-        let running = self.running.plan.outputs.iter();
-        let running = running.map(|output| output.name.clone());
-        let lacking: Vec<String> = running.filter(|name| !has(name)).collect();
+        let outputs = running.plan.outputs.iter();
+        let outputs = outputs.map(|output| output.name.clone());
+        let lacking: Vec<String> = outputs.filter(|name| !has(name)).collect();
         reporter.report(Report::Staged {
             path: &path,
             staged,
@@ -231,15 +261,18 @@ impl SwapSchedule {
         });
         self.staged = Some((model, path));
         match self.shadow {
-            Some(duration) => control.shadow(duration, self.margin),
-            None => self.commit(control),
+            Some(duration) => match live.control() {
+                Some(control) => control.shadow(duration, self.margin),
+                None => Ok(()),
+            },
+            None => self.commit(live, running),
         }
     }
 
     /// Whether what runs has an output of which no more than a few values are to be expected in so long a past.
-    fn gives_seldom(&self, name: &str, now: Instant, past: Duration) -> bool {
+    fn gives_seldom(&self, name: &str, running: &Model, now: Instant, past: Duration) -> bool {
         let mut columns = self.columns.iter().zip(&self.gave);
-        let mut outputs = self.running.plan.outputs.iter();
+        let mut outputs = running.plan.outputs.iter();
         let gave = columns.find_map(|(column, gave)| (column == name).then_some(*gave));
         let ran = self.first.map_or(Duration::ZERO, |first| now - first);
         outputs.any(|output| output.name == name)
@@ -247,8 +280,14 @@ impl SwapSchedule {
                 .is_some_and(|gave| gave as f64 * past.as_ns() as f64 <= FEW * ran.as_ns() as f64)
     }
 
-    fn judge(&mut self, control: &mut Control, reporter: &dyn Reporter) -> Result<(), StageError> {
-        let Some(verdict) = control.verdict().filter(|verdict| verdict.over) else {
+    fn judge(
+        &mut self,
+        live: &mut LiveGraph,
+        running: &mut Model,
+        reporter: &dyn Reporter,
+    ) -> Result<(), StageError> {
+        let verdict = live.control().and_then(|of| of.verdict());
+        let Some(verdict) = verdict.filter(|verdict| verdict.over) else {
             return Ok(());
         };
         // A file that is being written is read first.
@@ -257,7 +296,7 @@ impl SwapSchedule {
         }
         reporter.report(Report::Shadow(&verdict));
         let reason = match verdict.passes {
-            Some(true) => return self.commit(control),
+            Some(true) => return self.commit(live, running),
             None => Refusal::NothingToCompare,
             Some(false) => Refusal::LargerError,
         };
@@ -265,21 +304,21 @@ impl SwapSchedule {
             let path = &path;
             reporter.report(Report::NotTakenOver { path, reason });
         }
-        control.discard();
+        discard(live);
         Ok(())
     }
 
-    fn commit(&mut self, control: &mut Control) -> Result<(), StageError> {
-        control.commit()?;
+    fn commit(&mut self, live: &mut LiveGraph, running: &mut Model) -> Result<(), StageError> {
+        live.control().map_or(Ok(()), Control::commit)?;
         if let Some((model, _)) = self.staged.take() {
-            self.running = model;
+            *running = model;
         }
         Ok(())
     }
 
     /// Reports, once the data have ended, what has happened since and what has not.
-    pub(super) fn end(&self, control: &mut Control, reporter: &dyn Reporter) {
-        pump(control, reporter);
+    pub(super) fn end(&self, live: &mut LiveGraph, reporter: &dyn Reporter) {
+        pump(live, reporter);
         let shadowed = self.staged.iter().map(|(_, path)| path);
         let waiting = self.waiting.iter().rev().map(|swap| &swap.path);
         for path in shadowed.chain(waiting) {
@@ -289,8 +328,14 @@ impl SwapSchedule {
     }
 }
 
-fn pump(control: &mut Control, reporter: &dyn Reporter) {
-    for notice in control.pump() {
+fn discard(live: &mut LiveGraph) {
+    if let Some(control) = live.control() {
+        control.discard();
+    }
+}
+
+fn pump(live: &mut LiveGraph, reporter: &dyn Reporter) {
+    for notice in live.events().0 {
         reporter.report(Report::Swap(notice));
     }
 }

@@ -6,7 +6,7 @@
 use super::Timeline;
 use super::judge::Judge;
 use super::pace::offset;
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 
 /// A lag is kept anew where it is shorter than the one that is kept by so much, and so long after that.

@@ -2,7 +2,7 @@
 
 use super::timeline::WAITING;
 use super::{Admission, Decision, Refusal, Sample, Sequencer};
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 
 /// What is decided of samples that wait for that, of so many yet.

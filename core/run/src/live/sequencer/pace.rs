@@ -1,6 +1,6 @@
 //! At what pace the stamps of a channel go: with the clock, faster as in a backlog, or forth and back.
 
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 
 /// Stamps are looked at no more often: of what comes at once the first alone.

@@ -1,12 +1,12 @@
 //! How many samples were accepted and do not count: they are infinite or outside of the range of their signal.
 
-use athermal_run::live::Feed;
+use super::Feed;
 
 use crate::compile::Plan;
 
 /// The counts by channel of the feed, on the engine thread.
 #[derive(Debug)]
-pub struct Outside {
+pub(super) struct Outside {
     feed: Vec<Feed>,
     /// Between which values samples count; none of a channel that the graph does not read.
     ranges: Vec<Option<(f64, f64)>>,
@@ -14,7 +14,7 @@ pub struct Outside {
 }
 
 impl Outside {
-    pub(crate) fn new(feed: &[Feed], plan: &Plan) -> Self {
+    pub(super) fn new(feed: &[Feed], plan: &Plan) -> Self {
         let mut outside = Self {
             feed: feed.to_vec(),
             ranges: vec![None; feed.len()],
@@ -25,13 +25,13 @@ impl Outside {
     }
 
     /// Goes by the ranges of another plan. It allocates nothing.
-    pub(crate) fn follow(&mut self, plan: &Plan) {
+    pub(super) fn follow(&mut self, plan: &Plan) {
         for (range, fed) in self.ranges.iter_mut().zip(&self.feed) {
             *range = fed.source(plan).map(|of| of.range);
         }
     }
 
-    pub(crate) fn look(&mut self, row: &[f64]) {
+    pub(super) fn look(&mut self, row: &[f64]) {
         for ((count, range), &value) in self.counts.iter_mut().zip(&self.ranges).zip(row) {
             let is_outside = |&(lowest, highest): &(f64, f64)| {
                 value.is_infinite() || value < lowest || value > highest
@@ -41,8 +41,7 @@ impl Outside {
     }
 
     /// The counts.
-    #[must_use]
-    pub fn counts(&self) -> &[u64] {
+    pub(super) fn counts(&self) -> &[u64] {
         &self.counts
     }
 }

@@ -14,7 +14,7 @@
 
 use super::Rules;
 use super::pace::{MINUTE, Pace};
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 
 /// How much faster than the host a source's clock is allowed to fall behind until its newest stamp no longer counts: 100 ppm.

@@ -39,7 +39,7 @@ pub use decision::{Admission, Counts, Decision, Leader, Refusal, Sample};
 pub use rules::{ChannelRules, ClockRemedy, ClockRule, Rules, SourceRules};
 pub use timeline::Timeline;
 
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 use age::Age;
 use gate::Gate;

@@ -5,7 +5,7 @@
 //! after a connection that lasted, or where no other gives anything.
 
 use super::{Rules, SourceRules};
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::Duration;
 
 /// Knows which sources are waited for.

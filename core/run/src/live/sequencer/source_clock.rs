@@ -1,7 +1,7 @@
 //! What is made of the stamps of a source whose clock is wrong.
 
 use super::{ClockRemedy, ClockRule, Refusal, Sample};
-use crate::moment::Moment;
+use crate::live::Moment;
 use crate::time::{Duration, Instant};
 
 /// Of so many samples the median offset is taken.
