@@ -85,7 +85,8 @@ impl Slots for TickView<'_> {
     fn value(&self, slot: usize) -> f64 {
         match self.engine {
             Some(engine) => engine.value(slot),
-            None => self.mirrored(slot),
+            None if self.ran(slot) => self.mirrored(slot),
+            None => f64::NAN,
         }
     }
 }
