@@ -1,7 +1,8 @@
 //! How long a sample takes through a service, from its source to the sink, beside two bare threads that sleep the same.
 //!
 //! `cargo bench --bench service` sends a row of a simulated die tester each millisecond, without `wait`, and prints percentiles of the
-//! time from the hand-over by the source to the call of the sink. The journal is written between. `--test` sends a few.
+//! time from the hand-over by the source to the call of the sink. The journal is written between, and a checkpoint taken each second. It
+//! also prints what the process took of the processor meanwhile and how much memory it held (Linux). `--test` sends a few.
 
 mod die_tester;
 
@@ -109,7 +110,10 @@ fn main() {
         rows: sent,
         ..Course::default()
     });
+    let before = processor_s();
     serve(&model);
+    let took = processor_s() - before;
+    println!("processor {took:.2} s, memory at most {:.1} MB", peak_mb());
     let sent = course.sent.lock().expect("nobody panicked");
     let came = course.came.lock().expect("nobody panicked");
     assert_eq!(sent.len(), course.rows.len());
@@ -132,9 +136,26 @@ fn main() {
     print("two bare threads that sleep the same", &mut bare(rows));
 }
 
+/// What this process has taken of the processor, in s.
+fn processor_s() -> f64 {
+    let all = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let rest = all.rsplit(')').next().unwrap_or_default();
+    let ticks = rest.split_whitespace().skip(11).take(2);
+    // A hundredth of a second each.
+    ticks.filter_map(|of| of.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
+/// The most memory that it has held, in MB.
+fn peak_mb() -> f64 {
+    let all = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = all.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kb = line.and_then(|of| of.trim().strip_suffix("kB")?.trim().parse::<f64>().ok());
+    kb.unwrap_or_default() / 1_000.0
+}
+
 fn serve(model: &Model) {
     let folder = std::env::temp_dir().join(format!("athermal-bench-{}", std::process::id()));
-    let text = "schema = 1\nruntime = { wait = \"0 s\", settle = \"0 s\" }\n\
+    let text = "schema = 1\nruntime = { wait = \"0 s\", settle = \"0 s\", checkpoint = \"1 s\" }\n\
          sources.metronome.type = \"metronome\"\nsinks.clerk.type = \"clerk\"\n";
     let (mut files, mut mistakes) = (Sources::new(), Diagnostics::new());
     let read = load_text(

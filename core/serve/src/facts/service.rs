@@ -57,7 +57,7 @@ impl<'a> Look<'a> {
 pub enum State {
     /// All is as it should be.
     Running,
-    /// The journal cannot be written, a node was given up, the copy of the graph is lost, a source has not been connected since the
+    /// The journal cannot be written, a node was given up, ticks were missed by what looks on, a source has not been connected since the
     /// start, or none is.
     Degraded,
 }
