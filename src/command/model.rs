@@ -66,7 +66,7 @@ pub fn warn_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
 }
 
 /// The same, of nodes that are known.
-pub fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
+fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
     if !nodes.is_empty() {
         terminal.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",

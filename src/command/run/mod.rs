@@ -3,7 +3,6 @@
 mod reports;
 pub(super) mod stop;
 mod swap;
-pub(super) mod swap_words;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,7 +17,7 @@ use athermal::files::{
 use athermal::run::live::monitor::{Finding, Watch};
 use athermal::run::live::session::WatchedGraph;
 use athermal::run::live::store::{FileLock, OutputIdentity};
-use athermal::run::live::{Session, SessionOptions, Sink, StateStore};
+use athermal::run::live::{Report, Reporter as _, Session, SessionOptions, Sink, StateStore};
 use athermal::run::recording::thin;
 use clap::Args;
 use serde_json::json;
@@ -85,7 +84,7 @@ impl Run {
         })?;
         let (terminal, ends) = (*terminal, self.ends());
         let reports = Reports { terminal, ends };
-        let (model, watched) = self.load(&terminal, state.as_ref())?;
+        let (model, watched) = self.load(&reports, state.as_ref())?;
         warn_unfitted(&terminal, &model, &self.model);
         warn_without_novelty(&terminal, &model, &self.model);
         let options = SessionOptions {
@@ -96,7 +95,7 @@ impl Run {
         let read = options.reading(&model);
         let mut reader = self.open(&terminal, layout(&read)).map_err(|failure| {
             let replacement = options.replacement.as_ref();
-            swap_words::not_read(failure, replacement.and_then(|of| of.watched.as_ref()))
+            swap::not_read(failure, replacement.and_then(|of| of.watched.as_ref()))
         })?;
         let thinned = thinned::of(&self.model, &model.graph)?;
         let time = TimeColumn::from(&read.time);
@@ -108,7 +107,7 @@ impl Run {
         }
         let usual = model.sample_ranges().to_vec();
         let mut watch = Watch::new(&model.plan, &read.sources, &usual);
-        reports.found(&watch.begin());
+        reports.found(watch.begin());
         let mut looks = ChannelWatch::at(&model.plan);
         let mut session = Session::begin(model, options, &reports)?;
         if ends {
@@ -132,7 +131,12 @@ impl Run {
         session.run(&mut *rows, &mut *sink)?;
         drop(rows);
         let none = session.output().none(session.engine());
-        reports.found(none.filter(|_| ends).map(Finding::NoOutput).as_slice());
+        reports.found(
+            none.filter(|_| ends)
+                .map(Finding::NoOutput)
+                .into_iter()
+                .collect(),
+        );
         let (engine, ticks) = (session.engine(), session.output().rows());
         let (plan, ranges) = (Arc::clone(engine.plan()), engine.sample_ranges());
         let (refused, rejected) = (engine.refused(), engine.rejected_channels());
@@ -200,9 +204,10 @@ impl Run {
     /// The graph to go on with, and its file as it stands to that: what ran last and has been kept, where the file has another.
     fn load(
         &self,
-        terminal: &Terminal,
+        reports: &Reports,
         state: Option<&StateStore>,
     ) -> Result<(Model, WatchedGraph), Failure> {
+        let terminal = &reports.terminal;
         let last = state.and_then(StateStore::last_model);
         // As it is before it is read, so that no change is missed.
         let watched = WatchedGraph::of(&self.model);
@@ -228,7 +233,7 @@ impl Run {
             }
             Err(failure) => {
                 terminal.setback(&failure);
-                swap_words::unusable(terminal, &self.model, "what ran last goes on");
+                reports.report(Report::refused(&self.model, "what ran last goes on"));
             }
         }
         Ok((last, watched.unlike()))

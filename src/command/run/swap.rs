@@ -5,7 +5,7 @@ use std::path::Path;
 use athermal::core::document::TimeBase;
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
-use athermal::run::live::session::{Swap, SwapTime, WatchedGraph, load_replacement};
+use athermal::run::live::session::{ANOTHER_RUN, Swap, SwapTime, WatchedGraph, load_replacement};
 use athermal::run::live::{Replacement, Reporter, StageError};
 use athermal::{Duration, Model};
 use clap::Args;
@@ -106,6 +106,17 @@ impl Options {
             shadow: self.shadow,
             margin: self.margin,
         }))
+    }
+}
+
+/// Why an input cannot be read: where it is not the watched graph that runs, that may be the one for it.
+pub fn not_read(failure: Failure, watched: Option<&WatchedGraph>) -> Failure {
+    match (failure, watched) {
+        (Failure::Request(why), Some(watched)) if watched.is_unlike() => Failure::Request(format!(
+            "{why} (that is what the graph reads that ran last and would go on; {} holds another: {ANOTHER_RUN})",
+            watched.path().display()
+        )),
+        (other, _) => other,
     }
 }
 

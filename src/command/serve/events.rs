@@ -4,11 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use athermal::core::engine::NodeCarry;
 use athermal::core::event::Event as _;
+use athermal::run::live::Report;
 use athermal::serve::recovery::{RecoveryReport, Start};
 use athermal::serve::service::{ServiceEvent, SinkCounts};
 
-use crate::command::run::swap_words;
 use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, instant, seconds};
 
@@ -20,12 +21,17 @@ impl Events {
     pub fn report(&self, event: ServiceEvent) {
         let Self(terminal) = self;
         let all = match &event {
-            ServiceEvent::Compared { verdict, .. } => vec![(false, swap_words::shadow(verdict))],
+            ServiceEvent::Compared { verdict, .. } => {
+                Report::Shadow(verdict.clone()).messages(!terminal.events)
+            }
             event => event.messages(!terminal.events),
         };
         all.into_iter().for_each(|of| terminal.report(of));
         if let ServiceEvent::Staged { carry, .. } = &event {
-            swap_words::carry(terminal, carry);
+            let text = NodeCarry::words(carry);
+            if !text.is_empty() {
+                terminal.note(text.trim_start());
+            }
         }
     }
 }

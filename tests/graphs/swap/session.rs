@@ -41,7 +41,7 @@ impl Sink for Frames {
 struct Names(RefCell<Vec<&'static str>>);
 
 impl Reporter for Names {
-    fn report(&self, report: Report<'_>) {
+    fn report(&self, report: Report) {
         self.0.borrow_mut().push(match report {
             Report::NoState(_) => "no state",
             Report::Skipped { .. } => "skipped",
@@ -49,7 +49,7 @@ impl Reporter for Names {
             Report::Staged { .. } => "staged",
             Report::Swap(Notice::TookOver { .. }) => "took over",
             Report::NotTakenOver { .. } => "not taken over",
-            Report::Doubts { .. } => return,
+            Report::Doubts(..) => return,
             _ => "other",
         });
     }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::compile::Plan;
 use crate::engine::Engine;
+use crate::figures::{apart, counted};
 use crate::score::{PairedPrediction, link};
 use crate::time::{Duration, Instant};
 
@@ -27,6 +28,27 @@ pub struct Verdict {
     pub ratio: Option<f64>,
     /// Whether the candidate is not worse by more than the margin; none before there is anything to compare.
     pub passes: Option<bool>,
+}
+
+impl Verdict {
+    /// What it has come to, a line for each output.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let mut text = "in the shadow:".to_owned();
+        for of in &self.outputs {
+            let [running, new] = apart([of.running_rmse, of.candidate_rmse]);
+            let instants = counted(of.n as u64, "instant");
+            let (output, unit) = (&of.output, &of.unit);
+            text += &format!(
+                "\n  {output}: RMSE {running} running, {new} new, in {unit}, over {instants}"
+            );
+        }
+        match self.ratio {
+            Some(ratio) => text += &format!("\n  new to running: {ratio:.3}"),
+            None => text += " there was nothing to compare",
+        }
+        text
+    }
 }
 
 /// One output, as both predicted it.

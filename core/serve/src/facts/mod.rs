@@ -10,6 +10,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
+use athermal_run::live::Report;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
@@ -202,15 +203,20 @@ pub fn guide() -> String {
         let (metric, help) = (code(metric), fact.help.trim());
         text += &format!("| `/v1/{of}`: `{path}` | {metric} | {kind} | {help} |\n");
     }
-    text += "\n| event | how grave | facts | counted by | what it is |\n|---|---|---|---|---|\n";
-    for of in event_kinds() {
-        let facts: Vec<_> = of.facts.iter().map(|(key, _)| code(key)).collect();
-        let counter = code(of.counter.map_or("", |(name, _)| name));
-        let (facts, help) = (facts.join(", "), of.help.trim());
+    let of_runs = Report::KINDS.iter().collect::<Vec<_>>();
+    for (what, all) in [
+        ("event", event_kinds().collect()),
+        ("event of a run", of_runs),
+    ] {
         text += &format!(
-            "| `{}` | {} | {facts} | {counter} | {help} |\n",
-            of.name, of.level
+            "\n| {what} | how grave | facts | counted by | what it is |\n|---|---|---|---|---|\n"
         );
+        for of in all {
+            let facts: Vec<_> = of.facts.iter().map(|(key, _)| code(key)).collect();
+            let counter = code(of.counter.map_or("", |(name, _)| name));
+            let (name, level, facts, help) = (of.name, of.level, facts.join(", "), of.help.trim());
+            text += &format!("| `{name}` | {level} | {facts} | {counter} | {help} |\n");
+        }
     }
     text
 }

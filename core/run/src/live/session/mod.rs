@@ -8,7 +8,7 @@ mod swap_schedule;
 mod watched_graph;
 
 pub use replacement::{Replacement, Swap, SwapTime, load_replacement};
-pub use report::{Refusal, Report, Reporter};
+pub use report::{ANOTHER_RUN, Report, Reporter};
 pub use watched_graph::WatchedGraph;
 
 use std::path::PathBuf;
@@ -100,7 +100,7 @@ impl<'a> Session<'a> {
             if is_restored {
                 restart.seen = engine.last();
             } else {
-                reporter.report(Report::NoState(state.path()));
+                reporter.report(Report::NoState(state.path().to_owned()));
             }
             // Better now than after the first minute. What was read needs not be written yet: a disk may be full for a while.
             match state.save(&engine, &model) {
@@ -357,16 +357,15 @@ impl<'a> Session<'a> {
     }
 
     fn report_found(&mut self, at: Instant, time: &str) {
-        for finding in &self.found {
-            let found = Report::Found { finding, at, time };
+        for finding in self.found.drain(..) {
+            let found = Report::Found(at, time.to_owned(), finding);
             self.reporter.report(found);
         }
-        self.found.clear();
     }
 
     fn look_at_output(&mut self) {
         if let Some(path) = self.identity.as_mut().and_then(OutputIdentity::moved) {
-            self.reporter.report(Report::OutputMoved(path));
+            self.reporter.report(Report::OutputMoved(path.to_owned()));
         }
     }
 }

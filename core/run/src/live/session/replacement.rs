@@ -64,10 +64,7 @@ pub fn load_replacement<'a>(
 ) -> Result<Model, ModelError> {
     let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
     let mut model = Model::load_from(path, Wanted::default(), &mut sources, &mut doubts)?;
-    reporter.report(Report::Doubts {
-        doubts: &doubts,
-        sources: &sources,
-    });
+    reporter.report(Report::Doubts(doubts, sources));
     // A graph goes by the fits of what runs; a model in which some are missing was to bring its own.
     let mut kept = model
         .card
@@ -81,15 +78,13 @@ pub fn load_replacement<'a>(
     }
     kept.retain(|node| model.fitted.contains_key(node));
     if !kept.is_empty() {
-        reporter.report(Report::FitsKept { path, nodes: &kept });
+        reporter.report(Report::FitsKept(path.to_owned(), kept));
     }
     if !nodes.is_empty() {
-        let nodes = &nodes;
-        reporter.report(Report::Unfitted { path, nodes });
+        reporter.report(Report::Unfitted(path.to_owned(), nodes));
     }
     if !doubtful.is_empty() {
-        let nodes = &doubtful;
-        reporter.report(Report::DoubtfulFits { path, nodes });
+        reporter.report(Report::DoubtfulFits(path.to_owned(), doubtful));
     }
     Ok(model)
 }

@@ -49,7 +49,7 @@ impl Restart {
         let is_first = rows == 1 && self.seen.is_some();
         // 10, 100, 1,000 and so on: where the clock has been set back, it goes on for as long as that.
         if is_first || rows >= 10 && 10_u64.pow(rows.ilog10()) == rows {
-            let time = &samples.time_text;
+            let time = samples.time_text.clone();
             reporter.report(Report::Skipped { rows, time, before });
         }
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::watched_graph::Went;
 use super::{
-    Refusal, Replacement, Report, Reporter, Swap, SwapTime, WatchedGraph, load_replacement,
+    ANOTHER_RUN, Replacement, Report, Reporter, Swap, SwapTime, WatchedGraph, load_replacement,
 };
 use crate::live::{Control, Feed, LiveGraph, StageError, Staged, Stepped};
 use crate::model::Model;
@@ -12,6 +12,23 @@ use crate::time::{Duration, Instant};
 
 /// How often a watched file is looked at, however fast or slowly rows come.
 const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(200);
+
+/// Why a graph does not take over, in a word for programs and for people.
+type Why = (&'static str, &'static str);
+const CHANGED: Why = (
+    "changed",
+    "has changed: as it was in the shadow until now, it does not take over",
+);
+const GONE: Why = (
+    "changed",
+    "is gone: as it was in the shadow until now, it does not take over",
+);
+const LARGER_ERROR: Why = ("larger_error", "does not take over: its error is larger");
+const NOTHING_TO_COMPARE: Why = (
+    "nothing_to_compare",
+    "does not take over: there was nothing to compare",
+);
+const DATA_ENDED: Why = ("data_ended", "did not take over: the data ended before");
 
 /// So few values of an output may be missing in the past by chance.
 const FEW: f64 = 10.0;
@@ -174,12 +191,12 @@ impl SwapSchedule {
         if !watched.changed() {
             match watched.went() {
                 Some(Went::Away(away)) => {
-                    reporter.report(Report::FileGone(&away));
+                    reporter.report(Report::FileGone(away));
                     if self.staged.is_some() {
-                        self.withdraw(live, &path, Refusal::Gone, reporter);
+                        self.withdraw(live, &path, GONE, reporter);
                     }
                 }
-                Some(Went::Back(back)) => reporter.report(Report::FileBack(&back)),
+                Some(Went::Back(back)) => reporter.report(Report::FileBack(back)),
                 None => {}
             }
             return;
@@ -194,46 +211,47 @@ impl SwapSchedule {
                 self.staged = loaded.ok().zip(Some(path));
                 return;
             }
-            self.withdraw(live, &path, Refusal::Changed, reporter);
+            self.withdraw(live, &path, CHANGED, reporter);
             if revision.is_some() && revision == running.revision() {
-                reporter.report(Report::RunsAlready(&path));
+                reporter.report(Report::RunsAlready(path));
                 return;
             }
         }
-        let refused = |reason| {
-            let path = &path;
-            reporter.report(Report::NotTakenOver { path, reason });
-        };
         let model = match loaded {
             Ok(model) => model,
-            Err(error) => return refused(Refusal::Unusable(error)),
+            Err(error) => {
+                reporter.report(Report::Unusable(error));
+                return reporter.report(Report::refused(&path, "what runs goes on"));
+            }
         };
         let mut outputs = model.plan.outputs.iter();
         let is_new = |name: &String| !self.columns.contains(name);
         if let Some(new) = outputs.find(|output| is_new(&output.name)) {
-            refused(Refusal::NoColumn(&new.name));
+            let why = format!(
+                "has the output `{}`, for which there is no column; what runs goes on; {ANOTHER_RUN}",
+                new.name
+            );
+            reporter.report(Report::not_taken_over(&path, ("no_column", &why)));
         } else if let Err(error) = self.stage(live, running, (model, path), now, reporter) {
             self.refuse(live, &error, reporter);
         }
     }
 
     /// Lets go of what is in the shadow, since its file is no more what it was.
-    fn withdraw(
-        &mut self,
-        live: &mut LiveGraph,
-        path: &Path,
-        reason: Refusal<'_>,
-        reporter: &dyn Reporter,
-    ) {
+    fn withdraw(&mut self, live: &mut LiveGraph, path: &Path, why: Why, reporter: &dyn Reporter) {
         self.staged = None;
         discard(live);
-        reporter.report(Report::NotTakenOver { path, reason });
+        reporter.report(Report::not_taken_over(path, why));
     }
 
     /// Lets go of the watched file as it has become.
     fn refuse(&mut self, live: &mut LiveGraph, error: &StageError, reporter: &dyn Reporter) {
-        if let Some(path) = self.watched.as_ref().map(|of| of.path().to_owned()) {
-            self.withdraw(live, &path, Refusal::Stage(error), reporter);
+        self.staged = None;
+        discard(live);
+        if let Some(watched) = &self.watched {
+            Report::unfit(watched.path(), error)
+                .into_iter()
+                .for_each(|of| reporter.report(of));
         }
     }
 
@@ -253,12 +271,17 @@ impl SwapSchedule {
         let outputs = running.plan.outputs.iter();
         let outputs = outputs.map(|output| output.name.clone());
         let lacking: Vec<String> = outputs.filter(|name| !has(name)).collect();
-        reporter.report(Report::Staged {
-            path: &path,
-            staged,
-            lacking: &lacking,
-            silent: (past, &silent),
-        });
+        if !lacking.is_empty() {
+            reporter.report(Report::Lacking(path.clone(), lacking));
+        }
+        reporter.report(Report::staged(&path, staged));
+        if !silent.is_empty() {
+            reporter.report(Report::Silent {
+                path: path.clone(),
+                past,
+                outputs: silent.into_iter().map(str::to_owned).collect(),
+            });
+        }
         self.staged = Some((model, path));
         match self.shadow {
             Some(duration) => match live.control() {
@@ -294,15 +317,15 @@ impl SwapSchedule {
         if self.watched.as_ref().is_some_and(WatchedGraph::differs) {
             return Ok(());
         }
-        reporter.report(Report::Shadow(&verdict));
-        let reason = match verdict.passes {
+        let passes = verdict.passes;
+        reporter.report(Report::Shadow(verdict));
+        let why = match passes {
             Some(true) => return self.commit(live, running),
-            None => Refusal::NothingToCompare,
-            Some(false) => Refusal::LargerError,
+            None => NOTHING_TO_COMPARE,
+            Some(false) => LARGER_ERROR,
         };
         if let Some((_, path)) = self.staged.take() {
-            let path = &path;
-            reporter.report(Report::NotTakenOver { path, reason });
+            reporter.report(Report::not_taken_over(&path, why));
         }
         discard(live);
         Ok(())
@@ -322,8 +345,7 @@ impl SwapSchedule {
         let shadowed = self.staged.iter().map(|(_, path)| path);
         let waiting = self.waiting.iter().rev().map(|swap| &swap.path);
         for path in shadowed.chain(waiting) {
-            let reason = Refusal::DataEnded;
-            reporter.report(Report::NotTakenOver { path, reason });
+            reporter.report(Report::not_taken_over(path, DATA_ENDED));
         }
     }
 }

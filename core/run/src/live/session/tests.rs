@@ -66,9 +66,9 @@ fn a_state_is_saved_after_the_first_row_and_once_a_minute_when_what_came_of_it_w
 struct Found(RefCell<Vec<(Instant, Finding)>>);
 
 impl Reporter for Found {
-    fn report(&self, report: Report<'_>) {
-        if let Report::Found { finding, at, .. } = report {
-            self.0.borrow_mut().push((at, finding.clone()));
+    fn report(&self, report: Report) {
+        if let Report::Found(at, _, finding) = report {
+            self.0.borrow_mut().push((at, finding));
         }
     }
 }
