@@ -85,3 +85,41 @@ fn what_is_mirrored_of_a_tick_is_what_the_engine_made_and_it_is_stepped_again_on
     assert_eq!(rmse(&errors.0), rmse(&errors.1));
     assert!(rmse(&errors.0).iter().any(|(_, of)| of.is_some()));
 }
+
+#[test]
+fn where_ticks_come_fast_they_get_more_room_and_none_is_missed_on_the_way() {
+    let graph = model(DIE_TESTER, "0");
+    let options = LiveOptions {
+        mirrors: false,
+        ..LiveOptions::default()
+    };
+    let (mut stepper, mut control) = pair(&graph, options).unwrap();
+    let seen = Arc::<Mutex<Vec<athermal::Instant>>>::default();
+    let looking = Arc::clone(&seen);
+    control.look_on(move |tick| looking.lock().unwrap().push(tick.at));
+    let channels = stepper.feed().len();
+    let data = rows(&mut Prng::stream(4, "rows"), channels, 6, 5_000);
+    let times: Vec<_> = data.iter().map(|(at, _)| *at).collect();
+    let mut notices = Vec::new();
+    std::thread::scope(|scope| {
+        let engine = scope.spawn(|| {
+            for (nth, (at, row)) in data.iter().enumerate() {
+                stepper.step(*at, row).unwrap();
+                if nth < 2_000 {
+                    std::thread::sleep(std::time::Duration::from_micros(100));
+                }
+            }
+        });
+        while seen.lock().unwrap().len() < 1_500 {
+            notices.extend(control.pump());
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        // Nobody looks for thousands of ticks.
+        engine.join().unwrap();
+    });
+    notices.extend(control.pump());
+    notices.extend(control.pump());
+    assert_eq!(notices, []);
+    assert!(*seen.lock().unwrap() == times);
+    assert_eq!(stepper.missed(), 0);
+}

@@ -24,6 +24,10 @@ use crate::model::Model;
 use crate::time::{Duration, Instant};
 use watching::Watching;
 
+/// So many ticks have room at first, unless there is a replica all the time.
+const FIRST: usize = 256;
+/// Where so many wait at once, they come fast, and get all the room that they may have.
+const SEVERAL: usize = 4;
 /// Engines that may be on their way in either direction.
 const ON_THE_WAY: usize = 4;
 
@@ -32,6 +36,9 @@ pub struct Control {
     options: LiveOptions,
     feed: Arc<[Feed]>,
     ticks: Consumer<f64>,
+    /// To hand a ring with more room over, once; and its end here until the one before has been read.
+    wider: Option<Producer<Producer<f64>>>,
+    next_ticks: Option<Consumer<f64>>,
     departing: Producer<Box<LiveEngine>>,
     returning: Consumer<Box<LiveEngine>>,
     /// What runs, to the same bits: for as long as something needs it, and not after ticks have been missed.
@@ -64,6 +71,8 @@ pub struct Control {
     frozen: bool,
     generation: u64,
     row: Vec<f64>,
+    /// How many numbers a tick takes, of the graph that ran first.
+    record: usize,
     /// What happened and has not been reported yet.
     notices: Vec<Notice>,
     look: Option<Look>,
@@ -133,7 +142,13 @@ pub(super) fn pair(
         |engine| LiveEngine::new(engine, &feed, 0).expect("the feed has all channels of the plan");
     let live = seat(engine);
     let record = Mark::WIDTH + feed.len() + running.outputs.len() + live.shown.len();
-    let (mirror, ticks) = RingBuffer::new(options.mirrored.max(1) * record);
+    let begin = match options.mirrors {
+        true => options.mirrored,
+        false => options.mirrored.min(FIRST),
+    };
+    let (mirror, ticks) = RingBuffer::new(begin.max(1) * record);
+    let (wider, to_come) = RingBuffer::new(1);
+    let wider = (begin < options.mirrored).then_some(wider);
     let (departing, arriving) = RingBuffer::new(ON_THE_WAY);
     let (leaving, returning) = RingBuffer::new(ON_THE_WAY);
     let (frozen, revision) = (live.engine.frozen(), live.revision.clone());
@@ -142,7 +157,7 @@ pub(super) fn pair(
     let stepper = Stepper::new(
         live,
         Arc::clone(&feed),
-        Some(mirror),
+        (Some(mirror), to_come),
         ends,
         Arc::clone(&is_asked),
     );
@@ -165,6 +180,9 @@ pub(super) fn pair(
         options,
         feed,
         ticks,
+        wider,
+        next_ticks: None,
+        record,
         departing,
         returning,
         staged: None,
@@ -219,8 +237,20 @@ impl Control {
     /// Takes in what there is. What happened is kept for whoever pumps.
     fn catch_up(&mut self) {
         let mut notices = std::mem::take(&mut self.notices);
+        if self.ticks.slots() >= SEVERAL * self.record
+            && let Some(mut wider) = self.wider.take()
+        {
+            let (mirror, ticks) = RingBuffer::new(self.options.mirrored * self.record);
+            self.next_ticks = wider.push(mirror).is_ok().then_some(ticks);
+        }
         for _ in 0..self.options.mirrored.max(1) {
             let mut mark = [f64::NAN; Mark::WIDTH];
+            if self.ticks.is_abandoned()
+                && self.ticks.is_empty()
+                && let Some(next) = self.next_ticks.take()
+            {
+                self.ticks = next;
+            }
             if self.ticks.pop_entire_slice(&mut mark).is_err() {
                 break;
             }

@@ -124,7 +124,8 @@ impl LiveGraph {
         Self::new(None, Stepper::alone(engine), ())
     }
 
-    /// The same with a control, so that it can be replaced. What runs is stepped twice only while something needs that.
+    /// The same with a control, so that it can be replaced. What runs is stepped twice only while something needs that. Ask for its
+    /// [`events`](Self::events) at least once in 200 rows.
     ///
     /// # Errors
     /// When a node does not take its own state back, so that the engine cannot be copied.

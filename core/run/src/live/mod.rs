@@ -63,7 +63,8 @@ use crate::time::Duration;
 /// How a graph is run so that it can be replaced.
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
-    /// How many ticks may wait for the control thread; beyond, the replica is lost and states are no longer carried.
+    /// How many ticks may wait for the control thread; beyond, the replica is lost and states are no longer carried. Without
+    /// [`mirrors`](Self::mirrors) only 256 before the first [`pump`](Control::pump).
     pub mirrored: usize,
     /// How much of the past is kept at least, beyond what the running graph needs to warm up.
     pub retain: Duration,

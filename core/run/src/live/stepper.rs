@@ -23,6 +23,8 @@ pub struct Stepper {
     feed: Arc<[Feed]>,
     /// None where there is no control.
     ticks: Option<Producer<f64>>,
+    /// A ring with more room, which the control makes where ticks come fast.
+    wider: Consumer<Producer<f64>>,
     arriving: Consumer<Box<LiveEngine>>,
     leaving: Producer<Box<LiveEngine>>,
     next: Option<Box<LiveEngine>>,
@@ -58,13 +60,20 @@ impl Stepper {
         let feed: Arc<[Feed]> = Feed::of(engine.plan()).into();
         let live = LiveEngine::new(engine, &feed, 0).expect("the feed is that of the plan");
         let (leaving, arriving) = RingBuffer::new(1);
-        Self::new(live, feed, None, (arriving, leaving), Arc::default())
+        let (_, wider) = RingBuffer::new(1);
+        Self::new(
+            live,
+            feed,
+            (None, wider),
+            (arriving, leaving),
+            Arc::default(),
+        )
     }
 
     pub(super) fn new(
         live: LiveEngine,
         feed: Arc<[Feed]>,
-        ticks: Option<Producer<f64>>,
+        (ticks, wider): (Option<Producer<f64>>, Consumer<Producer<f64>>),
         (arriving, leaving): (Consumer<Box<LiveEngine>>, Producer<Box<LiveEngine>>),
         is_asked: Arc<AtomicBool>,
     ) -> Self {
@@ -73,6 +82,7 @@ impl Stepper {
             live: Box::new(live),
             feed,
             ticks,
+            wider,
             arriving,
             leaving,
             next: None,
@@ -271,6 +281,10 @@ impl Stepper {
             width: width as u64,
         };
         let Some(ticks) = &mut self.ticks else { return };
+        if let Ok(wider) = self.wider.pop() {
+            // The control has the other end of the one before, and reads it to its end.
+            *ticks = wider;
+        }
         let Ok(mut chunk) = ticks.write_chunk(Mark::WIDTH + width) else {
             self.missed += 1;
             return;

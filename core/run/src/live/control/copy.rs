@@ -7,6 +7,7 @@ impl Control {
     pub(super) fn take_copy_at_rest(&mut self, notices: &mut Vec<Notice>) {
         if let Some(copy) = &self.copy
             && self.ticks.is_empty()
+            && !(self.next_ticks.is_some() && self.ticks.is_abandoned())
             && copy.event > self.event
         {
             let (event, missed) = (copy.event, copy.event - self.event);

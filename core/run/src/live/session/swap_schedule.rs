@@ -146,7 +146,7 @@ impl SwapSchedule {
         let next = self.waiting.last();
         let due = next.is_some_and(|swap| swap.at.instant(first) <= now);
         let look = self.watched.is_some() && self.looked.elapsed() >= LOOK_EVERY;
-        if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
+        if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(128)) {
             return Ok(());
         }
         pump(live, reporter);
