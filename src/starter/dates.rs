@@ -120,9 +120,8 @@ pub fn of(cells: &[String]) -> Option<Dates> {
         return with_word(cells);
     };
     let mut found = by(format);
-    found.others = fitting
-        .filter(|other| reads_otherwise(&found.form, other, cells))
-        .collect();
+    // That they read these alike says nothing of those that follow: on 03/03 and on 16-05-16 orders are not known apart.
+    found.others = fitting.collect();
     Some(found)
 }
 
@@ -231,13 +230,6 @@ pub fn nearly_all<'a>(
 fn fits(form: &TimeForm, cells: &[String]) -> bool {
     let is_read = |cell: &str| form.read(cell.as_bytes()).is_some();
     nearly_all(cells.iter().map(String::as_str), is_read)
-}
-
-fn reads_otherwise(form: &TimeForm, other: &TimeFormat, cells: &[String]) -> bool {
-    let other = TimeForm::Format(other.clone());
-    cells
-        .iter()
-        .any(|cell| form.read(cell.as_bytes()) != other.read(cell.as_bytes()))
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ fn times(path: &Path, clock: &Clock, form: &TimeForm) -> Result<Reader, FileErro
 }
 
 /// From when to when a log goes in a form.
-fn period(path: &Path, clock: &Clock, form: &TimeForm) -> Option<(i64, i64)> {
+pub(super) fn period(path: &Path, clock: &Clock, form: &TimeForm) -> Option<(i64, i64)> {
     let (mut reader, mut row, mut period) = (times(path, clock, form).ok()?, Row::default(), None);
     while reader.next_into(&mut row).ok()? {
         let (from, _) = *period.get_or_insert((row.time_ns, row.time_ns));
@@ -81,11 +81,13 @@ pub fn exchanged(logs: &[(&Path, &Clock)]) -> Option<(PathBuf, TimeFormat)> {
 }
 
 /// What speaks against a form: rows that it does not read, or by which times leap or go back; then steps over midnight that are not as
-/// long as most.
-fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<(u64, usize), FileError> {
+/// long as most. Beside it the sum of all times, which two forms share that read them alike.
+fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<(Doubts, i128), FileError> {
     let mut reader = times(path, clock, form)?;
     let (mut row, mut last, mut leaps, mut nights) = (Row::default(), None, 0, Vec::new());
+    let mut sum = 0;
     while reader.next_into(&mut row)? {
+        sum += i128::from(row.time_ns);
         if let Some(last) = last.replace(row.time_ns) {
             let step = row.time_ns.saturating_sub(last);
             leaps += u64::from(step > LEAP_NS);
@@ -100,11 +102,12 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<(u64, usize), F
         .iter()
         .filter(|step| step.abs_diff(usual) > usual.unsigned_abs() / 10);
     let report = reader.report();
-    Ok((
-        leaps + report.refused_rows.count + report.refused_time.count,
-        odd.count(),
-    ))
+    let wrong = leaps + report.refused_rows.count + report.refused_time.count;
+    Ok(((wrong, odd.count()), sum))
 }
+
+/// How many rows speak against a form, and how many nights.
+type Doubts = (u64, usize);
 
 /// The clock of a log in the form against which least speaks, where rows decide.
 ///
@@ -117,14 +120,18 @@ pub fn decided(path: &Path, mut clock: Clock) -> Result<Clock, FileError> {
     let own = clock.form.clone();
     let others = std::mem::take(&mut clock.others);
     let others = others.into_iter().map(TimeForm::Format);
-    let mut judged = Vec::new();
-    for form in std::iter::once(own.clone()).chain(others) {
-        judged.push((doubts(path, &clock, &form)?, form));
+    let (of_own, read) = doubts(path, &clock, &own)?;
+    let mut judged = vec![(of_own, own.clone())];
+    for form in others {
+        let (doubts, others) = doubts(path, &clock, &form)?;
+        if (doubts, others) != (of_own, read) {
+            judged.push((doubts, form));
+        }
     }
     judged.sort_by_key(|(doubts, _)| *doubts);
     let least = judged[0].0;
     let (best, rest): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(of, _)| *of == least);
-    let format = |(_, form): ((u64, usize), TimeForm)| match form {
+    let format = |(_, form): (Doubts, TimeForm)| match form {
         TimeForm::Format(format) => Some(format),
         _ => None,
     };

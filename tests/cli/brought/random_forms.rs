@@ -1,5 +1,5 @@
 //! A log in any of the known forms, written at random from one truth, is read to the same instants and values, or refused with the
-//! cause. `ATHERMAL_LONG=1` writes a hundred thousand, `ATHERMAL_SEED=7` that one.
+//! cause. `ATHERMAL_LONG=1` writes a hundred thousand, `ATHERMAL_SEED=7` that one, `ATHERMAL_SEED=0..50000` those.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -116,7 +116,7 @@ fn written(random: &mut Prng, truth: &Truth) -> (String, String) {
         }
     };
     let name = match (in_two, in_name.contains(',') && separator == ",") {
-        (true, _) => format!("Date{in_name}{separator}Clock").replace(',', " "),
+        (true, _) => format!("Date{}{separator}Clock", in_name.replace(',', " ")),
         (_, true) => format!("\"Time{in_name}\""),
         _ => format!("Time{in_name}"),
     };
@@ -169,58 +169,81 @@ fn read(graph: &str, log: &Path) -> BTreeMap<(String, i64), f64> {
     found
 }
 
+/// Whether a log of this seed is read to what was written; or why not.
+fn is_read(seed: u64, scratch: &Scratch) -> Result<(), Miss> {
+    let random = &mut Prng::stream(seed, "rows");
+    let truth = truth(random);
+    let (text, form) = written(random, &truth);
+    let log = scratch.file("log.csv", &text);
+    let head = text.lines().take(6).collect::<Vec<_>>().join("\n");
+    let starter = athermal::calls::init(&[log.display().to_string()]);
+    let starter = starter.map_err(|why| Miss::Refused(format!("{form}: {why:?}\n{head}")))?;
+    let found = read(&starter.text, &log);
+    let is_minutes = !form.contains("%S");
+    let rows = truth.iter().flat_map(|(at, values)| {
+        let at = if is_minutes { at - at % 60 } else { *at };
+        let values = COLUMNS.iter().zip(values);
+        values.filter_map(move |(column, value)| {
+            Some((((*column).to_owned(), at * 1_000_000_000), (*value)?))
+        })
+    });
+    let mut expected: BTreeMap<_, _> = rows.collect();
+    // Of a last row after a night nothing says whether its time is wrong: it is left out, which is said.
+    let is_doubted = |remark: &String| remark.contains("no row follows that decides");
+    if starter.remarks.iter().any(is_doubted) {
+        let last = expected.keys().map(|(_, at)| *at).max();
+        expected.retain(|(_, at), _| Some(*at) != last);
+    }
+    if found == expected {
+        return Ok(());
+    }
+    let differs = expected.iter().zip(&found).find(|(a, b)| a != b);
+    Err(Miss::Other(format!(
+        "{form}: {differs:?} of {} and {}\n{head}\n{:?}\n{}",
+        expected.len(),
+        found.len(),
+        starter.remarks,
+        starter.text
+    )))
+}
+
+/// Why a log is not read to what was written.
+enum Miss {
+    Refused(String),
+    Other(String),
+}
+
 #[test]
 fn a_log_in_any_form_is_read_to_what_was_written_or_refused() {
-    let cases = match (
-        std::env::var("ATHERMAL_SEED"),
-        std::env::var_os("ATHERMAL_LONG"),
-    ) {
-        (Ok(seed), _) => seed.parse().unwrap()..seed.parse::<u64>().unwrap() + 1,
+    let seeds = std::env::var("ATHERMAL_SEED");
+    let number = |text: &str| text.parse::<u64>().unwrap();
+    let cases = match (seeds.as_deref(), std::env::var_os("ATHERMAL_LONG")) {
+        (Ok(seeds), _) => match seeds.split_once("..") {
+            Some((from, to)) => number(from)..number(to),
+            None => number(seeds)..number(seeds) + 1,
+        },
         (_, Some(_)) => 0..100_000,
         _ => 0..24,
     };
-    let scratch = Scratch::new("random-forms");
-    let (mut refused, all) = (0, cases.end - cases.start);
+    let scratch = Scratch::new(&format!("random-forms-{}", cases.start));
+    let all = cases.end - cases.start;
+    let (mut refused, mut others) = (0, Vec::new());
     for seed in cases {
-        let random = &mut Prng::stream(seed, "rows");
-        let truth = truth(random);
-        let (text, form) = written(random, &truth);
-        let log = scratch.file("log.csv", &text);
-        let head: Vec<&str> = text.lines().take(6).collect();
-        let starter = match athermal::calls::init(&[log.display().to_string()]) {
-            Ok(starter) => starter,
-            Err(why) => {
-                let why = format!("{why:?}");
+        match is_read(seed, &scratch) {
+            Ok(()) => {}
+            Err(Miss::Refused(why)) => {
                 refused += 1;
-                assert!(
-                    !why.is_empty() && all > 1,
-                    "seed {seed}, {form}: {why}\n{}",
-                    head.join("\n")
-                );
-                eprintln!("seed {seed}, {form}: refused: {why}");
-                continue;
+                eprintln!("seed {seed}, refused: {why}");
             }
-        };
-        let found = read(&starter.text, &log);
-        let is_minutes = !form.contains("%S");
-        let rows = truth.iter().flat_map(|(at, values)| {
-            let at = if is_minutes { at - at % 60 } else { *at };
-            let values = COLUMNS.iter().zip(values);
-            values.filter_map(move |(column, value)| {
-                Some((((*column).to_owned(), at * 1_000_000_000), (*value)?))
-            })
-        });
-        let expected: BTreeMap<_, _> = rows.collect();
-        let differs = expected.iter().zip(&found).find(|(a, b)| a != b);
-        assert!(
-            found == expected,
-            "seed {seed}, {form}: {differs:?} of {} and {}\n{}\n{:?}\n{}",
-            expected.len(),
-            found.len(),
-            head.join("\n"),
-            starter.remarks,
-            starter.text
-        );
+            Err(Miss::Other(why)) => others.push(format!("seed {seed}, {why}")),
+        }
     }
-    assert!(refused * 5 <= all, "{refused} of {all}");
+    let first = others.iter().take(20).cloned().collect::<Vec<_>>();
+    assert!(
+        others.is_empty(),
+        "{} of {all}:\n{}",
+        others.len(),
+        first.join("\n\n")
+    );
+    assert!(refused * 20 <= all, "{refused} of {all} are refused");
 }
