@@ -18,6 +18,29 @@ use crate::time::{Duration, Instant};
 /// A host whose source is in order hands over [`row`](Self::row)s. One with several senders has a [`Sequencer`] make ticks of what
 /// [arrives](Self::arrive), and comes back when something is [due](Self::due). The [`Control`] is the graph's own where the host has one
 /// thread, and stays with another thread otherwise.
+///
+/// A host that pulls rows, and lets another graph take over:
+///
+/// ```
+/// use athermal_run::live::{LiveGraph, LiveOptions};
+/// use athermal_run::model::Model;
+/// use athermal_core::time::Instant;
+///
+/// fn host(first: &Model, second: &Model, rows: &[(Instant, Vec<f64>)]) -> Result<f64, Box<dyn std::error::Error>> {
+///     let mut graph = LiveGraph::replaceable(first.engine()?, LiveOptions::default())?;
+///     let mut last = f64::NAN;
+///     for (nth, (at, row)) in rows.iter().enumerate() {
+///         if nth == 100 {
+///             graph.stage(second, false)?;
+///             graph.control().map_or(Ok(()), |of| of.commit())?;
+///         }
+///         last = graph.row(*at, row)?.outputs[0];
+///         let (notices, _) = graph.events();
+///         notices.iter().for_each(|of| println!("{of:?}"));
+///     }
+///     Ok(last)
+/// }
+/// ```
 #[derive(Debug)]
 pub struct LiveGraph<K = ()> {
     sequencer: Option<Sequencer>,
