@@ -31,8 +31,9 @@ pub fn columns(plan: &Plan) -> (Vec<String>, Vec<String>) {
     all.extend(plan.sources.iter().map(|of| of.column.clone()));
     let tables = std::iter::once(&plan.table.base).chain(plan.table.files.iter().map(|of| &of.1));
     for table in tables {
-        let cells = [&table.segment, &table.name, &table.value];
+        let cells = [&table.segment, &table.machine, &table.name, &table.value];
         all.extend(cells.into_iter().flatten().cloned());
+        all.extend(table.rename.keys().cloned());
     }
     (times, all)
 }

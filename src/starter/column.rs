@@ -209,6 +209,19 @@ pub fn columns(described: &Description, time: &[String]) -> Vec<Column> {
         .collect()
 }
 
+/// Whether a name says neither what a column measures nor that it drifts.
+pub fn says_nothing(name: &str) -> bool {
+    let unit_aside = guess(name, "");
+    unit_aside.named == Guess::Other
+}
+
+/// Whether columns of these names have both a temperature and what may drift.
+pub fn is_whole(described: &Description, names: &[String]) -> bool {
+    let guess = |name: &String| guess(name, described.unit(name)).guess;
+    let has = |of: &[Guess]| names.iter().any(|name| of.contains(&guess(name)));
+    has(&[Guess::Temperature]) && has(&[Guess::Position, Guess::Other])
+}
+
 /// Letters of tags in plants (ISA-5.1): a temperature and a position, each as an element, an indicator or a transmitter.
 const TEMPERATURE_TAGS: &str = "TT TE TI TIT TIR";
 const POSITION_TAGS: &str = "ZT ZE ZI ZIT ZIR";

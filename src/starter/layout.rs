@@ -33,6 +33,19 @@ pub(super) fn lay_out(heading: &str, table: &TableFormat, text: &mut String) {
     key("value", value, "the column of its value");
     let segment = table.segment.as_deref().map(toml_string);
     key("segment", segment, "where it changes, times start again");
+    let machine = table.machine.as_deref().map(toml_string);
+    key(
+        "machine",
+        machine,
+        "which machine a row is of; those of each are read by themselves",
+    );
+    let only = table.only.as_deref().map(toml_string);
+    key("only", only, "the machine whose rows are read");
+    let renamed = table.rename.iter();
+    let renamed = renamed.map(|(from, to)| format!("{} = {}", toml_string(from), toml_string(to)));
+    let renamed: Vec<String> = renamed.collect();
+    let rename = (!renamed.is_empty()).then(|| format!("{{ {} }}", renamed.join(", ")));
+    key("rename", rename, "what its columns are called here");
     let encoding = table.encoding.map(|of| toml_string(of.name()));
     key("encoding", encoding, "how bytes become text");
     let rows = |rows: Option<u32>| rows.map(|rows| rows.to_string());

@@ -1,99 +1,151 @@
-//! Decides whether logs are of several machines, or of several sensors under the same names; not how they are read.
+//! Decides whether rows of a log are of several machines that stand side by side, and by which column; not how they are read.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use athermal::files::Description;
+use athermal::files::{Description, with_decimal_point};
 
-use super::Log;
 use super::clock::Clock;
+use super::name::ends_in_unit;
 use super::texts::Texts;
 
 /// Of a column with more values none is a machine.
-const MOST_MACHINES: usize = 20;
-/// Rows of a log of several machines stand beside each other in so many of the first.
-const BESIDE: usize = 10;
+const MOST: usize = 20;
+/// So many rows are looked at where a column may be one of machines: one may appear late.
+const LOOKED_AT: usize = 20_000;
 
-/// Why a log is of several machines, whose rows stand side by side: a column of a few values, of each of which the times go on, while
-/// those of all rows do not.
-pub fn several(described: &Description, clock: &Clock) -> Option<String> {
-    let texts = Texts::from(described, clock.columns.clone());
+/// The column that says which machine a row is of, with a remark, where rows of several stand side by side.
+pub fn column(path: &Path, described: &Description, clock: &Clock) -> Option<(String, String)> {
+    let few = |at: usize| {
+        let mut of_each: BTreeMap<&str, usize> = BTreeMap::new();
+        for row in &described.rows {
+            *of_each
+                .entry(row.get(at).map_or("", |cell| cell.trim()))
+                .or_default() += 1;
+        }
+        of_each.len() <= MOST
+            && of_each.len() * 10 <= described.rows.len()
+            && !of_each.contains_key("")
+    };
+    let may_be = |(at, name): &(usize, &String)| {
+        !clock.columns.names().contains(name) && !ends_in_unit(name) && few(*at)
+    };
+    let mut candidates = described
+        .columns
+        .iter()
+        .enumerate()
+        .filter(may_be)
+        .peekable();
+    candidates.peek()?;
+    let more = Description::laid_out(path, LOOKED_AT, &described.table).ok()?;
+    let texts = Texts::from(&more, clock.columns.clone());
     let times = texts
         .by_row()
         .filter_map(|(row, text)| Some((row, clock.form.read(text.as_bytes())?)));
     let times: Vec<(usize, i64)> = times.collect();
-    let stays = |times: &[i64]| times.windows(2).filter(|pair| pair[1] <= pair[0]).count();
-    let all: Vec<i64> = times.iter().map(|(_, time)| *time).collect();
-    if stays(&all) < BESIDE {
-        return None;
-    }
-    let columns = described.columns.iter().enumerate();
-    let mut columns = columns.filter(|(_, name)| !clock.columns.names().contains(name));
-    columns.find_map(|(at, name)| {
-        let mut of_each: BTreeMap<&str, Vec<i64>> = BTreeMap::new();
-        for (row, time) in &times {
-            of_each.entry(described.rows[*row].get(at)?.trim()).or_default().push(*time);
-        }
-        let is_such = (2..=MOST_MACHINES).contains(&of_each.len())
-            && of_each.iter().all(|(value, times)| !value.is_empty() && times.len() > 1 && stays(times) == 0);
-        let values: Vec<&str> = of_each.keys().copied().take(4).collect();
-        is_such.then(|| {
-            format!(
-                "`{name}` has {} values ({}{}), and where it changes the time does not go on: rows of several machines stand side by side, \
-                 and a graph is of one. Write the rows of each into a file of its own, start with one, and fit all with `athermal fleet`; \
-                 sorted by `{name}`, they can be read as they are, as segments: `[table] segment = \"{name}\"`",
-                of_each.len(),
-                values.join(", "),
-                if of_each.len() > values.len() { ", …" } else { "" },
-            )
-        })
-    })
+    candidates.find_map(|(at, name)| Rows::of(&more, &times, at)?.remark(name))
 }
 
-/// Why several logs are of one sensor each: they have the same columns, and the same times.
-pub fn same_names(logs: &[Log]) -> Option<String> {
-    let begins = |log: &Log| {
-        let texts = Texts::from(&log.described, log.clock.columns.clone()).read();
-        let times = texts
-            .iter()
-            .take(3)
-            .map(|text| log.clock.form.read(text.as_bytes()));
-        times
-            .collect::<Option<Vec<i64>>>()
-            .filter(|times| times.len() == 3)
-    };
-    let same = |one: &Log, other: &Log| {
-        one.described.columns == other.described.columns
-            && begins(one).is_some()
-            && begins(one) == begins(other)
-    };
-    let first = logs
-        .iter()
-        .find(|log| logs.iter().filter(|other| same(log, other)).count() > 1)?;
-    let alike: Vec<&Log> = logs.iter().filter(|other| same(first, other)).collect();
-    let times: BTreeSet<&String> = first.clock.columns.names().iter().collect();
-    let mut values = first.described.columns.iter().enumerate();
-    let is_number = |at: usize| {
-        first.described.rows.iter().any(|row| {
-            row.get(at)
-                .is_some_and(|cell| cell.trim().parse::<f64>().is_ok())
+/// Rows with the machine that a column says.
+struct Rows<'a> {
+    described: &'a Description,
+    /// Their place, the machine and the time of each.
+    rows: Vec<(usize, &'a str, i64)>,
+    /// The column of the machine.
+    at: usize,
+    /// Those of each machine.
+    of_each: BTreeMap<&'a str, Vec<(usize, i64)>>,
+}
+
+impl<'a> Rows<'a> {
+    fn of(described: &'a Description, times: &[(usize, i64)], at: usize) -> Option<Self> {
+        let machine =
+            |(row, time): &(usize, i64)| Some((*row, described.rows[*row].get(at)?.trim(), *time));
+        let rows: Vec<(usize, &str, i64)> = times.iter().filter_map(machine).collect();
+        let mut of_each: BTreeMap<&str, Vec<(usize, i64)>> = BTreeMap::new();
+        for (row, machine, time) in &rows {
+            of_each.entry(machine).or_default().push((*row, *time));
+        }
+        let is_such =
+            (2..=MOST).contains(&of_each.len()) && of_each.values().all(|of| of.len() > 2);
+        is_such.then_some(Self {
+            described,
+            rows,
+            at,
+            of_each,
         })
-    };
-    let (_, value) = values.find(|(at, name)| !times.contains(name) && is_number(*at))?;
-    let stem = |log: &&Log| {
-        std::path::Path::new(&log.name)
-            .file_stem()
-            .map(|of| of.to_string_lossy().into_owned())
-    };
-    let names: Vec<String> = alike
-        .iter()
-        .filter_map(stem)
-        .map(|stem| format!("`{stem}_degC`"))
-        .collect();
-    let files: Vec<&str> = alike.iter().map(|log| log.name.as_str()).collect();
-    Some(format!(
-        "{} have the same columns at the same times: they are several sensors, whose columns need names of their own. In the line of names \
-         of each write another for `{value}`, such as {}, by what it measures and its unit",
-        files.join(" and "),
-        names.join(" and ")
-    ))
+    }
+
+    fn remark(&self, name: &str) -> Option<(String, String)> {
+        let changes = self
+            .rows
+            .windows(2)
+            .filter(|pair| pair[0].1 != pair[1].1)
+            .count();
+        let stays = |times: &mut dyn Iterator<Item = i64>| {
+            let times: Vec<i64> = times.collect();
+            times.windows(2).filter(|pair| pair[1] <= pair[0]).count()
+        };
+        let of_all = stays(&mut self.rows.iter().map(|row| row.2));
+        let of_each = self
+            .of_each
+            .values()
+            .map(|of| stays(&mut of.iter().map(|row| row.1)));
+        let of_each: usize = of_each.sum();
+        // Where each stands once, it is a segment as it stands.
+        let come_back = changes >= 2 * self.of_each.len();
+        let why = if come_back && of_all >= 2 && of_all * 3 >= changes && of_each * 10 <= of_all {
+            "where it changes the time does not go on"
+        } else if come_back && of_each == 0 && changes * 10 >= self.rows.len() && self.leap() {
+            "where it changes all values leap"
+        } else {
+            return None;
+        };
+        let values: Vec<&str> = self.of_each.keys().copied().take(4).collect();
+        let remark = format!(
+            "`{name}` has {} values ({}{}), and {why}: rows of several machines stand side by side. Those of each are read by themselves, as a \
+             segment. A service is of one machine, and reads its rows with `only = \"{}\"` beside it; `athermal fleet` fits each by itself, from \
+             a file of each",
+            self.of_each.len(),
+            values.join(", "),
+            if self.of_each.len() > values.len() {
+                ", …"
+            } else {
+                ""
+            },
+            values[0],
+        );
+        Some((name.to_owned(), remark))
+    }
+
+    /// Whether all that is measured changes far less from row to row of a machine than from one to another.
+    fn leap(&self) -> bool {
+        let mut measured = 0;
+        let columns = 0..self.described.columns.len();
+        let all_leap = columns.filter(|at| *at != self.at).all(|at| {
+            let value = |row: usize| {
+                let cell = self.described.rows[row].get(at)?;
+                with_decimal_point(cell.trim()).parse::<f64>().ok()
+            };
+            let step = |pair: [usize; 2]| Some(value(pair[1])? - value(pair[0])?);
+            let pairs = self.rows.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+            let between: Vec<f64> = pairs
+                .filter_map(|pair| step([pair[0].0, pair[1].0]))
+                .collect();
+            let pairs = self.of_each.values().flat_map(|of| of.windows(2));
+            let within: Vec<f64> = pairs
+                .filter_map(|pair| step([pair[0].0, pair[1].0]))
+                .collect();
+            // What is no number, and what counts rows or the time, says nothing.
+            if between.len() * 2 < self.rows.len() / 10 || between.iter().all(|step| *step >= 0.0) {
+                return true;
+            }
+            measured += 1;
+            let mean = |steps: &[f64]| {
+                steps.iter().map(|step| step.abs()).sum::<f64>() / steps.len().max(1) as f64
+            };
+            mean(&between) > 3.0 * mean(&within)
+        });
+        all_leap && measured > 0
+    }
 }

@@ -11,6 +11,7 @@ mod name;
 mod own_times;
 mod placeholder;
 mod range;
+mod sensors;
 mod spacing;
 mod survey;
 mod text;
@@ -85,8 +86,12 @@ impl From<FileError> for NoStarter {
 /// A file, as far as its first rows say what it is.
 struct Log {
     name: String,
+    /// The names of the files that are laid out as this one.
+    pattern: String,
     described: Description,
     clock: Clock,
+    /// Columns beside the time that say of rows what they are, and measure nothing.
+    aside: Vec<String>,
 }
 
 impl Log {
@@ -132,22 +137,29 @@ impl Log {
         }
         let own_times = || own_times::refusal(&described, &clock);
         let own_times = (time.is_none() && long.is_none()).then(own_times).flatten();
-        let machines = || {
-            (long.is_none())
-                .then(|| machines::several(&described, &clock))
-                .flatten()
-        };
-        if let Some(why) = dropped::newest_first(&described, &clock)
-            .or(own_times)
-            .or_else(machines)
-        {
+        if let Some(why) = dropped::newest_first(&described, &clock).or(own_times) {
             return Err(unfit(why));
         }
+        let table = &request.table;
+        let is_declared = table.machine.is_some() || table.segment.is_some() || long.is_some();
+        let machines = || machines::column(path, &described, &clock);
+        if let Some((column, remark)) = (!is_declared).then(machines).flatten() {
+            remarks.push(remark);
+            described.table.machine = Some(column);
+        }
+        let file = path.file_name().unwrap_or_default();
         Ok(Self {
+            pattern: file.to_string_lossy().into_owned(),
+            aside: described.table.machine.iter().cloned().collect(),
             name,
             described,
             clock,
         })
+    }
+
+    /// The columns that measure nothing: those of the time, and others beside it.
+    fn beside(&self) -> Vec<String> {
+        [self.clock.columns.names(), &self.aside].concat()
     }
 
     /// Whether its time is read by a graph that declares this one.
@@ -205,16 +217,12 @@ fn tables(logs: &[Log]) -> TableBase {
             files: Vec::new(),
         };
     }
-    let file = |log: &Log| {
-        let name = Path::new(&log.name).file_name().unwrap_or_default();
-        (
-            Pattern::new(&name.to_string_lossy()),
-            log.described.table.clone(),
-        )
-    };
+    let mut known = BTreeSet::new();
+    let logs = logs.iter().filter(|log| known.insert(&log.pattern));
+    let file = |log: &Log| (Pattern::new(&log.pattern), log.described.table.clone());
     TableBase {
         base: TableFormat::default(),
-        files: logs.iter().map(file).collect(),
+        files: logs.map(file).collect(),
     }
 }
 
@@ -226,10 +234,8 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     let mut remarks = Vec::new();
     let logs = data.paths().iter();
     let logs = logs.map(|path| Log::of(path, request, &mut remarks));
-    let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
-    if let Some(why) = machines::same_names(&logs) {
-        return Err(NoStarter::Unfit(why));
-    }
+    let mut logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
+    remarks.extend(sensors::named_apart(&mut logs, data.paths())?);
     let clock = one_clock(&logs)?;
     remarks.insert(0, clock.remark());
     let is_other =
@@ -237,12 +243,11 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     for log in logs.iter().filter(|log| is_other(&log.clock)) {
         remarks.push(format!("{}: its {}", log.name, log.clock.remark()));
     }
-    let times = logs.iter().flat_map(|log| log.clock.columns.names());
-    let times: Vec<String> = times.cloned().collect();
+    let times: Vec<String> = logs.iter().flat_map(Log::beside).collect();
     let columns_of = |log: &Log| (log.name.clone(), log.described.columns.clone());
     let apart = apart(&logs.iter().map(columns_of).collect::<Vec<_>>(), &times);
     let mut known: BTreeSet<String> = apart.keys().cloned().collect();
-    let columns = |log: &Log| column::columns(&log.described, log.clock.columns.names());
+    let columns = |log: &Log| column::columns(&log.described, &log.beside());
     let columns = logs.iter().flat_map(columns);
     let is_new = |of: &Column| of.name.is_empty() || known.insert(of.name.clone());
     let mut columns: Vec<Column> = columns.filter(is_new).collect();

@@ -61,8 +61,11 @@ pub fn graph(
     writer.sets(&mut text);
     writer.time(&mut text);
     lay_out("[table]", &tables.base, &mut text);
-    for (name, (_, table)) in names.iter().zip(&tables.files) {
-        let heading = format!("[[table.files]]\nmatch = {}", toml_string(name));
+    for (pattern, table) in &tables.files {
+        let heading = format!(
+            "[[table.files]]\nmatch = {}",
+            toml_string(&pattern.to_string())
+        );
         lay_out(&heading, table, &mut text);
     }
     writer.signals(&mut text);

@@ -347,14 +347,14 @@ impl CsvRows {
     fn report_units(&self, report: &mut Report) {
         let channels = self.layout.iter().flat_map(|layout| &layout.channels);
         for channel in channels {
-            let at = self.names.iter().position(|name| *name == channel.column);
+            let column = &channel.column;
+            let at = self.names.iter().position(|name| name == column);
+            let column = self.table.rename.get(column).unwrap_or(column);
             let mut known = report.units.iter();
-            let is_known = known.any(|(column, _)| *column == channel.column);
+            let is_known = known.any(|(known, _)| known == column);
             let unit = at.filter(|_| !is_known);
             let unit = unit.and_then(|at| detect::unit(&self.units[at]));
-            report
-                .units
-                .extend(unit.map(|unit| (channel.column.clone(), unit)));
+            report.units.extend(unit.map(|unit| (column.clone(), unit)));
         }
     }
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::cell;
 use crate::detect::LongFormat;
+use crate::machines::MachineFault;
 use crate::merge::MergeError;
 
 mod message;
@@ -229,6 +230,15 @@ pub enum FileError {
         /// What is found, as a clause.
         found: String,
     },
+    /// A row that is of none of the machines that are read.
+    Machine {
+        /// The row.
+        place: Place,
+        /// The column that says which it is of.
+        column: String,
+        /// What is wrong.
+        fault: MachineFault,
+    },
     /// A row of a long layout whose time is before the one before.
     LongOutOfOrder {
         /// The row.
@@ -358,6 +368,7 @@ impl FileError {
             | Self::TimeLeaps { place, .. }
             | Self::HeaderAgain { place, .. }
             | Self::NotAsDeclared { place, .. }
+            | Self::Machine { place, .. }
             | Self::LongOutOfOrder { place, .. }
             | Self::LongFormat { place, .. }
             | Self::CellCount { place, .. }

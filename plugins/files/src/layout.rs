@@ -119,11 +119,24 @@ impl Layout {
         self.table.of(&name.to_string_lossy())
     }
 
-    /// Leaves out the columns that are declared for segments.
+    /// The same by the names that columns have in a file.
+    pub(crate) fn in_file(&self, table: &TableFormat) -> Self {
+        let mut own = self.clone();
+        if !table.rename.is_empty() {
+            for channel in &mut own.channels {
+                channel.column = table.in_file(&channel.column).into_owned();
+            }
+            let times = own.time.columns;
+            own.time.columns = times.renamed(|name| table.in_file(name).into_owned());
+        }
+        own
+    }
+
+    /// Leaves out the columns that are declared for segments and machines.
     pub(crate) fn without_segments(&mut self) {
         let files = self.table.files.iter_mut().map(|(_, table)| table);
         for table in files.chain([&mut self.table.base]) {
-            table.segment = None;
+            (table.segment, table.machine, table.only) = (None, None, None);
         }
     }
 

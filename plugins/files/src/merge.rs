@@ -210,7 +210,7 @@ fn with_times(paths: &[PathBuf], layout: &Layout, mut options: Options) -> Optio
 struct Content {
     name: String,
     columns: BTreeSet<String>,
-    /// Whether it has the column that is declared for segments.
+    /// Whether it has a column that is declared for segments or machines.
     has_segments: bool,
     /// All its names, for messages.
     names: Vec<String>,
@@ -221,9 +221,11 @@ impl Content {
     fn of(path: &Path, layout: &Layout, options: &Options) -> Result<Self, FileError> {
         let mut wanted = layout.clone();
         wanted.channels.iter_mut().for_each(|of| of.optional = true);
-        let segment = layout.table_of(path).segment.clone();
+        let table = layout.table_of(path);
+        let apart = [table.segment.clone(), table.machine.clone()];
         wanted.without_segments();
-        wanted.channels.extend(segment.map(|column| ChannelColumn {
+        let apart = apart.into_iter().flatten();
+        wanted.channels.extend(apart.map(|column| ChannelColumn {
             column,
             optional: true,
             is_instant: false,
@@ -236,7 +238,7 @@ impl Content {
             }
         }
         let mut present = reader.present();
-        let has_segments = present.split_off(layout.channels.len()) == [true];
+        let has_segments = present.split_off(layout.channels.len()).contains(&true);
         let columns = layout.channels.iter().zip(present);
         let columns = columns.filter(|(_, is_there)| *is_there);
         Ok(Self {
@@ -330,7 +332,7 @@ pub(crate) fn logs_of(
 
 /// The rows of several logs in the order of time, each file open once, with one row of each log in memory.
 ///
-/// Rows of one time are one. Where times are dates, a segment of one log is one of all. Where they are not, segments are set beside
+/// Rows of one time are one. Where times are dates, a segment of one log is one of all. Where they are not, or logs are of several machines, segments are set beside
 /// each other in their order.
 pub struct Merge {
     logs: Vec<OpenLog>,
@@ -410,8 +412,9 @@ impl Merge {
             row.is_none_or(|row| is_dated(log.recording.form(), row.time_ns))
         };
         let (dates, counts): (Vec<_>, Vec<_>) = open.iter().partition(|log| is_dated(log));
-        let dated = counts.is_empty();
-        if !dated && !options.merge {
+        let of_machines = |log: &OpenLog| log.recording.is_of_several();
+        let dated = counts.is_empty() && !open.iter().any(of_machines);
+        if !counts.is_empty() && !options.merge {
             let is_dated = !dates.is_empty();
             let files = [
                 counts[0],

@@ -15,6 +15,7 @@ use crate::json_rows::JsonRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 use crate::long::Long;
+use crate::machines::Machines;
 use crate::recording::offset_of;
 use crate::typed::{self, TypedCells, TypedFile};
 use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, Stretch, TimeColumn};
@@ -74,7 +75,11 @@ pub struct Reader {
     reading: Reading,
     /// The first row of a segment, after the break before it was given.
     waiting: Option<Row>,
+    /// Its rows from the first on, of a file whose machines are read one after the other.
+    again: Option<Again>,
 }
+
+type Again = Box<dyn Fn() -> Result<Rows, FileError> + Send>;
 
 enum Rows {
     Csv(Box<CsvRows>),
@@ -111,15 +116,22 @@ impl Reader {
         if let Some((_, time)) = options.times.iter().find(|(file, _)| file == path) {
             layout.time = time.clone();
         }
+        let is_whole = !options.goes_on && path.is_file();
+        let table = layout.table_of(path).clone();
+        let is_of_several = table.machine.is_some() && table.only.is_none();
+        let again = (is_of_several && (is_whole || crate::is_in_memory(path))).then(|| {
+            let (path, layout, options) = (path.to_owned(), layout.clone(), options.clone());
+            let again = move || Ok(Self::open(&path, layout.clone(), options.clone())?.rows);
+            Box::new(again) as Again
+        });
         if let Some(file) = typed::opened(path) {
-            return Self::from_typed(path, file?, layout, options);
+            let reader = Self::from_typed(path, file?, layout, options)?;
+            return Ok(reader.reading_again(again));
         }
         let format = options.format.or_else(|| Format::of_file(path));
         let options = Options { format, ..options };
-        let table = layout.table_of(path).clone();
         let lines = Lines::open_through(path, table.encoding, through)?;
         // What is read once, or goes on, is read as it comes.
-        let is_whole = !options.goes_on && path.is_file();
         let mut reader = Self::from_lines(lines, layout, &table, options)?;
         if let (Rows::Csv(rows), true, Some(_)) = (&mut reader.rows, is_whole, &reader.reading.long)
         {
@@ -129,7 +141,16 @@ impl Reader {
                 reader.reading.commas.times,
             );
         }
-        Ok(reader)
+        Ok(reader.reading_again(again))
+    }
+
+    /// The same with its rows from the first on, where these can be had.
+    fn reading_again(mut self, again: Option<Again>) -> Self {
+        if let Some(machines) = &mut self.reading.machines {
+            machines.is_file = again.is_some();
+        }
+        self.again = again;
+        self
     }
 
     /// Reads from any stream of bytes; `name` stands for it in messages.
@@ -201,7 +222,7 @@ impl Reader {
         options: &Options,
         taken: Option<(i64, i64)>,
     ) -> Self {
-        let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout));
+        let long = (table.layout == Arrangement::Long).then(|| Long::of(&layout.in_file(table)));
         let cells = if long.is_some() {
             2
         } else {
@@ -210,6 +231,10 @@ impl Reader {
         let is_time = |name: &String| layout.time.columns.names().contains(name);
         let restarts = table.segment.as_ref().is_some_and(is_time);
         let segment_cell = table.segment.as_ref().map(|_| cells).filter(|_| !restarts);
+        let machine_cell = cells + usize::from(table.segment.is_some());
+        let machines = table.machine.as_ref();
+        let machines =
+            machines.map(|column| Machines::new(column, machine_cell, table.only.as_deref()));
         let joins = options.joins || long.is_some();
         let mut ledger = Ledger::new(options.lenient || table.lenient, table.decimal);
         ledger.joins = joins;
@@ -225,6 +250,7 @@ impl Reader {
                 segment_cell,
                 restarts,
                 segment: Vec::new(),
+                machines,
                 long,
                 ahead: None,
                 joins,
@@ -232,6 +258,7 @@ impl Reader {
                 taken,
             },
             waiting: None,
+            again: None,
         }
     }
 
@@ -241,11 +268,23 @@ impl Reader {
     /// A cell, row or line that cannot be read, with its place, unless [`Options::lenient`]; at the end of JSON lines and of a long
     /// layout also a channel that no line had, unless that was reported at once ([`Reader::report_first`]).
     pub fn next_into(&mut self, row: &mut Row) -> Result<bool, FileError> {
-        match &mut self.rows {
-            Rows::Csv(rows) => self.reading.next_joined(rows.as_mut(), row),
-            Rows::Json(rows) => self.reading.next_joined(rows.as_mut(), row),
-            Rows::Typed(rows) => self.reading.next_joined(rows.as_mut(), row),
+        loop {
+            let is_row = match &mut self.rows {
+                Rows::Csv(rows) => self.reading.next_joined(rows.as_mut(), row),
+                Rows::Json(rows) => self.reading.next_joined(rows.as_mut(), row),
+                Rows::Typed(rows) => self.reading.next_joined(rows.as_mut(), row),
+            }?;
+            match &self.again {
+                Some(again) if !is_row && self.reading.next_machine() => self.rows = again()?,
+                _ => return Ok(is_row),
+            }
         }
+    }
+
+    /// Whether rows of several machines are read, one machine after the other.
+    pub(crate) fn is_of_several(&self) -> bool {
+        let machines = self.reading.machines.as_ref();
+        machines.is_some_and(Machines::are_several)
     }
 
     /// What comes next, with `row` filled if it is a row.
@@ -323,20 +362,21 @@ fn taken(path: &Path, layout: &Layout, options: &Options) -> Result<Option<(i64,
     Ok(ends.map(|(from, to)| (own(from), own(to))))
 }
 
-/// The columns whose cells are read: those of the channels, or where a row has one value its name and that; behind them the one for
-/// segments.
+/// The columns whose cells are read, as the file names them: those of the channels, or where a row has one value its name and that;
+/// behind them those for segments and machines.
 fn wanted(layout: &Layout, table: &TableFormat) -> Layout {
     let column = |name: &String| ChannelColumn {
         column: name.clone(),
         optional: false,
         is_instant: false,
     };
-    let mut wanted = layout.clone();
+    let mut wanted = layout.in_file(table);
     if table.layout == Arrangement::Long {
         let cells = [&table.name, &table.value].into_iter().flatten();
         wanted.channels = cells.map(column).collect();
     }
-    wanted.channels.extend(table.segment.as_ref().map(column));
+    let apart = [&table.segment, &table.machine].into_iter().flatten();
+    wanted.channels.extend(apart.map(column));
     wanted
 }
 

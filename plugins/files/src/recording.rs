@@ -101,8 +101,9 @@ impl Recording {
             if let Some((_, reader)) = &mut self.current {
                 let first = reader.report().rows == 0;
                 if reader.next_into(row)? {
+                    let apart = self.options.segments || reader.is_of_several();
                     self.shift(row);
-                    let apart = |last| self.options.segments || row.time_ns <= last;
+                    let apart = |last| apart || row.time_ns <= last;
                     let of_file = first && self.last_ns.is_some_and(apart);
                     if of_file || row.begins_segment {
                         self.waiting = Some(std::mem::take(row));
@@ -132,6 +133,12 @@ impl Recording {
                 *value += Duration::from_ns(self.offset_ns).secs();
             }
         }
+    }
+
+    /// Whether rows of several machines are read, one machine after the other.
+    pub(crate) fn is_of_several(&self) -> bool {
+        let current = self.current.as_ref();
+        current.is_some_and(|(_, of)| of.is_of_several())
     }
 
     /// How the times of the file that is read are written.

@@ -269,64 +269,6 @@ fn names_may_stand_in_the_third_row() {
 }
 
 #[test]
-fn machines_side_by_side_and_sensors_of_one_name_are_named() {
-    let told = |words: &[&dyn AsRef<std::ffi::OsStr>]| {
-        let told = athermal(words).ended(2).told;
-        told.split_whitespace().collect::<Vec<_>>().join(" ")
-    };
-    let scratch = Scratch::new("machines");
-    let graph = scratch.path("g.toml");
-    if let Some(folder) = case("two-machines-in-one-log") {
-        let told = told(&[&"init", &folder.join("line.csv"), &"-o", &graph]);
-        for part in [
-            "`machine` has 2 values (A, B)",
-            "the time does not go on",
-            "athermal fleet",
-            "segment = \"machine\"",
-        ] {
-            assert!(told.contains(part), "{part} is not in {told}");
-        }
-    }
-    if let Some(folder) = case("a-file-for-each-sensor") {
-        let [spindle, bed, positions] =
-            ["spindle.csv", "bed.csv", "positions.csv"].map(|file| folder.join(file));
-        for files in [vec![&spindle, &bed, &positions], vec![&spindle, &bed]] {
-            let mut words: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"init", &"-o", &graph];
-            words.extend(files.iter().map(|file| *file as &dyn AsRef<_>));
-            let told = told(&words);
-            for part in [
-                "same columns at the same times",
-                "several sensors",
-                "another for `Value`",
-                "`spindle_degC`",
-            ] {
-                assert!(told.contains(part), "{part} is not in {told}");
-            }
-        }
-    }
-    // Three machines by number, in blocks of hours, and one whose rows follow those of the other.
-    let row = |machine: usize, minute: usize| {
-        let plate = 20.0 + (minute as f64 / 40.0).sin() + machine as f64;
-        format!("{},{machine},{plate:.3},{:.3}\n", 60 * minute, 3.0 * plate)
-    };
-    let names = "time_s,unit_no,plate_degC,Z_um\n";
-    let by_turns: String = (0..900).map(|nth| row(nth % 3, nth / 3)).collect();
-    let in_blocks: String = (0..900)
-        .map(|nth| row(nth / 30 % 3, 30 * (nth / 90) + nth % 30))
-        .collect();
-    for rows in [by_turns, in_blocks] {
-        let log = scratch.file("log.csv", format!("{names}{rows}"));
-        let told = told(&[&"init", &log, &"-o", &graph]);
-        assert!(told.contains("`unit_no` has 3 values (0, 1, 2)"), "{told}");
-    }
-    let sorted: String = (0..900).map(|nth| row(nth / 450, nth % 450)).collect();
-    let log = scratch.file("log.csv", format!("{names}{sorted}"));
-    athermal(&[&"init", &log, &"-o", &graph]).ended(0);
-    let graph = std::fs::read_to_string(graph).unwrap();
-    assert!(graph.contains("segment = \"unit_no\""), "{graph}");
-}
-
-#[test]
 fn times_that_start_again_after_a_reboot_are_segments() {
     let scratch = Scratch::new("reboots");
     let row = |nth: usize, at: usize| {

@@ -3,5 +3,6 @@
 mod ages;
 mod cases;
 mod dates;
+mod layouts;
 mod random_forms;
 mod scored_outputs;

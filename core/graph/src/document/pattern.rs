@@ -1,5 +1,7 @@
 //! Patterns of names: `*` is any text, `?` one character and `{a,b}` a choice.
 
+use std::fmt;
+
 /// A pattern of names: `*` is any text, `?` one character and `{a,b}` a choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<String>);
@@ -15,6 +17,15 @@ impl Pattern {
     #[must_use]
     pub fn matches(&self, name: &str) -> bool {
         self.0.iter().any(|choice| glob(choice, name))
+    }
+}
+
+impl fmt::Display for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &*self.0 {
+            [one] => f.write_str(one),
+            choices => write!(f, "{{{}}}", choices.join(",")),
+        }
     }
 }
 

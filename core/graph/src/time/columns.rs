@@ -61,6 +61,13 @@ impl TimeColumns {
         }
     }
 
+    /// The same with other names.
+    #[must_use]
+    pub fn renamed(mut self, name: impl Fn(&str) -> String) -> Self {
+        self.names.iter_mut().for_each(|of| *of = name(of));
+        self
+    }
+
     fn written(&self, open: &str, close: &str) -> String {
         let mut text = String::new();
         for (name, before) in self.names.iter().zip(&self.around) {

@@ -197,6 +197,7 @@ impl FileError {
                 f,
                 "{found}, other than `{key}` in `[table]` declares; correct `{key}`, or leave it out so that it is found"
             ),
+            Self::Machine { column, fault, .. } => write!(f, "`{column}` {fault}"),
             Self::LongOutOfOrder { time, previous, .. } => write!(
                 f,
                 "the time `{time}` is before `{previous}`; a long layout is read in order of time: sort the rows by their time"

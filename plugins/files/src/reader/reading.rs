@@ -10,6 +10,7 @@ use crate::error::excerpt;
 use crate::joined::{self, Joined, Lookahead};
 use crate::ledger::{Follows, Ledger};
 use crate::long::Long;
+use crate::machines::Machines;
 use crate::{Again, CellFault, FileError, Layout, Place, TimeColumn};
 
 /// What becomes of rows, whatever their format.
@@ -27,6 +28,8 @@ pub(super) struct Reading {
     pub(super) restarts: bool,
     /// The segment of the row that was read last.
     pub(super) segment: Vec<u8>,
+    /// Where rows are of several machines.
+    pub(super) machines: Option<Machines>,
     /// Where a row has one value.
     pub(super) long: Option<Long>,
     /// What was read to find out whether the row before it is to be taken.
@@ -100,6 +103,18 @@ impl Reading {
             let time = next.time_text.as_bytes();
             self.ledger.refuse_again(time, place, why);
         }
+    }
+
+    /// Goes to the machine whose rows are read next; false where there is none.
+    pub(super) fn next_machine(&mut self) -> bool {
+        let machines = self.machines.as_mut();
+        let is_one = machines.is_some_and(|of| of.next(&self.ledger));
+        if is_one {
+            // The end of the rows before is not that of these.
+            self.lookahead = Lookahead::default();
+            self.segment.clear();
+        }
+        is_one
     }
 
     fn next<C: Cells>(&mut self, rows: &mut C, row: &mut Row) -> Result<bool, FileError> {
@@ -183,7 +198,21 @@ impl Reading {
         rows: &mut C,
         row: &mut Row,
     ) -> Result<Option<Follows>, FileError> {
-        while rows.advance(&mut self.ledger)? {
+        loop {
+            let ledger = match &mut self.machines {
+                Some(machines) => machines.ledger(&mut self.ledger),
+                None => &mut self.ledger,
+            };
+            if !rows.advance(ledger)? {
+                break;
+            }
+            if let Some(machines) = &mut self.machines
+                && !machines.takes(rows.channel(machines.cell), &mut self.ledger, || {
+                    rows.place()
+                })?
+            {
+                continue;
+            }
             if let Some(long) = &mut self.long
                 && !long.takes(rows.channel(0))
             {
@@ -210,6 +239,7 @@ impl Reading {
                 }
                 changes && !is_first
             });
+            row.begins_segment |= self.machines.as_mut().is_some_and(Machines::begins);
             row.begins_segment |= self.restarts && self.ledger.follows(time_ns) == Follows::Behind;
             let follows = self.follows(row);
             if self.ledger.refuses(follows) {

@@ -1,5 +1,8 @@
 //! `[table]`: how the text of a log is laid out. What it leaves open is found in each file by the reader.
 
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -45,8 +48,30 @@ pub struct TableFormat {
     pub value: Option<String>,
     /// A column such as "day": a change of its value begins a segment.
     pub segment: Option<String>,
+    /// A column that says which machine a row is of: those of each are read by themselves, as a segment.
+    pub machine: Option<String>,
+    /// The machine whose rows alone are read, as it stands in the column `machine`.
+    pub only: Option<String>,
+    /// What the graph calls columns of the file, by their names in it: { Value = "spindle_degC" }.
+    pub rename: BTreeMap<String, String>,
     /// Take cells and rows that cannot be read as missing, and count them.
     pub lenient: bool,
+}
+
+impl TableFormat {
+    /// What the column that the graph calls so is called in the file.
+    #[must_use]
+    pub fn in_file<'a>(&'a self, column: &'a str) -> Cow<'a, str> {
+        let mut renamed = self.rename.iter();
+        match renamed.find(|(_, name)| *name == column) {
+            Some((in_file, _)) => in_file.into(),
+            // What the file calls so has another name for the graph: it lacks this one.
+            None => match self.rename.get(column) {
+                Some(name) => format!("{column} (called {name})").into(),
+                None => column.into(),
+            },
+        }
+    }
 }
 
 /// What stands between cells: an ASCII character that no number or quoted cell has.
@@ -210,6 +235,14 @@ fn format(keys: &Value, what: &str, diagnostics: &mut Diagnostics) -> Option<Tab
             }
             _ => {}
         }
+    }
+    if format.only.is_some() && format.machine.is_none() {
+        let why = "only a table with `machine = \"…\"`, the column that says which one a row is of, has several";
+        refused.push(("only", why));
+    }
+    let names: BTreeSet<&String> = format.rename.values().collect();
+    if names.len() < format.rename.len() {
+        refused.push(("rename", "two columns of a file cannot have one name"));
     }
     for (key, reason) in refused {
         let (place, key) = (keys.place_of(key), Some(key.to_owned()));

@@ -253,6 +253,8 @@ fn each_mistake_in_a_table_is_reported_at_its_place() {
         ("name = \"tag\"", &["3 A010"]),
         ("names = 0", &["3 A010"]),
         ("files = 1", &["3 A008"]),
+        ("only = \"A\"", &["3 A010"]),
+        ("rename = { a = \"c\", b = \"c\" }", &["3 A010"]),
         (
             "[[table.files]]\nmatch = \"a\"\nunits = 1\n\
              [[table.files]]\nlayout = \"long\"\nname = \"a\"",
