@@ -51,6 +51,20 @@ fn graph(ahead: &str, lag: &str) -> Graph {
         .outputs("result = 'result'; drift = 'drift'")
 }
 
+/// What persistence says of a truth at an instant: at the last row before it by the horizon, the newest truth that is older by its
+/// window, or by what the horizon leaves of that. None where no truth came of the last position by then, or it is older than a window.
+fn persistence(rows: &[[f64; 3]], measured: &[bool], at: f64, ahead_s: f64) -> f64 {
+    let last = |by: f64, is: &dyn Fn(usize) -> bool| {
+        let last = (0..rows.len())
+            .rev()
+            .find(|nth| rows[*nth][0] <= by && is(*nth));
+        last.filter(|nth| by - rows[*nth][0] <= 300.0)
+    };
+    let run = last(at - ahead_s, &|_| true);
+    let newest = run.and_then(|run| last(rows[run][0] - (300.0 - ahead_s), &|nth| measured[nth]));
+    newest.map_or(f64::NAN, |nth| rows[nth][2])
+}
+
 #[test]
 fn the_figures_of_an_output_are_those_of_the_rows_that_are_written() {
     let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
@@ -80,8 +94,13 @@ fn the_figures_of_an_output_are_those_of_the_rows_that_are_written() {
                 std::array::from_fn(|_| cells.next().unwrap())
             })
             .collect();
+        // The truth is computed wherever a position is measured.
+        let log = std::fs::read_to_string(&test).unwrap();
+        let is_measured = |line: &str| !line.ends_with(',');
+        let measured: Vec<bool> = log.lines().skip(1).map(is_measured).collect();
+        assert_eq!(measured.len(), rows.len());
         // A truth goes with what was put out last before it by the horizon, unless that is older than the truth's window.
-        let (mut pairs, mut truths) = (Vec::new(), 0);
+        let (mut pairs, mut lasting, mut truths) = (Vec::new(), Vec::new(), 0);
         for [at, _, truth] in rows.iter().filter(|row| !row[2].is_nan()) {
             truths += 1;
             let asked = at - ahead_s;
@@ -93,7 +112,14 @@ fn the_figures_of_an_output_are_those_of_the_rows_that_are_written() {
                 last.filter(|row| asked - row[0] <= 300.0)
                     .map(|row| (row[1], *truth)),
             );
+            if pairs.len() > lasting.len() {
+                lasting.push(persistence(&rows, &measured, *at, ahead_s) - truth);
+            }
         }
+        let lasting: Vec<f64> = lasting.into_iter().filter(|of| !of.is_nan()).collect();
+        let lasting_n = lasting.len() as f64;
+        assert!(lasting_n > 50.0, "seed {seed}: {lasting_n}");
+        let lasting: f64 = lasting.iter().map(|of| of * of).sum();
         let n = pairs.len() as f64;
         let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
         let mean = sum(&|(_, y)| *y) / n;
@@ -105,6 +131,8 @@ fn the_figures_of_an_output_are_those_of_the_rows_that_are_written() {
             ("baseline_zero", (sum(&|(_, y)| y * y) / n).sqrt()),
             ("r2_zero", 1.0 - squared / sum(&|(_, y)| y * y)),
             ("r2_mean", 1.0 - squared / sum(&|(_, y)| (y - mean).powi(2))),
+            ("persistence_n", lasting_n),
+            ("baseline_persistence", (lasting / lasting_n).sqrt()),
             ("bias", sum(&|(p, y)| p - y) / n),
             (
                 "max_abs",
