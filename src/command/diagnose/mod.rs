@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use athermal::core::compile::{Plan, Wanted};
 use athermal::diagnosis::day::Days;
 use athermal::diagnosis::{
-    Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
+    Diagnosis, LOOKING, Observation, Options, day, diagnose, is_called, plots, window,
 };
 use athermal::run::recording::{Recording, Table};
 use athermal::run::score::Lack;
@@ -25,7 +25,7 @@ use super::faults::{FaultWatch, Purpose};
 use super::found::{self, Found};
 use super::model::load_fitted;
 use super::report::write_plots;
-use crate::terminal::{Answer, Failure, Format, Terminal, outside};
+use crate::terminal::{Answer, Failure, Format, Progress, Terminal, outside};
 use athermal_analysis::figures::counted;
 use offsets::{OfFile, offsets};
 use tables::Tables;
@@ -127,11 +127,15 @@ impl Diagnose {
             day: (!self.no_fit).then_some(self.day),
             windows: self.window,
         };
-        let mut bar = None;
-        let mut progress = |done: u64, total: u64| {
-            bar.get_or_insert_with(|| terminal.progress_to("fitting", total))
-                .set(done);
+        let mut bar: Option<(&str, Progress)> = None;
+        let mut progress = |what, done, total| match &mut bar {
+            Some((of, bar)) if *of == what => bar.set(done),
+            bar => bar
+                .insert((what, terminal.progress_to(what, total)))
+                .1
+                .set(done),
         };
+        progress(LOOKING.0, 0, LOOKING.1);
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         // It is read dozens of times, mostly for fits.
         let most = IN_MEMORY / (model.plan.sources.len() + ROW);

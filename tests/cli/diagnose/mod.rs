@@ -331,7 +331,7 @@ fn a_sensor_that_is_watched_is_tried_like_any_other() {
         );
         let model = model("watched", &text, &[("thermal", linear(&terms, 0.0))]);
         let table = wandering(3000, |course, row| 2000.0 * course[row][0]);
-        diagnose(&model, &table, &Options::default(), &mut |_, _| {})
+        diagnose(&model, &table, &Options::default(), &mut |_, _, _| {})
             .unwrap()
             .0
     };
@@ -527,10 +527,14 @@ fn a_recording_without_a_truth_is_no_reason_to_stop() {
         ..Options::default()
     };
     let mut empty = Table::default();
-    diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();
+    diagnose(&model, &empty, &options, &mut |_, _, _| {}).unwrap();
     for row in 0..50 {
         empty.push(secs(10.0 * f64::from(row)), &[20.0, f64::NAN, f64::NAN]);
     }
-    let (found, _) = diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();
+    let mut seen = Vec::new();
+    let mut progress = |what, done, all| seen.push((what, done, all));
+    let (found, _) = diagnose(&model, &empty, &options, &mut progress).unwrap();
     assert!(found.residuals[0].n == 0 && found.days.is_none());
+    let looked: Vec<_> = (1..=6).map(|done| ("looking", done, 6)).collect();
+    assert_eq!(seen, looked);
 }

@@ -118,7 +118,10 @@ impl Diagnosis {
     }
 }
 
-/// Diagnoses a model on a recording. `progress` gets the number of fits done, and of all.
+/// What is done before fits of its own: the recording is read, and looked at in so many ways.
+pub const LOOKING: (&str, u64) = ("looking", 6);
+
+/// Diagnoses a model on a recording that has been read. `progress` gets what is done, how much of it has been, and of how much.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.
@@ -126,10 +129,17 @@ pub fn diagnose(
     model: &Model,
     recording: &dyn Recording,
     options: &Options,
-    progress: &mut dyn FnMut(u64, u64),
+    progress: &mut dyn FnMut(&'static str, u64, u64),
 ) -> Result<(Diagnosis, Observation), FitError> {
     let plan = &*model.plan;
+    let mut looked = 1;
+    let mut look = || {
+        progress(LOOKING.0, looked, LOOKING.1);
+        looked += 1;
+    };
+    look();
     let observation = observe(model, recording)?;
+    look();
     let main = observation.trace.truths.iter().filter_map(|truth| {
         let of = &truth.predictions[main_prediction(plan, truth, &options.of)?];
         let channel = &plan.channels[truth.slot];
@@ -141,20 +151,27 @@ pub fn diagnose(
         })
     });
     let (responses, mut silent_nodes) = response::answers(model, &observation)?;
+    look();
     let (contributions, more) = sensor::contributions(model, recording, &observation)?;
     silent_nodes.extend(more);
+    look();
+    let lags = lag::lags(model, recording, &observation, &options.of)?;
+    look();
+    let designs = regressor::designs(model, recording)?;
+    look();
+    let mut fitted = |done, all| progress("fitting", done, all);
     let diagnosis = Diagnosis {
         graph: plan.name.clone().unwrap_or_default(),
         main: main.collect(),
         residuals: residual::residuals(plan, &observation),
-        lags: lag::lags(model, recording, &observation, &options.of)?,
+        lags,
         responses,
-        designs: regressor::designs(model, recording)?,
+        designs,
         contributions,
         silent_nodes,
         lacks: observation.trace.lacks.clone(),
         days: match options.day {
-            Some(day) => day::days(model, recording, &observation, day, progress)?,
+            Some(day) => day::days(model, recording, &observation, day, &mut fitted)?,
             None => None,
         },
         day_count: options.day.map_or(0, |day| day::count(&observation, day)),
