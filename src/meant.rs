@@ -121,7 +121,7 @@ fn meant(words: &[OsString]) -> Option<String> {
     let (given, rest) = words.split_first()?;
     let command = synonym(given).unwrap_or(given);
     let (mut graphs, mut logs, mut others) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut of_option, mut of_data) = (false, false);
+    let (mut of_option, mut of_data, mut drifting) = (false, false, Vec::new());
     for &word in rest {
         if matches!(word, "--data" | "-d" | "--input" | "-i") {
             (of_option, of_data) = (false, true);
@@ -134,6 +134,10 @@ fn meant(words: &[OsString]) -> Option<String> {
             match Given::of(Path::new(word)) {
                 Some(Given::Graph | Given::Model) => graphs.push(word),
                 Some(Given::Log) => logs.push(word),
+                // What is no file behind `-d` is a column that drifts, where a log is looked at for the first time.
+                _ if of_data && *given == "init" && !Path::new(word).exists() => {
+                    drifting.push(word)
+                }
                 _ if of_data => logs.push(word),
                 _ => others.push(word),
             }
@@ -153,8 +157,12 @@ fn meant(words: &[OsString]) -> Option<String> {
     };
     let is_named = |of: &&str| of.starts_with("-o") || of.starts_with("--output");
     let output = (command == "fit" && !others.iter().any(is_named)).then_some(["-o", "model.json"]);
-    if command == "init" {
+    if command == "init" && *given != "init" {
         others.clear();
+    }
+    if !drifting.is_empty() {
+        others.push("--drifts");
+        others.append(&mut drifting);
     }
     let call = ["athermal", command]
         .into_iter()

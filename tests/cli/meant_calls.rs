@@ -107,6 +107,18 @@ fn what_stands_in_the_place_of_another_is_named_with_the_call_that_was_meant() {
             [folder, "--output"],
         ),
         ("init log.csv -o out", [folder, "--output"]),
+        (
+            "init log.csv -d Z1_nm",
+            ["-d", "tip: `athermal init log.csv --drifts Z1_nm`"],
+        ),
+        (
+            "init log.csv --data Z1_nm X1_nm --time time_s",
+            [
+                "--data",
+                "tip: `athermal init log.csv --time time_s --drifts Z1_nm X1_nm`",
+            ],
+        ),
+        ("init -d log.csv", ["-d", init]),
     ] {
         let told = refused(&scratch, call);
         assert!(!told.contains("similar subcommand"), "{call}: {told}");
