@@ -189,7 +189,7 @@ fn a_file_for_each_sensor_is_read_as_one_table_of_all() {
                 && (sensor == 0 && minute > 4400 || sensor == 2 && (600..900).contains(&minute))
         };
         let is_there = |sensor: usize, nth: usize, minute: u32| {
-            nth as u32 % every[sensor] == 0 && !is_hole(sensor, minute)
+            (nth as u32).is_multiple_of(every[sensor]) && !is_hole(sensor, minute)
         };
         let paths: Vec<PathBuf> = files
             .iter()
@@ -317,7 +317,7 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
     let scratch = Scratch::new("machines");
     if let Some(folder) = case("two-machines-in-one-log") {
         let line = folder.join("line.csv");
-        let (facts, graph) = scores(&scratch, &[line.clone()], &[]);
+        let (facts, graph) = scores(&scratch, std::slice::from_ref(&line), &[]);
         assert!(graph.contains("machine = \"machine\""), "{graph}");
         assert!(graph.contains("4,032 rows"), "{graph}");
         assert!(score(&facts, "now/result", "r2_zero") > 0.9, "{facts}");
@@ -363,8 +363,7 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
     }
     // By number, by text, three, one that appears late or ends early, irregularly interleaved, in blocks, and not in step.
     let of = |machine: u64| rows(machine, 700, 5).into_iter();
-    let named = |machine: u64, name: &str, rows: Rows| {
-        let _ = machine;
+    let named = |name: &str, rows: Rows| {
         let name = name.to_owned();
         rows.into_iter()
             .map(move |(minute, values)| (minute, name.clone(), values))
@@ -378,22 +377,16 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
         (
             "numbers",
             "machine_no",
-            sorted(
-                [
-                    named(1, "1", of(1).collect()),
-                    named(2, "2", of(2).collect()),
-                ]
-                .concat(),
-            ),
+            sorted([named("1", of(1).collect()), named("2", of(2).collect())].concat()),
         ),
         (
             "three",
             "Anlage",
             sorted(
                 [
-                    named(1, "A", of(1).collect()),
-                    named(2, "B", of(2).collect()),
-                    named(4, "C", of(4).collect()),
+                    named("A", of(1).collect()),
+                    named("B", of(2).collect()),
+                    named("C", of(4).collect()),
                 ]
                 .concat(),
             ),
@@ -403,9 +396,9 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
             "station",
             sorted(
                 [
-                    named(1, "west", of(1).collect()),
-                    named(2, "east", of(2).skip(600).collect()),
-                    named(3, "north", of(3).take(100).collect()),
+                    named("west", of(1).collect()),
+                    named("east", of(2).skip(600).collect()),
+                    named("north", of(3).take(100).collect()),
                 ]
                 .concat(),
             ),
@@ -414,8 +407,8 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
             let shifted = of(4).map(|(minute, values)| (minute + 1 + minute % 3, values));
             sorted(
                 [
-                    named(1, "MX-1", of(1).collect()),
-                    named(4, "MX-2", shifted.collect()),
+                    named("MX-1", of(1).collect()),
+                    named("MX-2", shifted.collect()),
                 ]
                 .concat(),
             )
@@ -424,7 +417,6 @@ fn machines_side_by_side_are_read_as_a_file_of_each() {
             let blocks = (0..7).flat_map(|block| [1, 2].map(|machine| (block, machine)));
             let blocks = blocks.flat_map(|(block, machine)| {
                 named(
-                    machine,
                     ["a", "b"][machine as usize - 1],
                     of(machine).skip(100 * block).take(100).collect(),
                 )

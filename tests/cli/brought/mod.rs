@@ -3,6 +3,7 @@
 mod ages;
 mod cases;
 mod dates;
+mod homings;
 mod layouts;
 mod random_forms;
 mod scored_outputs;

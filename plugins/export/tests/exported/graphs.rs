@@ -175,6 +175,27 @@ recover = "{}s"
             random.between(0.0, 40.0) as u64,
         );
     }
+    // What is measured rarely and counts long does not age what is made of it and of gradients.
+    let _ = write!(
+        text,
+        r#"
+[signals.voltage]
+unit = "V"
+channels = ["battery"]
+max_age = "{}s"
+[nodes.late]
+type = "lag"
+inputs.signal = "voltage"
+lags = ["10s"]
+[nodes.warm]
+type = "linear"
+each = "axis"
+inputs.features = ["gradients", "voltage", "late"]
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+"#,
+        one_of(random, &["200", "400", "900"]),
+    );
     // What is made of drift may not choose who predicts it while windows overlap.
     let state = if legal > 0 { "mark" } else { "state.{axis}" };
     votes(random, state, &mut text);
@@ -186,7 +207,8 @@ recover = "{}s"
 }
 
 fn votes(random: &mut Prng, state: &str, text: &mut String) {
-    let voters = r#"["thermal.{axis}", "motion.{axis}", "both.{axis}", "masses_too.{axis}"]"#;
+    let voters =
+        r#"["thermal.{axis}", "motion.{axis}", "warm.{axis}", "both.{axis}", "masses_too.{axis}"]"#;
     // A memory, and how many truths it holds at most.
     let memory = |random: &mut Prng| {
         let truths = 1 + random.between(0.0, 30.0) as u64;
@@ -358,6 +380,8 @@ chosen = "chosen"
 thermal = "thermal"
 novelty = "thermal:novelty"
 masses_too = "masses_too"
+late = "late"
+warm = "warm"
 motion = "motion"
 both = "both"
 nothing = "nothing"

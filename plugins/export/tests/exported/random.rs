@@ -60,6 +60,7 @@ pub fn events(random: &mut Prng, plan: &Plan, ticks: usize) -> Vec<Event> {
                 Some("position") => 0.7,
                 Some("applied") => 0.3,
                 Some("mark") => 0.1,
+                Some("voltage") => 0.01,
                 _ if regular => 1.0,
                 _ => 0.93,
             };
@@ -112,6 +113,7 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
         let mut random = Prng::stream(seed, "an exported graph");
         let text = graph(&mut random);
         let plan = plan(&text);
+        assert!(plan.gathers.iter().any(|of| !of.rare.is_empty()), "{text}");
         let fitted = made_up(&plan, &mut random);
         let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
         let exported = export_c(&engine, &options(), false).unwrap();
