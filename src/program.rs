@@ -7,6 +7,8 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use athermal::core::diagnostic::{panic_message, panic_text};
+use athermal::core::registry::{all, find};
+use athermal_command::CommandKind;
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 
 use crate::command::Command;
@@ -78,11 +80,15 @@ pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// Does what the command says that stands first: one of the program, or one that a crate brings.
 fn run(arguments: &ArgMatches, terminal: &mut Terminal) -> Result<Answer, Failure> {
     let is_for_programs = terminal.format == Format::Json;
-    if let Some((name, inside)) = arguments.subcommand()
-        && let Some(kind) = athermal_command::kind(name)
-    {
-        terminal.events = is_for_programs && kind.writes_events;
-        return (kind.run)(inside, terminal);
+    if let Some((name, inside)) = arguments.subcommand() {
+        match find::<CommandKind>(name) {
+            Ok(kind) => {
+                terminal.events = is_for_programs && kind.writes_events;
+                return (kind.run)(inside, terminal);
+            }
+            Err(twice) if twice.is_twice() => return Err(Failure::Request(twice.to_string())),
+            Err(_) => {}
+        }
     }
     let command = Command::from_arg_matches(arguments);
     let command = command.unwrap_or_else(|error| error.exit());
@@ -102,7 +108,9 @@ pub fn whole() -> clap::Command {
         .after_help(EXAMPLES);
     let whole = Command::augment_subcommands(Options::augment_args(whole))
         .about("Predicts and corrects the thermal drift of precision machines");
-    let brought = athermal_command::kinds().values();
+    let mut brought: Vec<_> = all::<CommandKind>().collect();
+    brought.dedup_by_key(|kind| kind.name);
+    let brought = brought.into_iter();
     brought.fold(whole, |whole, kind| whole.subcommand((kind.declare)()))
 }
 

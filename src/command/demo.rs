@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
+use athermal::core::registry::find;
 use athermal::run::fit::FitOptions;
 use athermal::run::score::{Score, ScoreOptions, Scores, score};
-use athermal::trial::machine::{Setup, Simulated, machine};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 use clap::Args;
 use serde_json::json;
 
@@ -92,7 +93,8 @@ impl Demo {
 }
 
 fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u64, Failure> {
-    let known = machine(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
+    let known =
+        find::<KnownMachine>(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
     let setup = Setup {
         days,
         seed,

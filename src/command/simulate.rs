@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
+use athermal::core::registry::{all, find};
 use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal::trial::fault::FaultSpec;
 use athermal::trial::machine::{
     ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation,
-    Spread, machine, machines,
+    Spread, facts,
 };
 use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_points, write_table};
 use clap::Args;
@@ -113,7 +114,7 @@ impl Simulate {
             list(terminal);
             return Ok(Answer::Fine);
         };
-        let known = machine(name)
+        let known = find::<KnownMachine>(name)
             .map_err(|error| refused(format!("{error} (`athermal simulate` lists them all)")))?;
         if self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::Request(format!(
@@ -196,7 +197,7 @@ impl Simulate {
         put: &mut dyn FnMut(i64, &[f64]),
     ) -> Result<Vec<String>, Failure> {
         let name = self.machine.as_deref().unwrap_or_default();
-        let machine = machine(name).map_err(refused)?.machine;
+        let machine = find::<KnownMachine>(name).map_err(refused)?.machine;
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
         let mut simulation = Watched::start(&self.recording(machine)?, terminal)?;
@@ -370,19 +371,15 @@ impl Simulation for Watched {
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = machines()
-            .values()
-            .flatten()
-            .map(KnownMachine::facts)
-            .collect();
+        let all: Vec<Value> = all::<KnownMachine>().map(facts).collect();
         println!("{:#}", json!({ "machines": all }));
         return;
     }
-    for known in machines().values().flatten() {
+    for known in all::<KnownMachine>() {
         let machine = known.machine;
         println!(
             "{} (from {} {})\n  {}",
-            machine.name(),
+            known.name,
             known.package,
             known.version,
             machine.summary()

@@ -5,9 +5,10 @@ use std::process::Command;
 
 use crate::workbench::Folder;
 use athermal::Model;
+use athermal::core::registry::{all, find};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::score::{ScoreOptions, score};
-use athermal::trial::machine::{Setup, Simulated, machine, machines};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 
 impl Folder {
     /// Runs and expects success; gives standard output and standard error.
@@ -83,7 +84,7 @@ fn the_demo_comes_again_to_its_own_folder_but_never_over_work_in_it() {
 
 #[test]
 fn the_machines_of_this_program_are_these() {
-    let names: Vec<&str> = machines().keys().copied().collect();
+    let names: Vec<&str> = all::<KnownMachine>().map(|of| of.name).collect();
     assert_eq!(names, ["die-tester", "linear-axis"]);
 }
 
@@ -188,7 +189,7 @@ fn what_cannot_be_simulated_is_refused_with_the_next_step() {
 
 #[test]
 fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
-    let known = machine("linear-axis").unwrap();
+    let known = find::<KnownMachine>("linear-axis").unwrap();
     let recording = |seed| {
         let setup = Setup {
             days: 1.0,
@@ -221,7 +222,7 @@ fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
 
 #[test]
 fn a_graph_that_measures_something_else_is_told_what_the_machine_has() {
-    let known = machine("linear-axis").unwrap();
+    let known = find::<KnownMachine>("linear-axis").unwrap();
     let model = Model::load(graph("z-probe.toml")).unwrap();
     let recording = Simulated::new(known.machine, Setup::default());
     let refused = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {});

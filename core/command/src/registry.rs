@@ -1,8 +1,6 @@
 //! Commands that crates bring.
 
-use std::collections::BTreeMap;
-use std::sync::OnceLock;
-
+use athermal_core::registry::Sort;
 use clap::{ArgMatches, Args};
 
 use crate::terminal::{Answer, Failure, Terminal};
@@ -19,13 +17,9 @@ pub trait Command: Args {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure>;
 }
 
-/// A command, as registered.
+/// A command, by its name on the command line.
 #[derive(Debug)]
 pub struct CommandKind {
-    /// What a command line says.
-    pub name: &'static str,
-    /// The crate that brings it.
-    pub package: &'static str,
     /// Its arguments and their help.
     pub declare: fn() -> clap::Command,
     /// Does what was asked for.
@@ -34,21 +28,9 @@ pub struct CommandKind {
     pub writes_events: bool,
 }
 
-inventory::collect!(CommandKind);
-
-/// All commands that crates bring, by name.
-pub fn kinds() -> &'static BTreeMap<&'static str, &'static CommandKind> {
-    static KINDS: OnceLock<BTreeMap<&'static str, &'static CommandKind>> = OnceLock::new();
-    KINDS.get_or_init(|| {
-        let all = inventory::iter::<CommandKind>.into_iter();
-        all.map(|kind| (kind.name, kind)).collect()
-    })
-}
-
-/// The command of a name, if a crate brings it.
-#[must_use]
-pub fn kind(name: &str) -> Option<&'static CommandKind> {
-    kinds().get(name).copied()
+impl Sort for CommandKind {
+    const ONE: &'static str = "command";
+    const MANY: &'static str = "commands";
 }
 
 /// The arguments of a command; [`register_command!`](crate::register_command) makes use of it.
@@ -70,14 +52,15 @@ pub fn run<C: Command>(matches: &ArgMatches, terminal: &Terminal) -> Result<Answ
 #[macro_export]
 macro_rules! register_command {
     ($command:ty, $name:literal) => {
-        $crate::__private::inventory::submit! {
+        $crate::__private::list!(
+            $crate::CommandKind,
+            $name,
+            $crate::__private::no_schema,
             $crate::CommandKind {
-                name: $name,
-                package: env!("CARGO_PKG_NAME"),
                 declare: || $crate::declare::<$command>($name),
                 run: $crate::run::<$command>,
                 writes_events: <$command as $crate::Command>::WRITES_EVENTS,
             }
-        }
+        );
     };
 }

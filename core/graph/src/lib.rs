@@ -7,6 +7,7 @@
 //! | [`diagnostic`] | how a mistake in a file is reported: code, place, reason, a way out |
 //! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
 //! | [`figures`], [`message`], [`event`] | numbers and tables for people; what is reported, and what can happen |
+//! | [`registry`] | what a name may mean: one table of all that linked crates bring |
 //! | [`document`] | a file, with what it extends, as a tree with places, expanded into declarations |
 //!
 //! A reader begins with [`document::load`](document), and follows one table of the file into the declaration that it becomes.
@@ -19,6 +20,7 @@ pub mod event;
 pub mod figures;
 pub mod message;
 pub mod quantity;
+pub mod registry;
 mod schema;
 pub mod time;
 pub mod unit;
@@ -26,5 +28,5 @@ pub mod unit;
 /// What macros of this crate make use of.
 #[doc(hidden)]
 pub mod __private {
-    pub use serde_json;
+    pub use {inventory, schemars, serde_json};
 }

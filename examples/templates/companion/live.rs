@@ -1,12 +1,13 @@
 //! What the companion declares is known.
 
-use athermal_serve::companion::companion_kinds;
+use athermal_core::registry::find;
+use athermal_serve::companion::CompanionKind;
 use athermal_serve::facts::guide;
 use my_node as _;
 
 #[test]
 fn its_section_its_facts_its_events_and_its_page_are_known() {
-    assert!(companion_kinds().any(|of| of.section == "my_node"));
+    assert!(find::<CompanionKind>("my_node").is_ok());
     for name in ["my_node_looks_total", "my_node_degraded"] {
         assert!(guide().contains(name), "{name}");
     }

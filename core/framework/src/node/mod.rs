@@ -31,7 +31,6 @@ mod recent_error;
 mod registry;
 mod state;
 mod training_error;
-mod written_name;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Evidence, Votes};
@@ -58,12 +57,8 @@ pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
 #[doc(hidden)]
 pub use registry::read;
-pub use registry::{
-    Kind, NodeSpec, ReadSpec, Role, RoleName, as_toml, first_paragraph, inline_toml, kind, kinds,
-};
+pub use registry::{Kind, NodeKind, NodeSpec, ReadSpec, Role, RoleName, as_toml, inline_toml};
 #[doc(hidden)]
 pub use state::StateForm;
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
-pub use written_name::taken_twice;
-pub use written_name::{Written, WrittenName, written_names};
