@@ -5,13 +5,9 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use athermal_core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
+use athermal_core::diagnostic::{Diagnostics, Sources};
+pub use athermal_core::failure::{Failure, outside, status_of};
 use athermal_core::figures::counted;
-use athermal_files::FileError;
-use athermal_run::fit::FitError;
-use athermal_run::live::{RunError, StateError};
-use athermal_run::model::ModelError;
-use athermal_trial::fault::FaultError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -299,123 +295,6 @@ impl Answer {
         match self {
             Self::Fine => 0,
             Self::No => 1,
-        }
-    }
-}
-
-/// Why a command could not do its work.
-#[derive(Debug)]
-pub enum Failure {
-    /// What was asked for makes no sense.
-    Request(String),
-    /// A graph has mistakes.
-    Graph {
-        /// The mistakes.
-        diagnostics: Box<Diagnostics>,
-        /// The texts that they point into.
-        sources: Box<Sources>,
-    },
-    /// Something outside did not work.
-    Outside(String),
-    /// It was reported before; the program ends with this status.
-    Exit(u8),
-}
-
-impl Failure {
-    /// The exit status: 2 where the request was wrong, 3 where something outside failed.
-    #[must_use]
-    pub fn status(&self) -> u8 {
-        match self {
-            Self::Request(_) => 2,
-            Self::Graph { diagnostics, .. } => status_of(diagnostics),
-            Self::Outside(_) => 3,
-            Self::Exit(code) => *code,
-        }
-    }
-}
-
-/// The exit status of mistakes: 3 where the only ones are files of the command line that cannot be read, else 2.
-#[must_use]
-pub fn status_of(mistakes: &Diagnostics) -> u8 {
-    let is_unread = |of: &Diagnostic| of.code == UNREADABLE && of.place.is_none();
-    let mut errors = mistakes.iter().filter(|of| of.severity == Severity::Error);
-    if errors.all(is_unread) { 3 } else { 2 }
-}
-
-/// A file that cannot be read; one that another names has a place.
-const UNREADABLE: &str = "A002";
-
-impl From<ModelError> for Failure {
-    fn from(error: ModelError) -> Self {
-        match error {
-            ModelError::Graph {
-                diagnostics,
-                sources,
-            } => Self::Graph {
-                diagnostics,
-                sources,
-            },
-            ModelError::Unreadable { .. } => Self::Outside(error.to_string()),
-            other => Self::Request(other.to_string()),
-        }
-    }
-}
-
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        if error.is_closed_pipe() {
-            // Whoever read our output has seen enough.
-            return Self::Exit(0);
-        }
-        match error {
-            FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {
-                Self::Outside(error.to_string())
-            }
-            other => Self::Request(other.to_string()),
-        }
-    }
-}
-
-impl From<RunError> for Failure {
-    fn from(error: RunError) -> Self {
-        match error {
-            RunError::Source(error) | RunError::Sink(error) => outside(error),
-            RunError::State(error) => error.into(),
-            RunError::Engine(_) | RunError::Stage(_) | RunError::Copy(_) => {
-                Self::Request(error.to_string())
-            }
-        }
-    }
-}
-
-impl From<StateError> for Failure {
-    fn from(error: StateError) -> Self {
-        match error {
-            StateError::Foreign { .. } => Self::Request(error.to_string()),
-            StateError::Held { path } => Self::Outside(format!(
-                "{}: another run keeps its state there: end that one first, or name another file with `--state`",
-                path.display()
-            )),
-            other => Self::Outside(other.to_string()),
-        }
-    }
-}
-
-/// The failure of a source, a sink or a recording.
-pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
-    match error.downcast::<FileError>() {
-        Ok(error) => (*error).into(),
-        Err(error) if error.is::<FaultError>() => Failure::Request(error.to_string()),
-        Err(error) => Failure::Outside(error.to_string()),
-    }
-}
-
-impl From<FitError> for Failure {
-    fn from(error: FitError) -> Self {
-        match error {
-            FitError::Recording(error) => outside(error),
-            FitError::Engine(_) | FitError::Blocks(_) => Self::Request(error.to_string()),
-            FitError::Panicked { .. } => Self::Outside(error.to_string()),
         }
     }
 }

@@ -126,8 +126,8 @@ mod tests;
 
 // The vocabulary that a graph is written in; authors of nodes need one crate.
 pub use athermal_graph::{
-    channel, diagnostic, document, event, events, figures, lacks, message, quantity, registry,
-    time, unit,
+    channel, diagnostic, document, event, events, failure, figures, lacks, message, quantity,
+    register_error, registry, time, unit,
 };
 
 /// What [`register!`], [`state!`] and [`predictor!`] need at their place of use.

@@ -7,6 +7,7 @@
 //! | [`diagnostic`] | how a mistake in a file is reported: code, place, reason, a way out |
 //! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
 //! | [`figures`], [`message`], [`event`] | numbers and tables for people; what is reported, and what can happen |
+//! | [`failure`] | why work that somebody asked for was not done |
 //! | [`registry`] | what a name may mean: one table of all that linked crates bring |
 //! | [`document`] | a file, with what it extends, as a tree with places, expanded into declarations |
 //!
@@ -17,6 +18,7 @@ mod decimal_comma;
 pub mod diagnostic;
 pub mod document;
 pub mod event;
+pub mod failure;
 pub mod figures;
 pub mod message;
 pub mod quantity;

@@ -96,6 +96,7 @@ static TWIN: Registered<NodeKind> = of_others(
         role: RoleName::Feature,
         ports: || &[],
         inputs: Keeper::inputs,
+        facts: Keeper::facts,
         read: athermal_core::node::read::<Keeper>,
     },
 );

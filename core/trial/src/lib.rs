@@ -34,7 +34,7 @@ pub use table::TestTable;
 
 // The layers below, by the names that they have for everybody.
 use athermal_core::{
-    compile, diagnostic, document, engine, node, prng, quantity, registry, time, unit,
+    compile, diagnostic, document, engine, failure, node, prng, quantity, registry, time, unit,
 };
 use athermal_run::{fit, recording, score};
 

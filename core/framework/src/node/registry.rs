@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
+use super::{Combiner, Duty, Estimator, Feature, InputPort, KindFacts, PortSummary, Read};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 use crate::document::{Value, decode_beside};
 use crate::registry::{Registered, Sort};
@@ -77,6 +77,8 @@ pub struct NodeKind {
     pub inputs: fn() -> &'static [InputPort],
     /// Of a feature, the output ports as it tells them: see [`Feature::ports`].
     pub ports: fn() -> &'static [PortSummary],
+    /// What reports ask of it.
+    pub facts: fn() -> KindFacts,
     /// Reads its parameters, or reports their mistakes. The keys are those of the node
     /// that are read elsewhere.
     pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
@@ -88,6 +90,12 @@ impl Sort for NodeKind {
 }
 
 impl NodeKind {
+    /// What it does, where reports go by that.
+    #[must_use]
+    pub fn duty(&self) -> Duty {
+        (self.facts)().duty
+    }
+
     /// The specification that parameters as a table give, with defaults for the others; none where they cannot be read.
     #[must_use]
     pub fn given(&self, parameters: &serde_json::Value) -> Option<Box<dyn NodeSpec>> {
@@ -199,6 +207,7 @@ macro_rules! register {
                 role: $crate::node::RoleName::$role,
                 inputs: <$spec as $crate::node::$role>::inputs,
                 ports: $ports,
+                facts: <$spec as $crate::node::$role>::facts,
                 read: $crate::__private::read::<$spec>,
             }
         );
@@ -206,7 +215,7 @@ macro_rules! register {
     ($($other:tt)*) => {
         compile_error!(
             "expected the type of the parameters, the role and the name of the kind: \
-             `register!(Difference, Feature, \"difference\")`; the roles are Feature, Estimator and Combiner"
+             `register!(Mine, Feature, \"mine\")`; the roles are Feature, Estimator and Combiner"
         );
     };
 }

@@ -16,7 +16,7 @@ use crate::connector::{ConnectorKind, Source, SourceKind};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::problem::MissingKey;
 use crate::document::{Entry, GraphFile, Table, Value};
-use crate::registry::{Registered, Sort, find};
+use crate::registry::{Registered, Sort, all, find};
 use crate::sequencer::{ClockRemedy, ClockRule};
 use crate::time::Duration;
 
@@ -148,7 +148,10 @@ where
             key: "type".to_owned(),
             what,
             advice: Some(format!(
-                "name its kind, such as type = \"csv\"; `athermal nodes` lists the kinds of {role}s"
+                "name its kind, such as type = \"{}\"; `athermal nodes` lists the kinds of {role}s",
+                all::<ConnectorKind<S>>()
+                    .next()
+                    .map_or("", |kind| kind.name)
             )),
         };
         diagnostics.report(entry.key, problem);
