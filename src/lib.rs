@@ -93,6 +93,8 @@ mod without_mqtt {
 
     athermal_core::lacks!(SourceKind, "mqtt", "mqtt");
     athermal_core::lacks!(SinkKind, "mqtt", "mqtt");
+    #[cfg(feature = "cli")]
+    athermal_core::lacks!(athermal_command::CommandKind, "mqtt", "browse");
 }
 #[cfg(not(feature = "parquet"))]
 athermal_core::lacks!(athermal_serve::connector::SinkKind, "parquet", "parquet");

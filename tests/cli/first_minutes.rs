@@ -265,6 +265,10 @@ fn shells_get_their_completions() {
     for shell in ["bash", "zsh", "fish"] {
         let (script, _) = folder.fine(&["completions", shell]);
         assert!(script.contains("simulate"), "{shell}");
+        assert!(
+            shell == "bash" || script.contains("Models - Fit"),
+            "{script}"
+        );
     }
 }
 
@@ -295,14 +299,17 @@ fn each_command_has_a_page_in_the_manual_with_what_its_help_says() {
         let path = folder.0.join(format!("pages/of/man1/{name}.1"));
         std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
-    assert!(page("athermal").contains("athermal\\-fit"));
+    let (models, runs) = page("athermal")
+        .split_once(".SH RUN\n")
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
+    assert!(models.contains("athermal\\-fit(1)") && runs.contains("athermal\\-serve(1)"));
     let (help, _) = folder.fine(&["--help"]);
-    let (_, commands) = help.split_once("Commands:\n").unwrap();
-    let commands = commands.lines().take_while(|line| !line.is_empty());
-    let commands = commands.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    let commands: Vec<&str> = commands
-        .filter(|name| !name.is_empty() && *name != "help")
-        .collect();
+    let (_, commands) = help.split_once("\nBegin:\n").unwrap();
+    let (commands, _) = commands.split_once("\nOptions:\n").unwrap();
+    let commands = commands.lines().filter_map(|line| line.strip_prefix("  "));
+    let commands = commands.filter_map(|line| line.split(' ').next());
+    let commands: Vec<&str> = commands.filter(|name| !name.is_empty()).collect();
     assert!(commands.len() > 30, "{commands:?}");
     for command in commands {
         assert!(page(&format!("athermal-{command}")).contains("SYNOPSIS"));

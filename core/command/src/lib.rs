@@ -4,7 +4,7 @@
 //! [`register_command!`], and it stands among the others:
 //!
 //! ```
-//! use athermal_command::{Answer, Command, Failure, Terminal, println};
+//! use athermal_command::{Answer, Command, Failure, Group, Terminal, println};
 //! use clap::Args;
 //!
 //! /// Say how many windows a period has
@@ -15,6 +15,8 @@
 //! }
 //!
 //! impl Command for Windows {
+//!     const GROUP: Group = Group::Look;
+//!
 //!     fn run(&self, _: &Terminal) -> Result<Answer, Failure> {
 //!         println!("{}", self.minutes / 5);
 //!         Ok(Answer::Fine)
@@ -35,7 +37,7 @@ pub mod terminal;
 
 pub use athermal_core::message::{self, Message};
 pub use athermal_run::live::monitor::words as findings;
-pub use registry::{Command, CommandKind, declare, run};
+pub use registry::{Command, CommandKind, Group, declare, run};
 pub use terminal::{Answer, Failure, Format, Terminal};
 
 /// What the macros of this crate use.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use athermal::core::node::NodeKind;
 use athermal::core::registry::{Sort, all};
 use athermal::trial::machine::KnownMachine;
+use athermal_command::CommandKind;
 use athermal_serve::companion::CompanionKind;
 use athermal_serve::connector::{SinkKind, SourceKind};
 use clap::Args;
@@ -65,6 +66,7 @@ impl Plugin {
             ("CORE", of("core/framework")),
             ("SERVE", of("core/serve")),
             ("INTERFACE", of("plugins/http")),
+            ("COMMAND", of("core/command")),
             ("TRIAL", of("core/trial")),
             ("TESTKIT", of("core/testkit")),
         ];
@@ -115,7 +117,9 @@ impl Plugin {
             Role::Machine => bring::<KnownMachine>(&self.name),
             Role::Source => bring::<SourceKind>(kind),
             Role::Sink => bring::<SinkKind>(kind),
-            Role::Companion => bring::<CompanionKind>(kind),
+            Role::Companion => {
+                bring::<CompanionKind>(kind).or_else(|| bring::<CommandKind>(&self.name))
+            }
             _ => bring::<NodeKind>(kind),
         };
         taken.map_or(Ok(()), |taken| Err(Failure::Request(taken)))
