@@ -2,6 +2,7 @@
 
 mod folder;
 
+use athermal_core::watch::Watch;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
@@ -92,7 +93,7 @@ impl Demo {
     }
 }
 
-fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u64, Failure> {
+fn simulate(days: f64, seed: u64, path: &Path, host: &dyn Watch) -> Result<u64, Failure> {
     let known =
         find::<KnownMachine>(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
     let setup = Setup {
@@ -101,23 +102,23 @@ fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u6
         ..Setup::default()
     };
     let recording = Simulated::new(known.machine, setup);
-    write_recording(&recording, known.machine, false, path, terminal)
+    write_recording(&recording, known.machine, false, path, host)
 }
 
 fn fit_model(
     graph: &Path,
     train: &Path,
     output: &Path,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<Model, Failure> {
     let mut model = Model::load(graph)?;
     let data = Data::of(vec![train.to_owned()], Reading::default());
-    fit_on(&mut model, &data, &FitOptions::default(), terminal)?;
+    fit_on(&mut model, &data, &FitOptions::default(), host)?;
     write_aside(output, text_of(&model)?)?;
     Ok(model)
 }
 
-fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Failure> {
+fn evaluate(model: &Path, test: &Path, host: &dyn Watch) -> Result<Scores, Failure> {
     let wanted = Wanted {
         standard_errors: true,
         intervals: false,
@@ -128,7 +129,7 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
         abs_truth_below: LIMIT.parse().ok(),
         ..ScoreOptions::default()
     };
-    let mut progress = terminal.progress("evaluating");
+    let mut progress = host.progress("evaluating");
     let mut show = |ticks| progress.set(ticks);
     let scores = score(&model.plan, &model.fitted, &dataset, &options, &mut show)?;
     Ok(scores)

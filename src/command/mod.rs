@@ -1,6 +1,7 @@
 //! The commands, each in a file of its own.
 
 pub(crate) mod aside;
+pub(crate) mod asked;
 pub(crate) mod beyond;
 mod build;
 mod check;

@@ -28,7 +28,6 @@
 //! # assert!((kind.declare)().try_get_matches_from(["windows", "15"]).is_ok());
 //! ```
 
-pub mod collect;
 pub mod numbers;
 #[macro_use]
 pub mod output;

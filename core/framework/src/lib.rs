@@ -127,7 +127,7 @@ mod tests;
 // The vocabulary that a graph is written in; authors of nodes need one crate.
 pub use athermal_graph::{
     channel, diagnostic, document, event, events, failure, figures, lacks, message, quantity,
-    register_error, registry, time, unit,
+    register_error, registry, time, unit, watch,
 };
 
 /// What [`register!`], [`state!`] and [`predictor!`] need at their place of use.

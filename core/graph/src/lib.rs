@@ -7,7 +7,7 @@
 //! | [`diagnostic`] | how a mistake in a file is reported: code, place, reason, a way out |
 //! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
 //! | [`figures`], [`message`], [`event`] | numbers and tables for people; what is reported, and what can happen |
-//! | [`failure`] | why work that somebody asked for was not done |
+//! | [`failure`], [`watch`] | why work that somebody asked for was not done; what is remarked on the way, and how far it has come |
 //! | [`registry`] | what a name may mean: one table of all that linked crates bring |
 //! | [`document`] | a file, with what it extends, as a tree with places, expanded into declarations |
 //!
@@ -26,6 +26,7 @@ pub mod registry;
 mod schema;
 pub mod time;
 pub mod unit;
+pub mod watch;
 
 /// What macros of this crate make use of.
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! A log in any of the known forms, written at random from one truth, is read to the same instants and values, or refused with the
 //! cause. `ATHERMAL_LONG=1` writes a hundred thousand, `ATHERMAL_SEED=7` that one.
 
+use athermal::core::watch::Kept;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -187,7 +188,9 @@ fn a_log_in_any_form_is_read_to_what_was_written_or_refused() {
         let (text, form) = written(random, &truth);
         let log = scratch.file("log.csv", &text);
         let head: Vec<&str> = text.lines().take(6).collect();
-        let starter = match athermal::calls::init(&[log.display().to_string()]) {
+        let asked = serde_json::json!({ "data": log });
+        let asked = asked.as_object().cloned().unwrap_or_default();
+        let starter = match athermal::calls::init(&asked, &Kept::default()) {
             Ok(starter) => starter,
             Err(why) => {
                 let why = format!("{why:?}");
