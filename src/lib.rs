@@ -86,6 +86,26 @@ use athermal_simulation as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_systemd as _;
 
+// What features bring, where they were left out.
+#[cfg(not(feature = "mqtt"))]
+mod without_mqtt {
+    use athermal_serve::connector::{SinkKind, SourceKind};
+
+    athermal_core::lacks!(SourceKind, "mqtt", "mqtt");
+    athermal_core::lacks!(SinkKind, "mqtt", "mqtt");
+    #[cfg(feature = "cli")]
+    athermal_core::lacks!(athermal_command::CommandKind, "mqtt", "browse");
+}
+#[cfg(not(feature = "parquet"))]
+athermal_core::lacks!(athermal_serve::connector::SinkKind, "parquet", "parquet");
+#[cfg(not(all(unix, feature = "cli")))]
+athermal_core::lacks!(
+    athermal_core::document::Section,
+    "cli",
+    "control",
+    "retrain"
+);
+
 /// The pages of the guide, so that their code is compiled and run as tests.
 #[cfg(doctest)]
 mod guide {

@@ -5,8 +5,10 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use athermal_command::CommandKind;
+use athermal_core::registry::{Why, find};
 use clap::builder::{PathBufValueParser, StyledStr, TypedValueParser};
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::program::whole;
 
@@ -182,7 +184,15 @@ fn meant(words: &[OsString]) -> Option<String> {
 
 /// Ends the program with an error of the command line, with the call that was meant where there is one.
 pub fn exit(mut error: clap::Error, words: &[OsString]) -> ! {
-    if error.use_stderr()
+    let given = words.get(1).and_then(|word| word.to_str());
+    let unknown = given.and_then(|name| find::<CommandKind>(name).err());
+    if error.kind() == ErrorKind::InvalidSubcommand
+        && let Some(unknown) = unknown.filter(|of| matches!(of.why, Why::Feature(_)))
+    {
+        error.remove(ContextKind::SuggestedSubcommand);
+        let tip = vec![StyledStr::from(unknown.help())];
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tip));
+    } else if error.use_stderr()
         && let Some(call) = meant(words)
     {
         // `train` is not `retrain`.

@@ -2,14 +2,17 @@
 
 use std::env::consts::{ARCH, OS};
 use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use athermal::core::diagnostic::{panic_message, panic_text};
-use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
+use athermal::core::registry::{Registered, all, find};
+use athermal_analysis::figures::paragraph;
+use athermal_command::{CommandKind, Group};
+use clap::{ArgMatches, Args, FromArgMatches};
 
-use crate::command::Command;
 use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 use crate::{invocation, meant};
 
@@ -75,22 +78,24 @@ pub fn command_line_of(words: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Does what the command says that stands first: one of the program, or one that a crate brings.
+/// Does what the command says that stands first.
 fn run(arguments: &ArgMatches, terminal: &mut Terminal) -> Result<Answer, Failure> {
-    let is_for_programs = terminal.format == Format::Json;
-    if let Some((name, inside)) = arguments.subcommand()
-        && let Some(kind) = athermal_command::kind(name)
-    {
-        terminal.events = is_for_programs && kind.writes_events;
-        return (kind.run)(inside, terminal);
-    }
-    let command = Command::from_arg_matches(arguments);
-    let command = command.unwrap_or_else(|error| error.exit());
-    terminal.events = is_for_programs && command.writes_events();
-    command.run(terminal)
+    let (name, inside) = arguments.subcommand().unwrap_or(("", arguments));
+    let kind = find::<CommandKind>(name).map_err(|why| Failure::Request(why.to_string()))?;
+    terminal.events = terminal.format == Format::Json && kind.writes_events;
+    (kind.run)(inside, terminal)
 }
 
-/// The command line, as a shell completes it: the commands of the program, behind them those that crates bring.
+/// The commands that stand in a group, by name.
+pub fn commands(of: Group) -> Vec<&'static Registered<CommandKind>> {
+    let mut commands: Vec<_> = all::<CommandKind>()
+        .filter(|kind| kind.group == of)
+        .collect();
+    commands.dedup_by_key(|kind| kind.name);
+    commands
+}
+
+/// The command line, as a shell completes it.
 #[must_use]
 pub fn whole() -> clap::Command {
     let whole = clap::Command::new("athermal")
@@ -100,10 +105,30 @@ pub fn whole() -> clap::Command {
         .arg_required_else_help(true)
         .max_term_width(80)
         .after_help(EXAMPLES);
-    let whole = Command::augment_subcommands(Options::augment_args(whole))
+    let head = *whole.get_styles().get_header();
+    let literal = *whole.get_styles().get_literal();
+    let mut whole = Options::augment_args(whole)
         .about("Predicts and corrects the thermal drift of precision machines");
-    let brought = athermal_command::kinds().values();
-    brought.fold(whole, |whole, kind| whole.subcommand((kind.declare)()))
+    let mut listed = String::new();
+    for group in Group::ALL {
+        let commands = commands(group);
+        if !commands.is_empty() {
+            let _ = writeln!(listed, "\n{head}{}:{head:#}", group.title());
+        }
+        for kind in commands {
+            let command = (kind.declare)();
+            let about = command
+                .get_about()
+                .map_or_else(String::new, ToString::to_string);
+            let name = format!("  {:<11}", kind.name);
+            let line = paragraph(&format!("{name}  "), 15, &about);
+            listed += &line.replacen(&name, &format!("{literal}{name}{literal:#}"), 1);
+            whole = whole.subcommand(command);
+        }
+    }
+    whole.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n{listed}\n{head}Options:{head:#}\n{{options}}{{after-help}}"
+    ))
 }
 
 /// What a command answers, or that code of the program or of a plugin panicked in it.
@@ -140,6 +165,8 @@ fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
 mod tests {
     use clap::{Args, Command, FromArgMatches};
 
+    use athermal_command::Group;
+
     use super::{run, whole};
     use crate::terminal::{Answer, Failure, Format, Options, Terminal};
 
@@ -151,6 +178,8 @@ mod tests {
     }
 
     impl athermal_command::Command for Say {
+        const GROUP: Group = Group::Look;
+
         fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
             assert_eq!((self.number, terminal.format), (7, Format::Json));
             Ok(Answer::No)
@@ -160,14 +189,27 @@ mod tests {
     athermal_command::register_command!(Say, "say-for-a-test");
 
     #[test]
-    fn a_command_that_a_crate_brings_stands_behind_those_of_the_program() {
+    fn a_command_that_a_crate_brings_stands_in_the_group_that_it_says() {
         let help = whole().render_help().to_string();
-        let (ours, brought) = (help.find("  build "), help.find("  say-for-a-test "));
+        let lines: Vec<&str> = help.lines().collect();
         assert!(
             help.starts_with("Predicts and corrects the thermal drift"),
             "{help}"
         );
-        assert!(ours.is_some() && ours < brought, "{help}");
+        let at = |line: &str| lines.iter().position(|of| of.starts_with(line));
+        assert!(at("Look:") < at("  say-for-a-test"), "{help}");
+        assert!(at("  say-for-a-test") < at("Run:"), "{help}");
+        assert!(
+            lines.iter().all(|line| line.chars().count() <= 80),
+            "{help}"
+        );
+        for group in Group::ALL {
+            assert_eq!(
+                help.matches(&format!("\n{}:\n", group.title())).count(),
+                1,
+                "{help}"
+            );
+        }
         let words = ["athermal", "say-for-a-test", "7", "--format", "json"];
         let arguments = whole().get_matches_from(words);
         let options = Options::from_arg_matches(&arguments).expect("they were checked");

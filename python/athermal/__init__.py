@@ -147,7 +147,7 @@ def _renamed(time: str | None, columns: list[str]) -> dict[str, str] | None:
 def _call(
     graph: _athermal.Graph, data: Any, time: str | None, progress: Progress, options: Mapping[str, Any]
 ) -> _frames.Call:
-    call = _frames.Call(_frames.words(options), progress)
+    call = _frames.Call(options, progress)
     _frames.add_data(call, data, columns=graph.columns, renamed=_renamed(time, graph.time_columns))
     return call
 
@@ -420,8 +420,8 @@ def compare(
     if not isinstance(graphs, Mapping):
         graphs = {f"graph {nth}": of for nth, of in enumerate(graphs, 1)}
     columns = {column for of in graphs.values() for column in of.columns}
-    call = _frames.Call(_frames.words(options), progress)
-    _frames.add_data(call, on, name="on", option="--on", columns=columns)
+    call = _frames.Call(options, progress)
+    _frames.add_data(call, on, name="on", option="on", columns=columns)
     _frames.add_data(call, data, columns=columns)
     return Comparison(*_athermal.compare([(name, of._graph) for name, of in graphs.items()], call))
 
@@ -439,8 +439,8 @@ class Starter(Graph):
 
 def init(data: Any, **options: Any) -> Starter:
     """A starter graph for data, as `athermal init` writes one; its options are `time`, `time_format` and `drifts`."""
-    call = _frames.Call(_frames.words(options))
-    _frames.add_data(call, data, option=None)
+    call = _frames.Call(options)
+    _frames.add_data(call, data)
     return Starter(*_athermal.init(call))
 
 
@@ -450,8 +450,8 @@ def simulate(machine: str, days: float = 7.0, seed: int = 1, *, progress: Progre
     Its options are `truth`, `faults` (a list), `disturb` (a list) and `schedule`. The same arguments give the same numbers everywhere.
     """
     faults = options.pop("faults", None)
-    words = [machine, *_frames.words({"days": days, "seed": seed, "fault": faults, **options})]
-    return Frame(_athermal.simulate(_frames.Call(words, progress)))
+    asked = {"machine": machine, "days": days, "seed": seed, "fault": faults, **options}
+    return Frame(_athermal.simulate(_frames.Call(asked, progress)))
 
 
 def __getattr__(name: str) -> Any:

@@ -19,7 +19,8 @@ __all__ = [
 __version__: str
 
 class _Call(Protocol):
-    arguments: list[str]
+    @property
+    def options(self) -> str: ...
     tables: list[tuple[str, Table]]
     progress: Callable[[str, int, int | None], Any] | None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,12 +18,21 @@ _EPOCH = datetime(1970, 1, 1)
 
 
 class Call:
-    """What a function of the library is asked for: arguments of the command line, and the tables that names among them stand for."""
+    """What a function of the library is asked for: options, and the tables that names of data among them stand for."""
 
-    def __init__(self, arguments: list[str], progress: Progress = None) -> None:
-        self.arguments = arguments
+    def __init__(self, options: Mapping[str, Any], progress: Progress = None) -> None:
+        self._options = {name.rstrip("_"): of for name, of in options.items() if of is not None}
         self.tables: list[tuple[str, Table]] = []
         self.progress = listener(progress)
+
+    @property
+    def options(self) -> str:
+        """The options as JSON; what has a form of its own goes by its text."""
+        return json.dumps(self._options, default=str)
+
+    def set(self, name: str, value: Any) -> None:
+        """Gives an option a value."""
+        self._options[name] = value
 
 
 def module_of(of: object) -> str:
@@ -34,7 +44,7 @@ def add_data(
     given: Any,
     *,
     name: str = "frame",
-    option: str | None = "--data",
+    option: str = "data",
     columns: Iterable[str] | None = None,
     renamed: Mapping[str, str] | None = None,
 ) -> None:
@@ -66,8 +76,9 @@ def add_data(
         if names:
             its_table = its_table.renamed(names)
         call.tables.append((its_name, its_table))
-    segments = ["--segments"] if several and len(given) > 1 and "--segments" not in call.arguments else []
-    call.arguments = [*([option] if option else []), *names_of_data, *segments, *call.arguments]
+    call.set(option, names_of_data)
+    if several and len(given) > 1:
+        call.set("segments", True)
 
 
 def table(frame: Any, wanted: Iterable[str] | None = None) -> Table:
@@ -253,20 +264,3 @@ def to_polars(made: Table) -> Any:
     import polars
 
     return polars.DataFrame(made)
-
-
-def words(options: Mapping[str, Any]) -> list[str]:
-    """Named arguments as options of the command line."""
-    said: list[str] = []
-    for name, value in options.items():
-        option = "--" + name.rstrip("_").replace("_", "-")
-        if value is None or value is False:
-            continue
-        if value is True:
-            said.append(option)
-        elif isinstance(value, (list, tuple)):
-            for one in value:
-                said += [f"{option}={one}"]
-        else:
-            said += [f"{option}={value}"]
-    return said

@@ -116,9 +116,11 @@ impl Graph {
         calls::picture(&self.inner.plan)
     }
 
-    /// Fits it, with the arguments of `athermal fit`. Gives the model, and how the fit went in words.
+    /// Fits it, with the options of `athermal fit`. Gives the model, and how the fit went in words.
     fn fit(&self, py: Python<'_>, call: Call) -> PyResult<(Model, String)> {
-        let fitted = work(py, &call, |arguments| calls::fit(&self.inner, arguments))?;
+        let fitted = work(py, &call, |asked, host| {
+            calls::fit(&self.inner, asked, host)
+        })?;
         match fitted.model {
             Some(inner) => Ok((Model { inner }, fitted.text)),
             None => Err(unfitted(py, &fitted.failed)),
@@ -141,9 +143,9 @@ impl Graph {
     }
 }
 
-/// A starter graph, with the arguments of `athermal init`: its text, and what was found and guessed.
+/// A starter graph, with the options of `athermal init`: its text, and what was found and guessed.
 #[pyfunction]
 pub fn init(py: Python<'_>, call: Call) -> PyResult<(String, Vec<String>)> {
-    let starter = work(py, &call, calls::init)?;
+    let starter = work(py, &call, |asked, host| calls::init(asked, host))?;
     Ok((starter.text, starter.remarks))
 }

@@ -103,43 +103,49 @@ impl Model {
             .map_err(|error| of_model(py, error))
     }
 
-    /// What it puts out, with the arguments of `athermal run`. `time` is the name of the column of the time.
+    /// What it puts out, with the options of `athermal run`. `time` is the name of the column of the time.
     fn predict(&self, py: Python<'_>, call: Call, time: String) -> PyResult<Table> {
         let outputs = self.inner.plan.outputs.iter();
         let outputs = outputs.map(|of| of.name.clone()).collect();
         let like = self.time_type(&call);
         let mut sink = Predictions::new(time, like.as_ref(), outputs);
-        let sink = work(py, &call, move |arguments| {
-            calls::predict(&self.inner, arguments, &mut sink)?;
+        let sink = work(py, &call, move |asked, host| {
+            calls::predict(&self.inner, asked, &mut sink, host)?;
             Ok(sink)
         })?;
         sink.table()
             .map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Scores, with the arguments of `athermal evaluate`.
+    /// Scores, with the options of `athermal evaluate`.
     fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         found(
             py,
-            &work(py, &call, |words| calls::evaluate(&self.inner, words))?,
+            &work(py, &call, |asked, host| {
+                calls::evaluate(&self.inner, asked, host)
+            })?,
         )
     }
 
-    /// A diagnosis, with the arguments of `athermal diagnose`.
+    /// A diagnosis, with the options of `athermal diagnose`.
     fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         found(
             py,
-            &work(py, &call, |words| calls::diagnose(&self.inner, words))?,
+            &work(py, &call, |asked, host| {
+                calls::diagnose(&self.inner, asked, host)
+            })?,
         )
     }
 
-    /// A report, with the arguments of `athermal report`; the last part is the page.
+    /// A report, with the options of `athermal report`; the last part is the page.
     fn report<'py>(
         &self,
         py: Python<'py>,
         call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
-        let (of, page) = work(py, &call, |words| calls::report(&self.inner, words))?;
+        let (of, page) = work(py, &call, |asked, host| {
+            calls::report(&self.inner, asked, host)
+        })?;
         let (text, facts) = found(py, &of)?;
         Ok((text, facts, page))
     }
@@ -156,7 +162,7 @@ impl Model {
     }
 }
 
-/// Graphs fitted on the same data and scored on others, with the arguments of `athermal compare`.
+/// Graphs fitted on the same data and scored on others, with the options of `athermal compare`.
 #[pyfunction]
 pub fn compare<'py>(
     py: Python<'py>,
@@ -168,6 +174,8 @@ pub fn compare<'py>(
     let graphs: Vec<_> = graphs.collect();
     found(
         py,
-        &work(py, &call, move |words| calls::compare(graphs, words))?,
+        &work(py, &call, move |asked, host| {
+            calls::compare(graphs, asked, host)
+        })?,
     )
 }

@@ -10,12 +10,12 @@ use pyo3::prelude::*;
 use crate::table::Table;
 use crate::work::{Call, work};
 
-/// Simulates a machine, with the arguments of `athermal simulate`.
+/// Simulates a machine, with the options of `athermal simulate`.
 #[pyfunction]
 pub fn simulate(py: Python<'_>, call: Call) -> PyResult<Table> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    let (names, columns) = work(py, &call, move |arguments| {
-        let names = calls::simulate(arguments, &mut |time_ns, values| {
+    let (names, columns) = work(py, &call, move |asked, host| {
+        let mut put = |time_ns: i64, values: &[f64]| {
             columns.resize(values.len() + 1, Vec::new());
             for (column, value) in columns
                 .iter_mut()
@@ -23,7 +23,8 @@ pub fn simulate(py: Python<'_>, call: Call) -> PyResult<Table> {
             {
                 column.push(value);
             }
-        })?;
+        };
+        let names = calls::simulate(asked, &mut put, host)?;
         Ok((names, columns))
     })?;
     let names = std::iter::once("time_s".to_owned()).chain(names);

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use athermal::calls::WITHOUT_ZONE;
+use athermal::calls::{Asked, WITHOUT_ZONE};
+use athermal::core::watch::{Kept, ProgressListener, Remark, Watch};
 use athermal::files::{OpenTable, with_tables};
 use athermal_command::Failure;
-use athermal_command::collect::{Collected, ProgressListener, collected};
 use pyo3::prelude::*;
 
-use crate::failure::{guarded, of_failure};
+use crate::failure::{guarded, of_failure, request};
 use crate::table::Table;
 
 /// So often Python is asked whether it was interrupted.
@@ -22,8 +22,8 @@ const USER: i32 = 3;
 /// What Python asks for, beside the function.
 #[derive(FromPyObject)]
 pub struct Call {
-    /// The arguments of the command line, those that name data included.
-    pub arguments: Vec<String>,
+    /// The options, those that name data included, as JSON.
+    options: String,
     /// The tables in memory that names among them stand for.
     pub tables: Vec<(PathBuf, Py<Table>)>,
     /// What takes progress.
@@ -85,11 +85,11 @@ impl Stop {
     }
 }
 
-/// Does some work with the arguments of a call. Its warnings are raised as Python's.
+/// Does some work with the options of a call. Its warnings are raised as Python's.
 pub fn work<R: Send>(
     py: Python<'_>,
     call: &Call,
-    work: impl FnOnce(&[String]) -> Result<R, Failure> + Send,
+    work: impl FnOnce(&Asked, &dyn Watch) -> Result<R, Failure> + Send,
 ) -> PyResult<R> {
     let stop = Stop::default();
     let go_on = stop.clone().check();
@@ -102,21 +102,23 @@ pub fn work<R: Send>(
     let tables = call.tables.iter().map(open).collect();
     let progress = call.progress.as_ref().map(|of| of.clone_ref(py));
     let progress = progress.map(|listener| stop.clone().progress(listener));
-    let arguments = &call.arguments;
+    let asked: Asked =
+        serde_json::from_str(&call.options).map_err(|error| request(py, &error.to_string()))?;
+    let host = Kept::with(progress);
     let done = guarded(py, || {
-        py.detach(|| collected(progress, || with_tables(tables, || work(arguments))))
+        py.detach(|| with_tables(tables, || work(&asked, &host)))
     });
     if let Some(error) = stop.take() {
         return Err(error);
     }
-    let (result, reports) = done?;
-    warn(py, &reports)?;
+    let result = done?;
+    warn(py, &host.remarks())?;
     result.map_err(|failure| of_failure(py, &failure))
 }
 
 /// Raises warnings, and the note that times have no zone.
-fn warn(py: Python<'_>, reports: &[Collected]) -> PyResult<()> {
-    let texts = reports.iter().filter_map(|report| {
+fn warn(py: Python<'_>, remarks: &[Remark]) -> PyResult<()> {
+    let texts = remarks.iter().filter_map(|report| {
         let text = report.message.to_string();
         let is_warning = report.level == "warning" || text.contains(WITHOUT_ZONE);
         is_warning.then_some(text)

@@ -2,11 +2,11 @@
 
 use athermal::core::engine::SampleRange;
 use athermal::run::live::monitor::usual;
+use athermal_core::watch::Watch;
 use serde::Serialize;
 use serde_json::json;
 
 use crate::message::Message;
-use crate::terminal::Terminal;
 use athermal_analysis::figures::apart;
 use athermal_command::findings::{OUTSIDE_FIT, doubt};
 
@@ -39,7 +39,7 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 }
 
 /// Warns of them.
-pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
+pub fn warn(host: &dyn Watch, all: &[Beyond<'_>]) {
     for of in all {
         let all = [of.lowest, of.highest, of.lowest_in_fit, of.highest_in_fit];
         let [lowest, highest, lowest_in_fit, highest_in_fit] = apart(all);
@@ -47,6 +47,6 @@ pub fn warn(terminal: &Terminal, all: &[Beyond<'_>]) {
             "{} is between {lowest} and {highest}, and was between {lowest_in_fit} and {highest_in_fit} in the data of the fit: {}",
             of.channel, of.doubt
         );
-        terminal.warning(Message::new(OUTSIDE_FIT, json!(of), words));
+        host.warning(Message::new(OUTSIDE_FIT, json!(of), words));
     }
 }

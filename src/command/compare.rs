@@ -2,6 +2,9 @@
 
 mod table;
 
+use athermal_core::watch::Watch;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -44,7 +47,7 @@ use athermal_analysis::figures::{count, number, seconds};
 /// of time, into ten blocks of equal size; the spread of the differences over the blocks gives it (batch means; Law and
 /// Kelton). A difference of less than two standard errors, marked ~, may be chance: of two such graphs choose the simpler
 /// one, or score them on more days.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv \\
       --on days.csv
@@ -55,13 +58,16 @@ use athermal_analysis::figures::{count, number, seconds};
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
     #[arg(required = true, value_name = "GRAPH", value_parser = crate::meant::graph_or_model())]
+    #[serde(skip)]
     graphs: Vec<PathBuf>,
     #[command(flatten)]
+    #[serde(flatten)]
     data: Data,
     /// The recording to score on; several files are joined as with --data
     #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = crate::meant::recording())]
     on: Vec<PathBuf>,
     #[command(flatten)]
+    #[serde(flatten)]
     scored: Scored,
 }
 
@@ -80,7 +86,7 @@ struct Fitted {
 
 /// The warnings that were shown already: graphs that read the same data have the same ones.
 struct Once<'a> {
-    terminal: &'a Terminal,
+    host: &'a dyn Watch,
     shown: BTreeSet<String>,
     /// Where samples lay in the fits so far.
     in_fits: Vec<SampleRange>,
@@ -90,21 +96,21 @@ impl Once<'_> {
     fn warn(&mut self, all: impl IntoIterator<Item = Message>) {
         for message in all {
             if self.shown.insert(message.to_string()) {
-                self.terminal.warning(message);
+                self.host.warning(message);
             }
         }
     }
 
     fn note(&mut self, words: Option<String>) {
         if let Some(words) = words.filter(|words| self.shown.insert(words.clone())) {
-            self.terminal.note(words);
+            self.host.note(words);
         }
     }
 
     fn warn_beyond(&mut self, report: &FitReport, trace: &Trace) {
         let new = |range: &&SampleRange| usual(&self.in_fits, &range.channel).is_none();
         let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
-        beyond::warn(self.terminal, &beyond::beyond(&new, &trace.ranges));
+        beyond::warn(self.host, &beyond::beyond(&new, &trace.ranges));
         self.in_fits.extend(new);
     }
 }
@@ -116,12 +122,7 @@ impl Compare {
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let models = self.models(terminal)?;
-        let mut failed = false;
-        found::show(terminal, || {
-            let (found, some_failed) = self.find(models, terminal)?;
-            failed = some_failed;
-            Ok(found)
-        })?;
+        let (_, failed) = found::show(terminal, |host| self.find(models, host))?;
         Ok(if failed { Answer::No } else { Answer::Fine })
     }
 
@@ -132,10 +133,10 @@ impl Compare {
     pub fn find(
         &self,
         models: Vec<(String, Model)>,
-        terminal: &Terminal,
+        host: &dyn Watch,
     ) -> Result<(Found, bool), Failure> {
         let options = self.scored.options()?;
-        let (contenders, fits) = self.fit_and_run(models, &options, terminal)?;
+        let (contenders, fits) = self.fit_and_run(models, &options, host)?;
         let comparisons = compare(&contenders, options.abs_truth_below.as_ref());
         let mut text = String::new();
         let asked = self.scored.in_words();
@@ -155,15 +156,15 @@ impl Compare {
             let _ = writeln!(text, "{} was fitted in {seconds} s", fit.graph);
         }
         let facts = self.facts(&comparisons, &fits);
-        warn(terminal, &comparisons, &fits);
-        let failed = failed(terminal, &fits);
+        warn(host, &comparisons, &fits);
+        let failed = failed(host, &fits);
         Ok((Found { text, facts }, failed))
     }
 
     /// The graphs, each with the name of its file.
-    fn models(&self, terminal: &Terminal) -> Result<Vec<(String, Model)>, Failure> {
+    fn models(&self, host: &dyn Watch) -> Result<Vec<(String, Model)>, Failure> {
         let load = |path: &PathBuf| {
-            let model = model::load_to_fit(path, &mut Sources::new(), terminal)?;
+            let model = model::load_to_fit(path, &mut Sources::new(), host)?;
             Ok((path.display().to_string(), model))
         };
         self.graphs.iter().map(load).collect()
@@ -183,7 +184,7 @@ impl Compare {
         &self,
         models: Vec<(String, Model)>,
         scored: &ScoreOptions,
-        terminal: &Terminal,
+        host: &dyn Watch,
     ) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
         self.data.check_offsets(&self.on)?;
         let on = self.data.others(self.on.clone());
@@ -193,7 +194,7 @@ impl Compare {
         }
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         let mut once = Once {
-            terminal,
+            host,
             shown: BTreeSet::new(),
             in_fits: Vec::new(),
         };
@@ -203,14 +204,14 @@ impl Compare {
             self.scored.check(&model)?;
             let began = Instant::now();
             let options = FitOptions::default();
-            let fit = fit_without_card(&mut model, &self.data, &options, terminal)
+            let fit = fit_without_card(&mut model, &self.data, &options, host)
                 .map_err(|failure| self.of_graph(&path, failure))?;
             let seconds = began.elapsed().as_secs_f64();
             once.warn(fit.doubts);
             once.note(data::without_zone(&fit.dataset.reports()));
             let report = fit.report;
             let dataset = on.dataset();
-            let mut progress = terminal.progress("scoring");
+            let mut progress = host.progress("scoring");
             let mut ticks = 0;
             let watch = FaultWatch::new(&dataset, Purpose::Scores);
             let mut look = |_: &Engine, _: Event| {
@@ -232,7 +233,7 @@ impl Compare {
             once.note(data::without_zone(&reports));
             once.warn_beyond(&report, &trace);
             if fits.is_empty() && !report.estimators.is_empty() {
-                self.warn_fitted_on(terminal, &report, &trace);
+                self.warn_fitted_on(host, &report, &trace);
             }
             let faults = watch.found();
             once.warn(faults::messages(&fit.faults));
@@ -283,14 +284,14 @@ impl Compare {
     }
 
     /// Warns where graphs are scored on the data of their fit.
-    fn warn_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
+    fn warn_fitted_on(&self, host: &dyn Watch, report: &FitReport, trace: &Trace) {
         let same = |on: &&PathBuf| {
             self.data
                 .paths()
                 .any(|data| data::is_same_content(data, on))
         };
         if let Some(path) = self.on.iter().find(same) {
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "{}: the graphs are fitted on this file and scored on it, so {FITS}",
                 path.display()
             ));
@@ -302,7 +303,7 @@ impl Compare {
         let scored = times().min().zip(times().max());
         if let Some(((from, to), (first, last))) = report.period.zip(scored) {
             let fit = (seconds(from), seconds(to));
-            warn_overlap(terminal, fit, (seconds(first), seconds(last)), false);
+            warn_overlap(host, fit, (seconds(first), seconds(last)), false);
         }
     }
 }
@@ -323,16 +324,16 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
 }
 
 /// Warns of what makes scores say less than they seem to.
-fn warn(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
+fn warn(host: &dyn Watch, comparisons: &[Comparison], fits: &[Fitted]) {
     if comparisons.is_empty() {
-        terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
+        host.warning("no graph predicts a measured truth, so there is nothing to compare");
     }
     for comparison in comparisons {
-        warn_left_out(terminal, comparison);
+        warn_left_out(host, comparison);
     }
     for column in comparisons.iter().flat_map(|of| &of.truths) {
         if !column.otherwise.is_empty() {
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "`{}` of {} has other values than that of {}, on which all are scored: name truths that are not the same differently",
                 column.truth,
                 column.otherwise.join(", "),
@@ -342,17 +343,17 @@ fn warn(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
     }
     for fit in fits {
         for message in Lack::warnings(&fit.lacks) {
-            terminal.warning(format_args!("{}: {message}", fit.graph));
+            host.warning(format_args!("{}: {message}", fit.graph));
         }
     }
 }
 
 /// Warns where the scores hide what happens while a prediction has no value.
-fn warn_left_out(terminal: &Terminal, comparison: &Comparison) {
+fn warn_left_out(host: &dyn Watch, comparison: &Comparison) {
     for column in &comparison.truths {
         if let Some((left_out, row)) = column.left_out {
             let Row { graph, node, .. } = &comparison.rows[row];
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "{}: {} instants are left out at which others predict and {node} of {graph} does not; what each does there is not shown: \
                  score it alone by `athermal evaluate --each-on-its-own`",
                 column.truth,
@@ -363,13 +364,13 @@ fn warn_left_out(terminal: &Terminal, comparison: &Comparison) {
 }
 
 /// Warns of nodes that could not be fitted; whether there is one.
-fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
+fn failed(host: &dyn Watch, fits: &[Fitted]) -> bool {
     let mut failed = false;
     for fit in fits {
         for estimator in &fit.report.estimators {
             if let Outcome::Failed(error) = &estimator.outcome {
                 failed = true;
-                terminal.warning(format_args!(
+                host.warning(format_args!(
                     "{}: {} could not be fitted: {error}; it gave no prediction",
                     fit.graph, estimator.node
                 ));

@@ -2,6 +2,10 @@
 
 mod cards;
 
+use athermal_core::watch::Watch;
+use schemars::JsonSchema;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -24,31 +28,38 @@ use crate::invocation::{program, quoted};
 use crate::meant::recording;
 use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
-use crate::terminal::{Failure, Terminal, outside};
+use crate::terminal::{Failure, outside};
 use athermal_analysis::figures::{DATES_S, count, counted, instant};
 use athermal_command::findings;
 use athermal_fleet::RowsId;
 use athermal_fleet::job::Times;
 
 /// Recorded data.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 pub struct Data {
     /// CSV or JSON lines, or a folder of them; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
     #[arg(long = "data", short = 'd', required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
+    #[serde(rename = "data")]
+    #[schemars(with = "Vec<String>")]
     given: Vec<Given>,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
+    #[serde(default)]
     lenient: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     reading: Reading,
     #[command(flatten)]
+    #[serde(flatten)]
     times: Times,
     #[arg(skip)]
+    #[serde(skip)]
     thinned: OnceLock<Vec<ThinnedChannels>>,
 }
 
 /// A file, or the files of a folder, by the name that was given.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize)]
+#[serde(from = "PathBuf")]
 struct Given {
     name: PathBuf,
     files: Vec<PathBuf>,
@@ -68,16 +79,20 @@ impl From<PathBuf> for Given {
 }
 
 /// How several files are read as one recording.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Default, Args, Deserialize, JsonSchema)]
 pub struct Reading {
     /// Take each file as a segment of its own, also where its times go on: windows, lags and filters start afresh with it
     #[arg(long)]
+    #[serde(default)]
     segments: bool,
     /// Merge files of different columns by time although their times are no dates: all of them count from one instant
     #[arg(long, conflicts_with = "segments")]
+    #[serde(default)]
     merge: bool,
     /// Add this to the times of a file, whose clock is behind by it (negative: ahead): `positions.csv=1.5s`. `diagnose` estimates it
     #[arg(long = "offset", value_name = "FILE=TIME", value_parser = offset)]
+    #[serde(default, rename = "offset", deserialize_with = "offsets")]
+    #[schemars(with = "Vec<String>")]
     offsets: Vec<(PathBuf, Duration)>,
 }
 
@@ -92,6 +107,14 @@ fn offset(text: &str) -> Result<(PathBuf, Duration), String> {
     };
     let length: Duration = length.parse().map_err(|error| format!("{error}"))?;
     Ok((file.into(), Duration::from_ns(sign * length.as_ns())))
+}
+
+/// The same of several.
+fn offsets<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(PathBuf, Duration)>, D::Error> {
+    let texts = Vec::<String>::deserialize(from)?.into_iter();
+    texts
+        .map(|text| offset(&text).map_err(D::Error::custom))
+        .collect()
 }
 
 /// The state folder of a service whose journal `journal:FOLDER` names.
@@ -130,11 +153,15 @@ impl Data {
         self.paths().filter(is_it)
     }
 
-    /// Refuses an offset of a file that is neither among these nor among others.
+    /// Refuses an offset of a file that is neither among these nor among others, and ways of reading that exclude each other.
     ///
     /// # Errors
     /// When there is one.
     pub fn check_offsets(&self, others: &[PathBuf]) -> Result<(), Failure> {
+        if self.reading.merge && self.reading.segments {
+            let words = "--merge and --segments exclude each other";
+            return Err(Failure::Request(words.to_owned()));
+        }
         let others = self.others(others.to_vec());
         let unknown = |(file, _): &&(PathBuf, Duration)| {
             self.named(file).chain(others.named(file)).next().is_none()
@@ -165,6 +192,11 @@ impl Data {
             ))),
             None => Ok(()),
         }
+    }
+
+    /// Whether only rows of some time are read.
+    pub fn is_a_stretch(&self) -> bool {
+        self.times != Times::default()
     }
 
     /// The names of the files, as they were given.
@@ -280,13 +312,13 @@ impl Data {
 
     /// Warns of files on which the model was fitted, and of data from the time of its fit: scores on them say little. `period` is that
     /// of the data, in s.
-    pub fn warn_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
+    pub fn warn_fitted_on(&self, host: &dyn Watch, model: &Model, period: Option<(f64, f64)>) {
         let cards = model.card.iter().flat_map(|card| &card.data);
         let seen = |path: &&Path| cards.clone().any(|card| card.is_of(path));
         let mut again = false;
         for path in self.paths().filter(seen) {
             again = true;
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "{}: the model was fitted on this file, so {FITS}",
                 path.display()
             ));
@@ -294,7 +326,7 @@ impl Data {
         let of_fit = model.card.as_ref().and_then(|card| card.period);
         if !again && let Some((fit, data)) = of_fit.zip(period) {
             let is_one_clock = cards.clone().any(|card| self.has_rest_of(card));
-            warn_overlap(terminal, (fit.from_s, fit.to_s), data, is_one_clock);
+            warn_overlap(host, (fit.from_s, fit.to_s), data, is_one_clock);
         }
     }
 
@@ -303,7 +335,7 @@ impl Data {
     /// # Errors
     /// When a file cannot be read.
     pub fn cards(&self, plan: &Plan, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
-        if self.times != Times::default() {
+        if self.is_a_stretch() {
             return self.cards_of_rows(plan, dataset);
         }
         let reports = dataset.reports();
@@ -340,13 +372,13 @@ impl Data {
 pub const FITS: &str = "the scores show how well it fits, not how well it predicts";
 
 /// Warns of data from the time of a fit, both in s, where they are dated or known to count from one instant.
-pub fn warn_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64), is_one_clock: bool) {
+pub fn warn_overlap(host: &dyn Watch, fit: (f64, f64), data: (f64, f64), is_one_clock: bool) {
     let shared = (fit.0.max(data.0), fit.1.min(data.1));
     let length = |(from, to): (f64, f64)| to - from;
     // Other times begin anew with each recording.
     let dated = shared.0 >= DATES_S;
     if (dated || is_one_clock) && length(shared) > 0.01 * length(data) {
-        terminal.warning(format_args!(
+        host.warning(format_args!(
             "the data of the fit are of the time from {} to {} too: there {FITS}",
             instant(shared.0),
             instant(shared.1)
@@ -412,22 +444,22 @@ pub fn without_zone(reports: &[(String, Report)]) -> Option<String> {
 /// Warns of rows and cells that were not taken, of rejected samples, of units that differ from those of the graph, of files that
 /// count more than once, and of dates without a zone.
 pub fn warn(
-    terminal: &Terminal,
+    host: &dyn Watch,
     plan: &Plan,
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    warn_of(terminal, doubts(plan, reports, refused, rejected), reports);
+    warn_of(host, doubts(plan, reports, refused, rejected), reports);
 }
 
 /// The same with doubts that are known already.
-pub fn warn_of(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
+pub fn warn_of(host: &dyn Watch, doubts: Vec<Message>, reports: &[(String, Report)]) {
     for message in doubts {
-        terminal.warning(message);
+        host.warning(message);
     }
     if let Some(note) = without_zone(reports) {
-        terminal.note(note);
+        host.note(note);
     }
 }
 

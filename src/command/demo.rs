@@ -2,13 +2,15 @@
 
 mod folder;
 
+use athermal_core::watch::Watch;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
+use athermal::core::registry::find;
 use athermal::run::fit::FitOptions;
 use athermal::run::score::{Score, ScoreOptions, Scores, score};
-use athermal::trial::machine::{Setup, Simulated, machine};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 use clap::Args;
 use serde_json::json;
 
@@ -91,31 +93,32 @@ impl Demo {
     }
 }
 
-fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u64, Failure> {
-    let known = machine(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
+fn simulate(days: f64, seed: u64, path: &Path, host: &dyn Watch) -> Result<u64, Failure> {
+    let known =
+        find::<KnownMachine>(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
     let setup = Setup {
         days,
         seed,
         ..Setup::default()
     };
     let recording = Simulated::new(known.machine, setup);
-    write_recording(&recording, known.machine, false, path, terminal)
+    write_recording(&recording, known.machine, false, path, host)
 }
 
 fn fit_model(
     graph: &Path,
     train: &Path,
     output: &Path,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<Model, Failure> {
     let mut model = Model::load(graph)?;
     let data = Data::of(vec![train.to_owned()], Reading::default());
-    fit_on(&mut model, &data, &FitOptions::default(), terminal)?;
+    fit_on(&mut model, &data, &FitOptions::default(), host)?;
     write_aside(output, text_of(&model)?)?;
     Ok(model)
 }
 
-fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Failure> {
+fn evaluate(model: &Path, test: &Path, host: &dyn Watch) -> Result<Scores, Failure> {
     let wanted = Wanted {
         standard_errors: true,
         intervals: false,
@@ -126,7 +129,7 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
         abs_truth_below: LIMIT.parse().ok(),
         ..ScoreOptions::default()
     };
-    let mut progress = terminal.progress("evaluating");
+    let mut progress = host.progress("evaluating");
     let mut show = |ticks| progress.set(ticks);
     let scores = score(&model.plan, &model.fitted, &dataset, &options, &mut show)?;
     Ok(scores)

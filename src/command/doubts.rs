@@ -2,13 +2,13 @@
 
 use athermal::core::compile::Plan;
 use athermal::files::{Dataset, Report};
+use athermal_core::watch::Watch;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::beyond::{self, Beyond};
 use super::data;
 use super::faults::{self, ChannelFaults};
-use crate::terminal::Terminal;
 
 /// What is doubtful in a recording on which a model was run.
 pub struct Doubts<'a> {
@@ -35,16 +35,16 @@ impl Doubts<'_> {
     }
 
     /// Warns of them.
-    pub fn warn(&self, terminal: &Terminal) {
+    pub fn warn(&self, host: &dyn Watch) {
         data::warn(
-            terminal,
+            host,
             self.plan,
             &self.dataset.reports(),
             self.refused,
             self.rejected,
         );
-        beyond::warn(terminal, &self.outside_fit);
-        faults::warn(terminal, &self.faults);
+        beyond::warn(host, &self.outside_fit);
+        faults::warn(host, &self.faults);
     }
 }
 

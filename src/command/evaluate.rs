@@ -1,5 +1,8 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
+use athermal_core::watch::Watch;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::PathBuf;
 
 use athermal::Model;
@@ -9,6 +12,7 @@ use athermal::run::score::{FellBack, Lack, Score, ScoreOptions, score};
 use clap::Args;
 use serde_json::json;
 
+use super::asked::in_memory;
 use super::beyond;
 use super::data::Data;
 use super::doubts::Doubts;
@@ -47,7 +51,7 @@ use athermal_analysis::figures::seconds;
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
 /// stay as they were measured, and so do the weights of votes. Standard deviations are those of as many steps as there are
 /// since the newest measured truth, under the model's own noise.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
                         athermal evaluate model.json --data test.csv --format json \\\n      \
@@ -57,13 +61,17 @@ use athermal_analysis::figures::seconds;
 pub struct Evaluate {
     /// The model, or a graph that names one or in which nothing needs fitting
     #[arg(value_parser = crate::meant::graph_or_model())]
+    #[serde(skip, default = "in_memory")]
     model: PathBuf,
     #[command(flatten)]
+    #[serde(flatten)]
     data: Data,
     /// Score each prediction on all instants of its own
     #[arg(long)]
+    #[serde(default)]
     each_on_its_own: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     scored: Scored,
 }
 
@@ -74,7 +82,7 @@ impl Evaluate {
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
-        let found = found::show(terminal, || self.find(&model, terminal))?;
+        let (found, ()) = found::show(terminal, |host| Ok((self.find(&model, host)?, ())))?;
         let mut scores = found.facts["scores"].as_array().into_iter().flatten();
         if terminal.format == Format::Table && scores.any(|of| of["n"] != 0) {
             // Why the scores are what they are.
@@ -87,7 +95,7 @@ impl Evaluate {
     ///
     /// # Errors
     /// When the data cannot be used.
-    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<Found, Failure> {
+    pub fn find(&self, model: &Model, host: &dyn Watch) -> Result<Found, Failure> {
         self.scored.check(model)?;
         self.data.check_offsets(&[])?;
         self.data.thin(&self.model, &model.graph)?;
@@ -98,7 +106,7 @@ impl Evaluate {
             ..self.scored.options()?
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let mut progress = terminal.progress("evaluating");
+        let mut progress = host.progress("evaluating");
         let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
             progress.set(ticks)
         })?;
@@ -123,24 +131,24 @@ impl Evaluate {
         facts["lacks"] = json!(scores.lacks);
         facts["fell_back"] = json!(scores.fell_back);
         doubts.add_to(&mut facts);
-        doubts.warn(terminal);
+        doubts.warn(host);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
-        self.data.warn_fitted_on(terminal, model, period);
-        unscored::warn(terminal, &scores.unscored);
+        self.data.warn_fitted_on(host, model, period);
+        unscored::warn(host, &scores.unscored);
         let fell_back = FellBack::warnings(&scores.fell_back);
         for message in Lack::warnings(&scores.lacks).into_iter().chain(fell_back) {
-            terminal.warning(message);
+            host.warning(message);
         }
         let none = |of: &Score| of.valid.is_some() && of.n == 0;
         if let Some(steps) = self.scored.steps()
             && scores.scores.iter().any(none)
         {
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "where no truth was predicted {steps} steps ahead, no stretch of the data may be that long: try fewer `--steps`"
             ));
         }
         if scores.scores.is_empty() {
-            terminal.warning(
+            host.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",
             );
         }

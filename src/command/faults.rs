@@ -4,17 +4,17 @@ pub use athermal::diagnosis::watch::{ChannelFaults, ChannelWatch, FaultWatch, Pu
 
 use athermal::diagnosis::leap::Leaps;
 use athermal::run::live::monitor::silence::Silence;
+use athermal_core::watch::Watch;
 use serde_json::Value;
 
 use crate::message::Message;
-use crate::terminal::Terminal;
 use athermal_analysis::figures::{apart, count, counted, exact, instant};
 use athermal_command::findings::of_standstill;
 
 /// Warns of them.
-pub fn warn(terminal: &Terminal, all: &[ChannelFaults]) {
+pub fn warn(host: &dyn Watch, all: &[ChannelFaults]) {
     for message in messages(all) {
-        terminal.warning(message);
+        host.warning(message);
     }
 }
 

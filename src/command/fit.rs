@@ -1,5 +1,8 @@
 //! `athermal fit`: fits what a graph has to learn on recorded data, estimators and encoders, and writes a model.
 
+use athermal_core::watch::Watch;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -18,6 +21,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
+use super::asked::in_memory;
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::doubts;
@@ -55,7 +59,7 @@ use athermal_analysis::figures::{count, counted, number, paragraph, table};
 ///
 /// With `--format json` all of that is data: `estimators` has an object for each node, and its `figures` are by name,
 /// unrounded.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(
     after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
                         athermal fit machine.toml --data monday.csv tuesday.csv -o model.json"
@@ -63,28 +67,40 @@ use athermal_analysis::figures::{count, counted, number, paragraph, table};
 pub struct Fit {
     /// The graph, or a model whose graph is fitted anew
     #[arg(value_parser = crate::meant::graph_or_model())]
+    #[serde(skip, default = "in_memory")]
     graph: PathBuf,
     #[command(flatten)]
+    #[serde(flatten)]
     data: Data,
     /// Where the model goes; `-` is standard output
     #[arg(long, short, value_name = "MODEL", value_parser = crate::meant::written())]
+    #[serde(skip)]
     output: PathBuf,
     #[command(flatten)]
+    #[serde(flatten)]
     blocks: BlockOptions,
     #[command(flatten)]
+    #[serde(flatten)]
     threads: Threads,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
     #[arg(
         long,
         value_name = "MB",
-        default_value_t = 64,
+        default_value_t = megabytes(),
         allow_negative_numbers = true,
         value_parser = numbers::read::<usize>("a whole number of megabytes, such as 64")
     )]
+    #[serde(default = "megabytes")]
     memory: usize,
     /// Show what else was tried at each step of a selection, with its score, and all orders that were compared
     #[arg(long)]
+    #[serde(default)]
     candidates: bool,
+}
+
+/// So many megabytes of rows are kept where nothing else is asked for.
+fn megabytes() -> usize {
+    64
 }
 
 impl Fit {
@@ -134,28 +150,29 @@ impl Fit {
     ///
     /// # Errors
     /// When the data cannot be read.
-    pub fn fit(&self, model: &mut Model, terminal: &Terminal) -> Result<FitOutcome, Failure> {
+    pub fn fit(&self, model: &mut Model, host: &dyn Watch) -> Result<FitOutcome, Failure> {
         self.data.check_offsets(&[])?;
+        self.blocks.check(self.data.is_a_stretch())?;
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.count(),
             ..FitOptions::default()
         };
         match self.blocks.blocks {
-            Some(_) => fit_on_blocks(&self.blocks, model, &self.data, &options, terminal),
-            None => fit_on(model, &self.data, &options, terminal),
+            Some(_) => fit_on_blocks(&self.blocks, model, &self.data, &options, host),
+            None => fit_on(model, &self.data, &options, host),
         }
     }
 
     /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
-    fn warn_of_no_model(&self, terminal: &Terminal) {
+    fn warn_of_no_model(&self, host: &dyn Watch) {
         let output = self.output.display();
         if self.output.is_file() {
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "nothing could be fitted: no model is written, and {output} stays as it is"
             ));
         } else {
-            terminal.warning("nothing could be fitted: no model is written");
+            host.warning("nothing could be fitted: no model is written");
         }
     }
 
@@ -173,7 +190,7 @@ impl Fit {
 
     /// Warns of mistakes in the tests of a graph file. The fit does without tests, but nobody should find such mistakes only when the
     /// model is in use.
-    fn doubt_tests(&self, model: &Model, mut sources: Sources, terminal: &Terminal) {
+    fn doubt_tests(&self, model: &Model, mut sources: Sources, host: &dyn Watch) {
         if self.graph.extension().is_none_or(|kind| kind != "toml") {
             return;
         }
@@ -184,7 +201,7 @@ impl Fit {
             } else {
                 format!("{of} mistakes")
             };
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "the tests of {path} have {mistakes}, which the fit does without: see `athermal check {path}`"
             ));
         }
@@ -271,27 +288,27 @@ pub fn fit_on(
     model: &mut Model,
     data: &Data,
     options: &FitOptions,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<FitOutcome, Failure> {
-    let mut outcome = fit_without_card(model, data, options, terminal)?;
-    warn_bare(&outcome, terminal);
+    let mut outcome = fit_without_card(model, data, options, host)?;
+    warn_bare(&outcome, host);
     for (output, voter, share) in outcome.report.fallbacks(&model.plan) {
-        terminal.warning(format_args!(
+        host.warning(format_args!(
             "{output}: {voter} lacks a regressor in {:.0}% of the rows, so it will be its fallback as often",
             100.0 * share
         ));
     }
     let doubts = std::mem::take(&mut outcome.doubts);
     let (dataset, report) = (&outcome.dataset, &outcome.report);
-    data::warn_of(terminal, doubts, &dataset.reports());
-    faults::warn(terminal, &outcome.faults);
+    data::warn_of(host, doubts, &dataset.reports());
+    faults::warn(host, &outcome.faults);
     let cards = data.cards(&model.plan, dataset)?;
     model.card = Some(Card::of(report, cards, created()));
     Ok(outcome)
 }
 
 /// Warns of outputs that predict a constant, and of voters that do beside others.
-pub fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
+pub fn warn_bare(outcome: &FitOutcome, host: &dyn Watch) {
     let (some, none): (Vec<_>, Vec<_>) = outcome.bare.iter().partition(|of| of.has_others);
     for (outputs, is_constant) in [(none, true), (some, false)] {
         if outputs.is_empty() {
@@ -309,7 +326,7 @@ pub fn warn_bare(outcome: &FitOutcome, terminal: &Terminal) {
         };
         let bare: Vec<&str> = bare.into_iter().map(String::as_str).collect();
         let (names, bare) = (names.join(", "), bare.join(", "));
-        terminal.warning(match is_constant {
+        host.warning(match is_constant {
             true => format!("{names}: predicts a constant, since no voter has a regressor left ({bare}){why}"),
             false => format!("{names}: {bare} predicts a constant, since it has no regressor left; other voters have{why}"),
         });
@@ -324,11 +341,11 @@ pub fn fit_without_card(
     model: &mut Model,
     data: &Data,
     options: &FitOptions,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<FitOutcome, Failure> {
     let dataset = data.dataset();
     let watch = FaultWatch::new(&dataset, Purpose::Fit);
-    let mut progress = terminal.progress("fitting");
+    let mut progress = host.progress("fitting");
     let (fitted, report) = fit(
         &model.plan,
         &watch,

@@ -1,5 +1,6 @@
 //! `athermal fit --blocks day`: a fit on blocks, made just now or kept in a folder.
 
+use athermal_core::watch::Watch;
 use std::path::Path;
 
 use athermal::Model;
@@ -13,7 +14,7 @@ use athermal_fleet::blocks::BlockOptions;
 use super::data::{self, Data};
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::{FitOutcome, created, warn_bare};
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::Failure;
 
 /// Fits a model on blocks of data, fills in its card, and warns as a fit on rows does, of the rows that were read.
 ///
@@ -24,11 +25,11 @@ pub fn fit_on_blocks(
     model: &mut Model,
     data: &Data,
     options: &FitOptions,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<FitOutcome, Failure> {
     check_blocks(&model.plan).map_err(FitError::from)?;
     let mut faults = Vec::new();
-    let mut progress = terminal.progress("summing");
+    let mut progress = host.progress("summing");
     let plan = &model.plan;
     let mut make = |dataset: &athermal::files::Dataset,
                     wanted: &dyn Fn(i64) -> bool,
@@ -61,8 +62,8 @@ pub fn fit_on_blocks(
     drop(progress);
     let reports = dataset.reports();
     let doubts = data::doubts(plan, &reports, report.refused, &report.rejected);
-    data::warn_of(terminal, doubts, &reports);
-    faults::warn(terminal, &faults);
+    data::warn_of(host, doubts, &reports);
+    faults::warn(host, &faults);
     let outcome = FitOutcome {
         bare: report.bare_outputs(plan),
         dataset,
@@ -70,7 +71,7 @@ pub fn fit_on_blocks(
         faults,
         doubts: Vec::new(),
     };
-    warn_bare(&outcome, terminal);
+    warn_bare(&outcome, host);
     model.card = Some(Card::of(&outcome.report, cards, created()));
     model.fitted = fitted;
     Ok(outcome)

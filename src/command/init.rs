@@ -1,5 +1,7 @@
 //! `athermal init`: a starter graph for logs.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 use athermal::core::document::TableFormat;
@@ -8,6 +10,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
+use super::asked::some_by_text;
 use super::data::{Data, Reading};
 use crate::invocation::{command, quoted};
 use crate::meant::{new_log, written};
@@ -21,7 +24,7 @@ use athermal_analysis::figures::paragraph;
 /// units. It measures rates and gaps, and chooses windows by the drift against its standard error. Every guess is printed,
 /// and stands in the graph as a comment. The graph checks, fits and evaluates as it is. Files of different columns whose times
 /// overlap are merged by time, as `fit` does.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(after_help = "Examples:
   athermal init log.csv
   athermal init log.csv -o graph.toml
@@ -36,23 +39,31 @@ pub struct Init {
     data: Vec<PathBuf>,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml", value_parser = written())]
+    #[serde(skip)]
     output: PathBuf,
     /// The column that gives the time, or several in braces: "{Date} {Time}"
     #[arg(long, value_name = "COLUMN")]
+    #[serde(default)]
     time: Option<String>,
     /// How dates and times are written that are not as in RFC 3339, in the letters of strptime
     #[arg(long, value_name = "FORMAT")]
+    #[serde(default, deserialize_with = "some_by_text")]
+    #[schemars(with = "Option<String>")]
     time_format: Option<TimeFormat>,
     /// The columns that drift
     #[arg(long, num_args = 1.., value_name = "COLUMN")]
+    #[serde(default)]
     drifts: Vec<String>,
     /// How the text is laid out where that is not found, as `[table]` of a graph says it: skip=2 names=1 separator=; decimal=,
     #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
+    #[serde(default)]
     table: Vec<String>,
     /// Write over a graph that is there
     #[arg(long)]
+    #[serde(skip)]
     force: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     reading: Reading,
 }
 

@@ -1,6 +1,7 @@
 //! The commands, each in a file of its own.
 
 pub(crate) mod aside;
+pub(crate) mod asked;
 pub(crate) mod beyond;
 mod build;
 mod check;
@@ -37,47 +38,32 @@ mod threads;
 mod unread;
 mod unscored;
 
-use athermal_command::numbers;
-use clap::Subcommand;
+use athermal_command::{Command, Group, numbers, register_command};
 
 use crate::terminal::{Answer, Failure, Terminal};
 
-/// The commands: a variant of each, and its call.
+/// The commands of the program: of each where it stands, its name, and its arguments.
 macro_rules! commands {
-    ($($name:ident($arguments:ty)),* $(,)?) => {
-        /// The commands.
-        #[derive(Debug, Subcommand)]
-        pub enum Command {
-            $($name($arguments)),*
-        }
+    ($($group:ident: $($name:literal $arguments:ty),+;)*) => {
+        $($(
+            impl Command for $arguments {
+                const GROUP: Group = Group::$group;
+                const WRITES_EVENTS: bool = matches!($name.as_bytes(), b"run" | b"serve");
 
-        impl Command {
-            /// Does what was asked for.
-            ///
-            /// # Errors
-            /// When it cannot be done.
-            pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-                match self {
-                    $(Self::$name(command) => command.run(terminal)),*
+                fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+                    <$arguments>::run(self, terminal)
                 }
             }
-        }
+
+            register_command!($arguments, $name);
+        )+)*
     };
 }
 
 commands! {
-    Demo(demo::Demo), Init(init::Init), Show(show::Show), Check(check::Check),
-    Explain(explain::Explain), Diff(diff::Diff), Nodes(nodes::Nodes), Fit(fit::Fit),
-    Evaluate(evaluate::Evaluate), Compare(compare::Compare), Diagnose(diagnose::Diagnose),
-    Report(report::Report), Run(run::Run), Serve(serve::Serve), Replay(replay::Replay), Simulate(simulate::Simulate),
-    Completions(completions::Completions), Man(man::Man), Test(test::Test), Schema(schema::Schema),
-    New(new::New), Build(build::Build),
-}
-
-impl Command {
-    /// Whether reports beside the result are events for programs: the result is rows.
-    #[must_use]
-    pub fn writes_events(&self) -> bool {
-        matches!(self, Self::Run(_) | Self::Serve(_))
-    }
+    Begin: "demo" demo::Demo, "init" init::Init, "check" check::Check, "explain" explain::Explain, "test" test::Test;
+    Model: "fit" fit::Fit, "evaluate" evaluate::Evaluate, "compare" compare::Compare;
+    Look: "show" show::Show, "diff" diff::Diff, "diagnose" diagnose::Diagnose, "report" report::Report, "nodes" nodes::Nodes;
+    Run: "run" run::Run, "serve" serve::Serve, "replay" replay::Replay, "simulate" simulate::Simulate;
+    Make: "new" new::New, "build" build::Build, "schema" schema::Schema, "completions" completions::Completions, "man" man::Man;
 }

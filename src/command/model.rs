@@ -1,5 +1,6 @@
 //! Loading a model or a graph for a command.
 
+use athermal_core::watch::Watch;
 use std::path::Path;
 
 use athermal::Model;
@@ -9,16 +10,16 @@ use athermal::core::node::Role;
 use athermal::core::quantity::Quantity;
 use athermal::run::model::ModelError;
 
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::Failure;
 
 /// A model, or a graph with the fits of the model that it names. Warns of what is doubtful in a graph file.
 ///
 /// # Errors
 /// When it cannot be loaded.
-pub fn load(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, Failure> {
+pub fn load(path: &Path, wanted: Wanted, host: &dyn Watch) -> Result<Model, Failure> {
     let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
     let model = Model::load_from(path, wanted, &mut sources, &mut doubts)?;
-    terminal.doubts(&doubts, &sources);
+    host.doubts(&doubts, &sources);
     Ok(model)
 }
 
@@ -26,14 +27,10 @@ pub fn load(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, F
 ///
 /// # Errors
 /// When it cannot be loaded.
-pub fn load_to_fit(
-    path: &Path,
-    sources: &mut Sources,
-    terminal: &Terminal,
-) -> Result<Model, Failure> {
+pub fn load_to_fit(path: &Path, sources: &mut Sources, host: &dyn Watch) -> Result<Model, Failure> {
     let mut doubts = Diagnostics::new();
     let model = Model::load_to_fit(path, Wanted::default(), sources, &mut doubts)?;
-    terminal.doubts(&doubts, sources);
+    host.doubts(&doubts, sources);
     Ok(model)
 }
 
@@ -41,8 +38,8 @@ pub fn load_to_fit(
 ///
 /// # Errors
 /// When it cannot be loaded, or is a graph that needs fitting.
-pub fn load_fitted(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, Failure> {
-    let model = load(path, wanted, terminal)?;
+pub fn load_fitted(path: &Path, wanted: Wanted, host: &dyn Watch) -> Result<Model, Failure> {
+    let model = load(path, wanted, host)?;
     check_fitted(&model, path)?;
     Ok(model)
 }
@@ -61,14 +58,14 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
 }
 
 /// Warns of the nodes of a model whose fit failed.
-pub fn warn_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
-    warn_nodes_unfitted(terminal, &model.unfitted(), path);
+pub fn warn_unfitted(host: &dyn Watch, model: &Model, path: &Path) {
+    warn_nodes_unfitted(host, &model.unfitted(), path);
 }
 
 /// The same, of nodes that are known.
-fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
+fn warn_nodes_unfitted(host: &dyn Watch, nodes: &[String], path: &Path) {
     if !nodes.is_empty() {
-        terminal.warning(format_args!(
+        host.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",
             path.display(),
             few(nodes),
@@ -79,7 +76,7 @@ fn warn_nodes_unfitted(terminal: &Terminal, nodes: &[String], path: &Path) {
 
 /// Warns of estimators that do not know where the edge of their fit is: what they predict outside stays as it is. These are fits of
 /// before fits kept it, or on rows that do not say, and kinds that never know.
-pub fn warn_without_novelty(terminal: &Terminal, model: &Model, path: &Path) {
+pub fn warn_without_novelty(host: &dyn Watch, model: &Model, path: &Path) {
     let (mut unknown, mut never) = (Vec::new(), Vec::new());
     for node in &model.plan.nodes {
         let (
@@ -106,7 +103,7 @@ pub fn warn_without_novelty(terminal: &Terminal, model: &Model, path: &Path) {
     }
     let of = |nodes: &[String], verbs: [&'static str; 2]| verbs[usize::from(nodes.len() > 1)];
     if !unknown.is_empty() {
-        terminal.warning(format_args!(
+        host.warning(format_args!(
             "{}: {} {} no `novelty`, since the fit kept no second moments of the regressors, so predictions outside of it pass as they are; \
              fit again, on more rows than regressors and with all of them in `--memory`",
             path.display(),
@@ -115,7 +112,7 @@ pub fn warn_without_novelty(terminal: &Terminal, model: &Model, path: &Path) {
         ));
     }
     if !never.is_empty() {
-        terminal.note(format_args!(
+        host.note(format_args!(
             "{}: {} {} no `novelty`, since the kind has none, so predictions outside of the fit pass as they are; put a `guard` behind",
             path.display(),
             few(&never),

@@ -1,5 +1,8 @@
 //! `athermal report`: what a model is worth on recorded data, as a page.
 
+use athermal_core::watch::Watch;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +17,7 @@ use athermal::run::score::{FellBack, Lack};
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};
+use super::asked::in_memory;
 use super::beyond::beyond;
 use super::data::{self, Data};
 use super::doubts;
@@ -27,7 +31,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 /// Prints a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
 /// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and
 /// errors, chosen features, all sensors, and the model's card. With `--format json` the same facts go to standard output.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(
     after_help = "Examples:\n  athermal report model.json --data test.csv\n  \
                         athermal report model.json --data test.csv -o report.html\n  \
@@ -37,14 +41,18 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 pub struct Report {
     /// The model, or a graph that names one or in which nothing needs fitting
     #[arg(value_parser = crate::meant::graph_or_model())]
+    #[serde(skip, default = "in_memory")]
     model: PathBuf,
     #[command(flatten)]
+    #[serde(flatten)]
     data: Data,
     /// Where the page goes; `-` is standard output
     #[arg(long, short, value_name = "FILE", value_parser = crate::meant::written())]
+    #[serde(skip)]
     output: Option<PathBuf>,
     /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
     plots: Option<PathBuf>,
 }
 
@@ -92,7 +100,7 @@ impl Report {
     ///
     /// # Errors
     /// When the data cannot be used.
-    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<(Found, Facts), Failure> {
+    pub fn find(&self, model: &Model, host: &dyn Watch) -> Result<(Found, Facts), Failure> {
         self.data.thin(&self.model, &model.graph)?;
         let dataset = self.data.dataset();
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
@@ -102,25 +110,25 @@ impl Report {
         })?;
         let course = &facts.course;
         data::warn(
-            terminal,
+            host,
             &model.plan,
             &dataset.reports(),
             course.refused,
             &course.rejected,
         );
-        self.data.warn_fitted_on(terminal, model, course.period_s);
+        self.data.warn_fitted_on(host, model, course.period_s);
         if let Some(message) = feedback::in_words(&model.plan) {
-            terminal.warning(message);
+            host.warning(message);
         }
         let fell_back = FellBack::warnings(&facts.fell_back);
         for message in Lack::warnings(&facts.lacks).into_iter().chain(fell_back) {
-            terminal.warning(message);
+            host.warning(message);
         }
         for of in &facts.unjudged {
-            terminal.warning(format_args!("`{}` cannot be judged: {}", of.of, of.why));
+            host.warning(format_args!("`{}` cannot be judged: {}", of.of, of.why));
         }
         if course.axes.is_empty() {
-            terminal.warning(
+            host.warning(
                 "the graph has no prediction of a measured truth, so there is little to report",
             );
         }
@@ -151,7 +159,7 @@ impl Report {
 ///
 /// # Errors
 /// When the folder or a file cannot be written.
-pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
+pub fn write_plots(host: &dyn Watch, folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::Outside(format!("cannot make {}: {error}", folder.display())))?;
     let names = file_names(plots.iter().map(|plot| plot.name.as_str()));
@@ -159,7 +167,7 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
         write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
     }
     let (count, folder) = (plots.len(), folder.display());
-    terminal.note(format_args!("wrote {count} pictures to {folder}"));
+    host.note(format_args!("wrote {count} pictures to {folder}"));
     Ok(())
 }
 

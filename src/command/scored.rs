@@ -1,5 +1,7 @@
 //! The options that say how predictions are scored.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::num::NonZeroU32;
 
 use athermal::Model;
@@ -14,17 +16,20 @@ use crate::terminal::Failure;
 use athermal_analysis::figures::counted;
 
 /// How predictions are scored.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 pub struct Scored {
     /// Only truths whose absolute value is below count, such as "250 nm/min"
     #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
+    #[serde(default)]
     abs_truth_below: Option<Quantity>,
     /// Let no estimator learn on the way; otherwise, what learns does so after each truth has been predicted. Votes go by recent
     /// errors in either case
     #[arg(long)]
+    #[serde(default)]
     frozen: bool,
     /// From which past truths predictions are made; only what reads or follows past truths differs
     #[arg(long, value_enum, default_value = "one-step")]
+    #[serde(default)]
     mode: Horizon,
     /// How many steps ahead `--mode k-step` predicts
     #[arg(
@@ -33,13 +38,16 @@ pub struct Scored {
         allow_negative_numbers = true,
         value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
     )]
+    #[serde(default)]
     steps: Option<NonZeroU32>,
 }
 
 /// From which past truths predictions are made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 enum Horizon {
     /// From those measured, as beside a machine: all that the horizon and the embargo allow
+    #[default]
     OneStep,
     /// From those measured up to K steps before the predicted one; newer ones are replaced by predictions of them, and
     /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one

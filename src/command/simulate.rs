@@ -1,34 +1,39 @@
 //! `athermal simulate`: the recording of a simulated machine, as a file.
 
+use athermal_core::watch::{Progress, Watch};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::{NO_FILE, lasts};
+use athermal::core::registry::{all, find};
 use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal::trial::fault::FaultSpec;
 use athermal::trial::machine::{
     ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation,
-    Spread, machine, machines,
+    Spread, facts,
 };
 use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_points, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::aside::{check_apart, not_written, write_aside, written_aside};
+use super::asked::{all_by_text, by_text};
 use super::data;
 use super::model::load_fitted;
 use super::numbers;
-use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
+use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::counted;
 
 /// Write the recording of a simulated machine, or list the machines
 ///
 /// The same machine, days, seed, schedule and faults give the same bytes everywhere. A schedule is a CSV file such as
 /// `time_h,chuck_degC` with rows `0,20`, `4,50` and, to start again, `8,repeat`.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(after_help = "Examples:
   athermal simulate
   athermal simulate die-tester -o train.csv
@@ -45,24 +50,27 @@ pub struct Simulate {
     machine: Option<String>,
     /// CSV, JSON lines or what else is written, by its ending, CSV without one; `-` is standard output, as CSV
     #[arg(long, short, value_name = "FILE", requires = "machine", value_parser = crate::meant::written())]
+    #[serde(skip)]
     output: Option<PathBuf>,
     /// Length of the recording in days
     #[arg(
         long,
-        default_value_t = 7.0,
+        default_value_t = a_week(),
         allow_negative_numbers = true,
         requires = "machine",
         value_parser = numbers::read::<f64>("a number of days, such as 0.5")
     )]
+    #[serde(default = "a_week")]
     days: f64,
     /// Another seed is another week of weather, motions and noise
     #[arg(
         long,
-        default_value_t = 1,
+        default_value_t = first(),
         allow_negative_numbers = true,
         requires = "machine",
         value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
     )]
+    #[serde(default = "first")]
     seed: u64,
     /// One machine of a fleet: its parameters lie around those of the design, by so much
     ///
@@ -70,37 +78,60 @@ pub struct Simulate {
     /// motors and creep are each multiplied with exp(SPREAD n), `n` standard normal: a log-normal distribution. Sensors of temperature
     /// have offsets of SPREAD times 0.5 K. Measures are those of the drawing. 0% is the design.
     #[arg(long, default_value = "0%", requires = "machine")]
+    #[serde(default = "of_design", deserialize_with = "by_text")]
+    #[schemars(with = "String")]
     spread: Spread,
     /// Which machine of the fleet it is; weather, motions and noise follow `--seed`
     #[arg(
         long,
-        default_value_t = 1,
+        default_value_t = first(),
         allow_negative_numbers = true,
         requires = "spread",
         value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
     )]
+    #[serde(default = "first")]
     machine_seed: u64,
     /// Add the true drift of each axis as a column
     #[arg(long, requires = "machine")]
+    #[serde(default)]
     truth: bool,
     /// Set points over time; the machine has a schedule of its own
     #[arg(long, value_name = "FILE", requires = "machine")]
+    #[serde(default)]
     schedule: Option<PathBuf>,
     /// Write what the schedule plans too: a row half an hour before each set point applies
     #[arg(long, value_name = "FILE", requires = "output")]
+    #[serde(skip)]
     set_points: Option<PathBuf>,
     /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
     #[arg(long, value_name = "MODEL", requires = "machine")]
+    #[serde(default)]
     compensate: Option<PathBuf>,
     /// A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…]
     #[arg(long = "fault", value_name = "SPEC", requires = "machine")]
+    #[serde(default, rename = "fault", deserialize_with = "all_by_text")]
+    #[schemars(with = "Vec<String>")]
     faults: Vec<FaultSpec>,
     /// The world changes: `door,from=8h,for=3h,size=3`, `lamp,size=0.6 mK/s` or `loose=SENSOR,size=0.5`
     ///
     /// While a door stands open, the air couples to all bodies so many times as strongly. A lamp heats all of a stage. A loose sensor reads
     /// so much of the room instead of its body.
     #[arg(long = "disturb", value_name = "SPEC", requires = "machine")]
+    #[serde(default, rename = "disturb", deserialize_with = "all_by_text")]
+    #[schemars(with = "Vec<String>")]
     disturbances: Vec<Disturbance>,
+}
+
+fn a_week() -> f64 {
+    7.0
+}
+
+fn first() -> u64 {
+    1
+}
+
+fn of_design() -> Spread {
+    Spread::default()
 }
 
 impl Simulate {
@@ -113,7 +144,7 @@ impl Simulate {
             list(terminal);
             return Ok(Answer::Fine);
         };
-        let known = machine(name)
+        let known = find::<KnownMachine>(name)
             .map_err(|error| refused(format!("{error} (`athermal simulate` lists them all)")))?;
         if self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::Request(format!(
@@ -170,14 +201,14 @@ impl Simulate {
         &self,
         machine: &dyn Machine,
         output: &Path,
-        terminal: &Terminal,
+        host: &dyn Watch,
     ) -> Result<u64, Failure> {
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
         let recording = self.recording(machine)?;
         written_aside(output, |output| match &self.compensate {
-            None => write_recording(&recording, machine, self.truth, output, terminal),
-            Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
+            None => write_recording(&recording, machine, self.truth, output, host),
+            Some(model) => self.write_corrected(model, &recording, machine, output, host),
         })
     }
 
@@ -192,14 +223,14 @@ impl Simulate {
     /// When there is no such machine, or the schedule or a fault does not fit it.
     pub fn rows(
         &self,
-        terminal: &Terminal,
+        host: &dyn Watch,
         put: &mut dyn FnMut(i64, &[f64]),
     ) -> Result<Vec<String>, Failure> {
         let name = self.machine.as_deref().unwrap_or_default();
-        let machine = machine(name).map_err(refused)?.machine;
+        let machine = find::<KnownMachine>(name).map_err(refused)?.machine;
         let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
         let machine = disturbed.as_deref().unwrap_or(machine);
-        let mut simulation = Watched::start(&self.recording(machine)?, terminal)?;
+        let mut simulation = Watched::start(&self.recording(machine)?, host)?;
         let channels = machine.channels();
         let (mut row, mut values) = (Row::empty(channels), Vec::new());
         while simulation.next(&mut row) {
@@ -217,10 +248,10 @@ impl Simulate {
         recording: &Simulated,
         machine: &dyn Machine,
         output: &Path,
-        terminal: &Terminal,
+        host: &dyn Watch,
     ) -> Result<u64, Failure> {
-        let engine = load_fitted(model, Wanted::default(), terminal)?.engine()?;
-        let simulation = Box::new(Watched::start(recording, terminal)?);
+        let engine = load_fitted(model, Wanted::default(), host)?.engine()?;
+        let simulation = Box::new(Watched::start(recording, host)?);
         let setup = recording.setup();
         let mut simulation =
             ClosedLoop::new(machine, setup, simulation, engine).map_err(refused)?;
@@ -281,9 +312,9 @@ pub fn write_recording(
     machine: &dyn Machine,
     truth: bool,
     output: &Path,
-    terminal: &Terminal,
+    host: &dyn Watch,
 ) -> Result<u64, Failure> {
-    let mut simulation = Watched::start(recording, terminal)?;
+    let mut simulation = Watched::start(recording, host)?;
     let channels = machine.channels();
     let format = FileFormat::from_path(output);
     if matches!(format, Some(FileFormat::JsonLines | FileFormat::Typed)) {
@@ -341,17 +372,17 @@ fn refused(error: impl ToString) -> Failure {
 /// A simulation that shows its progress.
 struct Watched {
     simulation: Box<dyn Simulation>,
-    progress: Progress,
+    progress: Box<dyn Progress>,
 }
 
 impl Watched {
-    fn start(recording: &Simulated, terminal: &Terminal) -> Result<Self, Failure> {
+    fn start(recording: &Simulated, host: &dyn Watch) -> Result<Self, Failure> {
         let simulation = recording.start().map_err(refused)?;
         let days = recording.setup().days;
         Ok(Self {
             simulation,
             // Days are counted in thousandths, since how many rows there will be is the machine's business.
-            progress: terminal.progress_to("simulating", (days * 1000.0) as u64),
+            progress: host.progress_to("simulating", (days * 1000.0) as u64),
         })
     }
 }
@@ -370,19 +401,15 @@ impl Simulation for Watched {
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = machines()
-            .values()
-            .flatten()
-            .map(KnownMachine::facts)
-            .collect();
+        let all: Vec<Value> = all::<KnownMachine>().map(facts).collect();
         println!("{:#}", json!({ "machines": all }));
         return;
     }
-    for known in machines().values().flatten() {
+    for known in all::<KnownMachine>() {
         let machine = known.machine;
         println!(
             "{} (from {} {})\n  {}",
-            machine.name(),
+            known.name,
             known.package,
             known.version,
             machine.summary()

@@ -1,11 +1,13 @@
 //! How many threads a command works with.
 
 use clap::Args;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::numbers;
 
 /// The threads that were asked for.
-#[derive(Debug, Clone, Copy, Args)]
+#[derive(Debug, Clone, Copy, Args, Deserialize, JsonSchema)]
 pub struct Threads {
     /// Threads to work with; 0 takes one for each core. The result does not depend on it
     #[arg(
@@ -15,6 +17,7 @@ pub struct Threads {
         allow_negative_numbers = true,
         value_parser = numbers::read::<usize>("a whole number of threads, 0 for one per core")
     )]
+    #[serde(default)]
     threads: usize,
 }
 

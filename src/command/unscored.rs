@@ -1,13 +1,13 @@
 //! Warnings about predictions of which nothing is scored.
 
 use athermal::run::score::Unscored;
+use athermal_core::watch::Watch;
 
 use super::model::few;
-use crate::terminal::Terminal;
 use athermal_analysis::figures::{counted, stated};
 
 /// Warns of them, of those with one reason together.
-pub fn warn(terminal: &Terminal, unscored: &[Unscored]) {
+pub fn warn(host: &dyn Watch, unscored: &[Unscored]) {
     let mut groups: Vec<(Vec<String>, String)> = Vec::new();
     for of in unscored {
         let (output, why) = (of.output.clone(), why(of));
@@ -18,7 +18,7 @@ pub fn warn(terminal: &Terminal, unscored: &[Unscored]) {
     }
     for (outputs, why) in groups {
         let outputs = few(&outputs);
-        terminal.warning(format_args!("{outputs}: nothing is scored: {why}"));
+        host.warning(format_args!("{outputs}: nothing is scored: {why}"));
     }
 }
 

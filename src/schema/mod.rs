@@ -1,19 +1,18 @@
 //! Decides the JSON Schema of graph files, for exactly the kinds that are linked in; what a kind's parameters are is decided by the kind.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
 
 use athermal_core::compile::EstimatorKeys;
 use athermal_core::document::{TIME_UNITS, TableFormat};
-use athermal_core::node::{InputPort, Kind, Read, kinds};
+use athermal_core::node::{InputPort, Kind, NodeKind, Read};
 use athermal_core::quantity::Quantity;
+use athermal_core::registry::{Sort, all};
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
-use athermal_serve::companion::companion_kinds;
-use athermal_serve::connector::{ConnectorKind, sink_kinds, source_kinds};
+use athermal_serve::companion::CompanionKind;
+use athermal_serve::connector::{ConnectorKind, Sink, Source};
 use athermal_serve::deployment;
 use athermal_trial::TestTable;
 
@@ -41,8 +40,8 @@ pub fn graph_schema() -> Value {
     let common = generator.take_definitions(true).into_iter();
     let common = common.map(|(name, schema)| (name, as_draft_7(&schema, &str::to_owned)));
     let mut definitions: Map<String, Value> = common.collect();
-    let kinds = kinds().values().filter_map(|same| same.first().copied());
-    let kinds: Vec<&Kind> = kinds.collect();
+    let mut kinds: Vec<&Kind> = all::<NodeKind>().collect();
+    kinds.dedup_by_key(|kind| kind.name);
     let node = |kind: &&Kind| node(kind, &framework, &mut definitions);
     let nodes: Value = kinds.iter().map(node).collect();
     let names: Vec<&str> = kinds.iter().map(|kind| kind.name).collect();
@@ -54,13 +53,12 @@ pub fn graph_schema() -> Value {
     schema["properties"]["time"]["properties"]["unit"]["enum"] = json!(TIME_UNITS);
     schema["properties"]["table"] = table(&format);
     schema["properties"]["runtime"] = runtime;
-    for kind in companion_kinds().filter(|kind| !kind.section.is_empty()) {
-        let section = adopt(kind.section, &(kind.schema)(), &mut definitions);
-        schema["properties"][kind.section] = section;
+    for kind in all::<CompanionKind>().filter(|kind| !kind.name.is_empty()) {
+        schema["properties"][kind.name] = adopt(kind.name, (kind.schema)(), &mut definitions);
     }
-    let sources = connectors(source_kinds(), &source, &mut definitions);
+    let sources = connectors::<dyn Source>(&source, &mut definitions);
     schema["properties"]["sources"]["additionalProperties"] = sources;
-    let sinks = connectors(sink_kinds(), &sink, &mut definitions);
+    let sinks = connectors::<dyn Sink>(&sink, &mut definitions);
     schema["properties"]["sinks"]["additionalProperties"] = sinks;
     let node = &mut schema["definitions"]["Node"]["then"];
     node["properties"]["type"]["enum"] = json!(names);
@@ -231,12 +229,14 @@ fn inputs(kind: &Kind) -> Value {
 }
 
 /// A source or a sink: the keys that each has, and those of its kind behind its `type`.
-fn connectors<S: ?Sized>(
-    kinds: &BTreeMap<&str, &ConnectorKind<S>>,
-    shared: &Value,
-    definitions: &mut Map<String, Value>,
-) -> Value {
-    let choice = |kind: &&ConnectorKind<S>| {
+fn connectors<S: ?Sized>(shared: &Value, definitions: &mut Map<String, Value>) -> Value
+where
+    ConnectorKind<S>: Sort,
+{
+    let kinds = all::<ConnectorKind<S>>();
+    let names: Vec<&str> = kinds.clone().map(|kind| kind.name).collect();
+    let texts: Vec<String> = kinds.clone().map(|kind| kind.summary()).collect();
+    let choices = kinds.map(|kind| {
         let own = adopt(kind.name, (kind.schema)(), definitions);
         let mut properties = json!({ "type": { "description": kind.documentation() } });
         for keys in [shared, &own] {
@@ -248,10 +248,8 @@ fn connectors<S: ?Sized>(
             "if": { "properties": { "type": { "const": kind.name } }, "required": ["type"] },
             "then": { "properties": properties, "additionalProperties": false }
         })
-    };
-    let choices: Vec<Value> = kinds.values().map(choice).collect();
-    let names: Vec<&str> = kinds.keys().copied().collect();
-    let texts: Vec<String> = kinds.values().map(|kind| kind.summary()).collect();
+    });
+    let choices: Vec<Value> = choices.collect();
     let docs = json!({ "docs": { "enumValues": texts } });
     json!({
         "if": { "type": "boolean" },

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::workbench::{Scratch, athermal, data, graph, graphs, simulated};
 use athermal::Model;
-use athermal::core::node::{RoleName, kinds};
+use athermal::core::node::{NodeKind, RoleName};
+use athermal::core::registry::all;
 use athermal::diagnosis::comparison::{Comparison, Contender, compare};
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, Outcome, fit};
@@ -280,7 +281,7 @@ fn horizons_are_not_compared_with_each_other() {
 fn the_zoo_holds_every_estimator_and_every_combiner() {
     let zoo = Model::load(graph("zoo")).unwrap();
     let there: BTreeSet<&str> = zoo.plan.nodes.iter().map(|node| node.kind.name).collect();
-    let all = kinds().values().flatten();
+    let all = all::<NodeKind>();
     let of_role = all.filter(|kind| matches!(kind.role, RoleName::Estimator | RoleName::Combiner));
     let missing: Vec<&str> = of_role
         .map(|kind| kind.name)

@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use crate::workbench::{Graph, Scratch, athermal};
 use athermal::Model;
-use athermal::core::node::{Kind, RoleName, kinds};
+use athermal::core::node::{Kind, NodeKind, RoleName};
+use athermal::core::registry::all;
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, FitReport, Outcome, fit};
 
@@ -43,7 +44,7 @@ fn fitted_on(
     options: &FitOptions,
     wanted: impl Fn(&Kind) -> bool,
 ) -> (Model, FitReport) {
-    let estimators = kinds().values().flatten();
+    let estimators = all::<NodeKind>();
     let estimators = estimators.filter(|kind| kind.role == RoleName::Estimator && wanted(kind));
     let (mut graph, mut outputs) = (signals().to_string(), "[outputs]\n".to_owned());
     for kind in estimators {

@@ -5,9 +5,10 @@ use std::process::Command;
 
 use crate::workbench::Folder;
 use athermal::Model;
+use athermal::core::registry::{all, find};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::score::{ScoreOptions, score};
-use athermal::trial::machine::{Setup, Simulated, machine, machines};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 
 impl Folder {
     /// Runs and expects success; gives standard output and standard error.
@@ -83,7 +84,7 @@ fn the_demo_comes_again_to_its_own_folder_but_never_over_work_in_it() {
 
 #[test]
 fn the_machines_of_this_program_are_these() {
-    let names: Vec<&str> = machines().keys().copied().collect();
+    let names: Vec<&str> = all::<KnownMachine>().map(|of| of.name).collect();
     assert_eq!(names, ["die-tester", "linear-axis"]);
 }
 
@@ -188,7 +189,7 @@ fn what_cannot_be_simulated_is_refused_with_the_next_step() {
 
 #[test]
 fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
-    let known = machine("linear-axis").unwrap();
+    let known = find::<KnownMachine>("linear-axis").unwrap();
     let recording = |seed| {
         let setup = Setup {
             days: 1.0,
@@ -221,7 +222,7 @@ fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
 
 #[test]
 fn a_graph_that_measures_something_else_is_told_what_the_machine_has() {
-    let known = machine("linear-axis").unwrap();
+    let known = find::<KnownMachine>("linear-axis").unwrap();
     let model = Model::load(graph("z-probe.toml")).unwrap();
     let recording = Simulated::new(known.machine, Setup::default());
     let refused = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {});
@@ -264,6 +265,10 @@ fn shells_get_their_completions() {
     for shell in ["bash", "zsh", "fish"] {
         let (script, _) = folder.fine(&["completions", shell]);
         assert!(script.contains("simulate"), "{shell}");
+        assert!(
+            shell == "bash" || script.contains("Models - Fit"),
+            "{script}"
+        );
     }
 }
 
@@ -294,14 +299,17 @@ fn each_command_has_a_page_in_the_manual_with_what_its_help_says() {
         let path = folder.0.join(format!("pages/of/man1/{name}.1"));
         std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
-    assert!(page("athermal").contains("athermal\\-fit"));
+    let (models, runs) = page("athermal")
+        .split_once(".SH RUN\n")
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
+    assert!(models.contains("athermal\\-fit(1)") && runs.contains("athermal\\-serve(1)"));
     let (help, _) = folder.fine(&["--help"]);
-    let (_, commands) = help.split_once("Commands:\n").unwrap();
-    let commands = commands.lines().take_while(|line| !line.is_empty());
-    let commands = commands.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    let commands: Vec<&str> = commands
-        .filter(|name| !name.is_empty() && *name != "help")
-        .collect();
+    let (_, commands) = help.split_once("\nBegin:\n").unwrap();
+    let (commands, _) = commands.split_once("\nOptions:\n").unwrap();
+    let commands = commands.lines().filter_map(|line| line.strip_prefix("  "));
+    let commands = commands.filter_map(|line| line.split(' ').next());
+    let commands: Vec<&str> = commands.filter(|name| !name.is_empty()).collect();
     assert!(commands.len() > 30, "{commands:?}");
     for command in commands {
         assert!(page(&format!("athermal-{command}")).contains("SYNOPSIS"));

@@ -7,10 +7,11 @@ use athermal as _;
 use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources, codes};
 use athermal::core::document::{Memory, declare, load};
-use athermal::core::node::kinds;
+use athermal::core::node::NodeKind;
+use athermal::core::registry::all;
 use athermal::schema::graph_schema;
 use athermal::trial;
-use athermal_serve::connector::{sink_kinds, source_kinds};
+use athermal_serve::connector::{SinkKind, SourceKind};
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/src/graph-file.md");
@@ -44,18 +45,18 @@ fn schema_of_the_framework() -> Value {
     let mut schema = graph_schema();
     let node = &mut schema["definitions"]["Node"]["then"];
     let types = node["allOf"].as_array_mut().unwrap();
-    assert_eq!(types.len(), kinds().len());
-    for (kind, choice) in kinds().values().zip(types) {
+    assert_eq!(types.len(), all::<NodeKind>().count());
+    for (kind, choice) in all::<NodeKind>().zip(types) {
         let common = ["type", "each", "inputs"];
-        let framework = kind[0].framework_keys();
+        let framework = kind.framework_keys();
         let properties = choice["then"]["properties"].as_object_mut().unwrap();
         properties.retain(|key, _| common.contains(&key.as_str()) || framework.contains(&&**key));
         let ports = properties["inputs"]["properties"].as_object_mut().unwrap();
         let one = ports.values().next().cloned();
         properties["inputs"] = one.unwrap_or_default();
     }
-    let sources = source_kinds().values().map(|kind| (kind.schema)());
-    let sinks = sink_kinds().values().map(|kind| (kind.schema)());
+    let sources = all::<SourceKind>().map(|kind| (kind.schema)());
+    let sinks = all::<SinkKind>().map(|kind| (kind.schema)());
     for (section, kinds) in [
         ("sources", sources.collect::<Vec<_>>()),
         ("sinks", sinks.collect()),

@@ -139,12 +139,12 @@ fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
         (
             "csv",
             "sink",
-            "a sink `csv` already, from athermal-connectors",
+            "a kind of sink `csv` already, from athermal-connectors",
         ),
         (
             "linear-axis",
             "machine",
-            "a machine `linear-axis` already, from athermal-simulation",
+            "a simulated machine `linear-axis` already, from athermal-simulation",
         ),
     ] {
         athermal(&[&"new", &"plugin", &name, &"--role", &role])

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use crate::workbench::{Folder, compiled, graph};
+use athermal::core::registry::find;
 use athermal::run::fit::{FitOptions, fit};
-use athermal::trial::machine::{Individual, Setup, Simulated, machine};
+use athermal::trial::machine::{Individual, KnownMachine, Setup, Simulated};
 use athermal_estimators::Pooling;
 
 /// A prior of five machines, six hours of each.
 fn prior() -> String {
-    let tester = machine("die-tester").unwrap().machine;
+    let tester = find::<KnownMachine>("die-tester").unwrap().machine;
     let text = std::fs::read_to_string(graph("die-tester-fleet")).unwrap();
     let text = text.replace(
         "extends = \"die-tester.toml\"",

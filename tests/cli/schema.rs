@@ -2,7 +2,8 @@
 
 use crate::workbench::{athermal, graph};
 use athermal as _;
-use athermal::core::node::kinds;
+use athermal::core::node::NodeKind;
+use athermal::core::registry::{all, find};
 use athermal::schema::graph_schema;
 use serde_json::Value;
 
@@ -31,12 +32,15 @@ fn every_kind_has_its_keys_behind_its_type() {
         .iter()
         .map(|name| name.as_str().unwrap())
         .collect();
-    assert_eq!(types, kinds().keys().copied().collect::<Vec<_>>());
+    assert_eq!(
+        types,
+        all::<NodeKind>().map(|kind| kind.name).collect::<Vec<_>>()
+    );
     for (nth, name) in types.iter().enumerate() {
         let choice = &node["allOf"][nth];
         assert_eq!(choice["if"]["properties"]["type"]["const"], *name);
         let keys = choice["then"]["properties"].as_object().unwrap();
-        let kind = kinds()[name][0];
+        let kind = find::<NodeKind>(name).unwrap();
         let own = (kind.schema)()["properties"]
             .as_object()
             .into_iter()

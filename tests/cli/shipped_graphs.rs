@@ -3,14 +3,15 @@
 use crate::workbench::{athermal, graphs};
 use std::collections::BTreeMap;
 
-use athermal::core::node::kinds;
+use athermal::core::node::NodeKind;
+use athermal::core::registry::{all, find};
 
 #[test]
 fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
     let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for (name, same) in kinds() {
-        assert_eq!(same.len(), 1, "{name}");
-        found.entry(same[0].package).or_default().push(name);
+    for kind in all::<NodeKind>() {
+        assert!(find::<NodeKind>(kind.name).is_ok(), "{}", kind.name);
+        found.entry(kind.package).or_default().push(kind.name);
     }
     let expected = [
         (
@@ -50,13 +51,13 @@ fn the_program_knows_the_same_kinds_as_the_library() {
         .iter()
         .map(|node| node["name"].as_str().unwrap())
         .collect();
-    let linked: Vec<&str> = kinds().keys().copied().collect();
+    let linked: Vec<&str> = all::<NodeKind>().map(|kind| kind.name).collect();
     assert_eq!(listed, linked);
 }
 
 #[test]
 fn every_kind_explains_itself_and_its_parameters() {
-    for kind in kinds().values().flatten() {
+    for kind in all::<NodeKind>() {
         assert!(kind.summary().len() > 10, "{}", kind.name);
         let schema = (kind.schema)();
         for (name, parameter) in schema["properties"].as_object().into_iter().flatten() {
@@ -100,7 +101,7 @@ fn every_kind_goes_through_the_conformance_kit() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let plugins = std::fs::read_dir(root.join("plugins")).unwrap();
     let folders: Vec<_> = plugins.map(|entry| entry.unwrap().path()).collect();
-    for kind in kinds().values().flatten() {
+    for kind in all::<NodeKind>() {
         let named = format!("name = \"{}\"", kind.package);
         let of_package = |folder: &&std::path::PathBuf| {
             std::fs::read_to_string(folder.join("Cargo.toml"))

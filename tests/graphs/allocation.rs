@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use crate::workbench::graphs;
 use athermal::core::compile::Plan;
-use athermal::core::node::kinds;
+use athermal::core::node::NodeKind;
+use athermal::core::registry::all;
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::Table;
 use athermal::{Duration, Instant, Model};
@@ -89,7 +90,7 @@ fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
         );
     }
     // What stands between a prediction and a motor is shown in full.
-    let of_control = kinds().values().flatten();
+    let of_control = all::<NodeKind>();
     for kind in of_control.filter(|kind| kind.package == "athermal-control") {
         assert!(
             stepped.contains(kind.name),

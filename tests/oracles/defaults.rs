@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use crate::workbench::{Scratch, data, graph};
 use athermal::Model;
-use athermal::core::node::{Kind, RoleName, kinds};
+use athermal::core::node::{Kind, NodeKind, RoleName};
+use athermal::core::registry::all;
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, Outcome, fit};
 use athermal::run::score::{ScoreOptions, score};
@@ -166,10 +167,7 @@ fn node(machine: &Machine, kind: &Kind) -> String {
 
 fn with_defaults() -> Vec<&'static Kind> {
     let predicts = |kind: &&Kind| matches!(kind.role, RoleName::Estimator | RoleName::Combiner);
-    kinds()
-        .values()
-        .flatten()
-        .copied()
+    all::<NodeKind>()
         .filter(|kind| predicts(kind) && !LEFT_OUT.contains(&kind.name))
         .collect()
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fitted;
+use athermal::core::registry::find;
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Recording, Table};
 use athermal::run::score::{TruthTrace, trace};
-use athermal::trial::machine::{Individual, Setup, Simulated, machine};
+use athermal::trial::machine::{Individual, KnownMachine, Setup, Simulated};
 use athermal_estimators::Pooling;
 
 use crate::workbench::{Scratch, compiled, graph};
@@ -29,7 +30,7 @@ fn days(days: f64, of: u64, seed: u64) -> Simulated<'static> {
         },
         ..Setup::default()
     };
-    Simulated::new(machine("die-tester").unwrap().machine, setup)
+    Simulated::new(find::<KnownMachine>("die-tester").unwrap().machine, setup)
 }
 
 /// The graph of the fleet, whose estimators have these keys of their solver.

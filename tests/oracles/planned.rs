@@ -5,10 +5,11 @@ use std::sync::Arc;
 use crate::workbench::{Scratch, compiled, graph, simulated};
 use athermal::Engine;
 use athermal::core::compile::Plan;
+use athermal::core::registry::find;
 use athermal::files::{Dataset, Options};
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Recording, Table};
-use athermal::trial::machine::{Setup, Simulated, machine};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 
 /// The days of a simulation of the die tester, with other weather for another seed.
 fn days(days: f64, seed: u64) -> Simulated<'static> {
@@ -17,7 +18,7 @@ fn days(days: f64, seed: u64) -> Simulated<'static> {
         seed,
         ..Setup::default()
     };
-    Simulated::new(machine("die-tester").unwrap().machine, setup)
+    Simulated::new(find::<KnownMachine>("die-tester").unwrap().machine, setup)
 }
 
 fn plan() -> Arc<Plan> {
@@ -121,7 +122,7 @@ fn a_recipe_from_a_file_gives_the_bits_of_one_that_is_simulated() {
         seed: 3,
         ..Setup::default()
     };
-    let tester = machine("die-tester").unwrap().machine;
+    let tester = find::<KnownMachine>("die-tester").unwrap().machine;
     let recipe = athermal_simulation::write_set_points(tester, &setup);
     let files = [
         simulated(&scratch, "days.csv", "die-tester", 0.5, 3),

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use crate::workbench::{Read, graph};
 use athermal::Engine;
 use athermal::core::prng::Prng;
+use athermal::core::registry::find;
 use athermal::run::fit::{FitOptions, fit};
 use athermal::run::recording::{Event, Table};
-use athermal::trial::machine::{Setup, Simulated, machine};
+use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 use athermal_simulation::{Disturbance, disturbed};
 
 const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
@@ -83,7 +84,7 @@ fn in_two_hours_of_a_random_world_the_virtual_sensor_is_hardly_worse_than_no_mod
         place.unwrap_or_else(|| panic!("there is no output {name}"))
     };
     let places = AXES.map(|axis| ["drift", "predicted"].map(|of| place(format!("{of}.{axis}"))));
-    let tester = machine("die-tester").unwrap().machine;
+    let tester = find::<KnownMachine>("die-tester").unwrap().machine;
     let week = Simulated::new(tester, Setup::default());
     let fitted = fit(&plan, &week, &FitOptions::default(), &mut |_| {})
         .unwrap()

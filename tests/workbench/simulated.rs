@@ -8,7 +8,7 @@ use super::Scratch;
 
 /// Writes so many days of a machine as a CSV file.
 pub fn simulated(scratch: &Scratch, name: &str, machine: &str, days: f64, seed: u64) -> PathBuf {
-    let machine = athermal::trial::machine::machine(machine)
+    let machine = athermal::core::registry::find::<athermal::trial::machine::KnownMachine>(machine)
         .expect("a machine of that name is built in")
         .machine;
     let setup = Setup {

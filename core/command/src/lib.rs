@@ -4,7 +4,7 @@
 //! [`register_command!`], and it stands among the others:
 //!
 //! ```
-//! use athermal_command::{Answer, Command, Failure, Terminal, println};
+//! use athermal_command::{Answer, Command, Failure, Group, Terminal, println};
 //! use clap::Args;
 //!
 //! /// Say how many windows a period has
@@ -15,6 +15,8 @@
 //! }
 //!
 //! impl Command for Windows {
+//!     const GROUP: Group = Group::Look;
+//!
 //!     fn run(&self, _: &Terminal) -> Result<Answer, Failure> {
 //!         println!("{}", self.minutes / 5);
 //!         Ok(Answer::Fine)
@@ -22,11 +24,10 @@
 //! }
 //!
 //! athermal_command::register_command!(Windows, "windows");
-//! # let matches = athermal_command::kind("windows").map(|kind| (kind.declare)().try_get_matches_from(["windows", "15"]));
-//! # assert!(matches.is_some_and(|matches| matches.is_ok()));
+//! # let kind = athermal_core::registry::find::<athermal_command::CommandKind>("windows").expect("it is registered");
+//! # assert!((kind.declare)().try_get_matches_from(["windows", "15"]).is_ok());
 //! ```
 
-pub mod collect;
 pub mod numbers;
 #[macro_use]
 pub mod output;
@@ -35,11 +36,11 @@ pub mod terminal;
 
 pub use athermal_core::message::{self, Message};
 pub use athermal_run::live::monitor::words as findings;
-pub use registry::{Command, CommandKind, declare, kind, kinds, run};
+pub use registry::{Command, CommandKind, Group, declare, run};
 pub use terminal::{Answer, Failure, Format, Terminal};
 
 /// What the macros of this crate use.
 #[doc(hidden)]
 pub mod __private {
-    pub use inventory;
+    pub use athermal_core::__private::{list, no_schema};
 }

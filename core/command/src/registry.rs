@@ -1,14 +1,60 @@
 //! Commands that crates bring.
 
-use std::collections::BTreeMap;
-use std::sync::OnceLock;
-
+use athermal_core::registry::Sort;
 use clap::{ArgMatches, Args};
 
 use crate::terminal::{Answer, Failure, Terminal};
 
+/// Where a command stands among others: what it is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Group {
+    /// The first steps with a log.
+    Begin,
+    /// From a graph to a model, and what it is worth.
+    Model,
+    /// What a graph, a model or a program has.
+    Look,
+    /// Rows in, predictions out.
+    Run,
+    /// A service at work.
+    Service,
+    /// Many machines.
+    Fleet,
+    /// What others make use of: files for controllers, editors and shells, plugin crates.
+    Make,
+}
+
+impl Group {
+    /// All of them, in order.
+    pub const ALL: [Self; 7] = [
+        Self::Begin,
+        Self::Model,
+        Self::Look,
+        Self::Run,
+        Self::Service,
+        Self::Fleet,
+        Self::Make,
+    ];
+
+    /// What stands above its commands.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Begin => "Begin",
+            Self::Model => "Models",
+            Self::Look => "Look",
+            Self::Run => "Run",
+            Self::Service => "Services",
+            Self::Fleet => "Fleets",
+            Self::Make => "Make",
+        }
+    }
+}
+
 /// A command. Its doc comment is what `--help` shows.
 pub trait Command: Args {
+    /// Where it stands among others.
+    const GROUP: Group;
     /// Whether reports beside the result are events for programs under `--format json`, as where the result is rows.
     const WRITES_EVENTS: bool = false;
 
@@ -19,36 +65,22 @@ pub trait Command: Args {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure>;
 }
 
-/// A command, as registered.
+/// A command, by its name on the command line.
 #[derive(Debug)]
 pub struct CommandKind {
-    /// What a command line says.
-    pub name: &'static str,
-    /// The crate that brings it.
-    pub package: &'static str,
     /// Its arguments and their help.
     pub declare: fn() -> clap::Command,
+    /// Where it stands among others.
+    pub group: Group,
     /// Does what was asked for.
     pub run: fn(&ArgMatches, &Terminal) -> Result<Answer, Failure>,
     /// Whether reports beside the result are events for programs.
     pub writes_events: bool,
 }
 
-inventory::collect!(CommandKind);
-
-/// All commands that crates bring, by name.
-pub fn kinds() -> &'static BTreeMap<&'static str, &'static CommandKind> {
-    static KINDS: OnceLock<BTreeMap<&'static str, &'static CommandKind>> = OnceLock::new();
-    KINDS.get_or_init(|| {
-        let all = inventory::iter::<CommandKind>.into_iter();
-        all.map(|kind| (kind.name, kind)).collect()
-    })
-}
-
-/// The command of a name, if a crate brings it.
-#[must_use]
-pub fn kind(name: &str) -> Option<&'static CommandKind> {
-    kinds().get(name).copied()
+impl Sort for CommandKind {
+    const ONE: &'static str = "command";
+    const MANY: &'static str = "commands";
 }
 
 /// The arguments of a command; [`register_command!`](crate::register_command) makes use of it.
@@ -70,14 +102,16 @@ pub fn run<C: Command>(matches: &ArgMatches, terminal: &Terminal) -> Result<Answ
 #[macro_export]
 macro_rules! register_command {
     ($command:ty, $name:literal) => {
-        $crate::__private::inventory::submit! {
+        $crate::__private::list!(
+            $crate::CommandKind,
+            $name,
+            $crate::__private::no_schema,
             $crate::CommandKind {
-                name: $name,
-                package: env!("CARGO_PKG_NAME"),
                 declare: || $crate::declare::<$command>($name),
+                group: <$command as $crate::Command>::GROUP,
                 run: $crate::run::<$command>,
                 writes_events: <$command as $crate::Command>::WRITES_EVENTS,
             }
-        }
+        );
     };
 }

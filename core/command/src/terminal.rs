@@ -5,19 +5,15 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use athermal_core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
+use athermal_core::diagnostic::{Diagnostics, Sources};
+pub use athermal_core::failure::{Failure, outside, status_of};
 use athermal_core::figures::counted;
-use athermal_files::FileError;
-use athermal_run::fit::FitError;
-use athermal_run::live::{RunError, StateError};
-use athermal_run::model::ModelError;
-use athermal_trial::fault::FaultError;
+use athermal_core::watch::{Progress, Watch};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::Value;
 
-use crate::collect::{self, Collected, ProgressListener};
 use crate::message::Message;
 
 /// Options that every command takes.
@@ -97,15 +93,6 @@ impl Terminal {
         }
     }
 
-    /// Shows a report that was collected.
-    pub fn pass_on(&self, report: &Collected) {
-        match report.level {
-            "note" => self.note(report.message.clone()),
-            "warning" => self.warning(report.message.clone()),
-            level => self.write(level, Some("\x1b[1;31m"), &report.message),
-        }
-    }
-
     /// Reports why the program gives up.
     pub fn error(&self, failure: &Failure) {
         match failure {
@@ -162,45 +149,12 @@ impl Terminal {
                 self.print(message.line(text("severity")));
             }
         } else if !diagnostics.is_empty() {
-            let plain = diagnostics.render(sources, false, 100);
-            if !collect::take("warning", &Message::from(plain.trim_end())) {
-                self.print(diagnostics.render(sources, self.colour, 100).trim_end());
-            }
-        }
-    }
-
-    /// Shows how many ticks a longer piece of work has stepped.
-    #[must_use]
-    pub fn progress(&self, what: &'static str) -> Progress {
-        let template = "{msg}: {human_pos} ticks";
-        self.progress_as(ProgressBar::no_length(), template, what)
-    }
-
-    /// Shows how far a longer piece of work has come, as a bar.
-    #[must_use]
-    pub fn progress_to(&self, what: &'static str, total: u64) -> Progress {
-        let template = "{msg} {bar:24} {percent:>3} %, {eta} left";
-        self.progress_as(ProgressBar::new(total), template, what)
-    }
-
-    fn progress_as(&self, bar: ProgressBar, template: &str, what: &'static str) -> Progress {
-        bar.set_draw_target(ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        bar.set_message(what);
-        Progress {
-            bar,
-            waits: std::io::stderr().is_terminal() && !self.quiet,
-            listener: collect::progress(),
+            self.print(diagnostics.render(sources, self.colour, 100).trim_end());
         }
     }
 
     /// Writes an event for programs or a line for people, with a label of this colour where it is graver than a note.
     fn write(&self, level: &'static str, colour: Option<&str>, message: &Message) {
-        if collect::take(level, message) {
-            return;
-        }
         if let Some(to) = &*diversion() {
             return to(level, message);
         }
@@ -249,35 +203,59 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
         })
 }
 
+impl Watch for Terminal {
+    fn remark(&self, level: &'static str, message: Message) {
+        match level {
+            "note" => self.note(message),
+            "warning" => self.warning(message),
+            level => self.write(level, Some("\x1b[1;31m"), &message),
+        }
+    }
+
+    fn begin(&self, what: &str, total: Option<u64>) -> Box<dyn Progress> {
+        let (bar, template) = match total {
+            None => (ProgressBar::no_length(), "{msg}: {human_pos} ticks"),
+            Some(total) => (
+                ProgressBar::new(total),
+                "{msg} {bar:24} {percent:>3} %, {eta} left",
+            ),
+        };
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what.to_owned());
+        let waits = std::io::stderr().is_terminal() && !self.quiet;
+        Box::new(Bar { bar, waits })
+    }
+
+    fn doubts(&self, diagnostics: &Diagnostics, sources: &Sources) {
+        Self::doubts(self, diagnostics, sources);
+    }
+}
+
 /// A line on standard error that shows how far the work has come, once it takes a second.
-pub struct Progress {
+struct Bar {
     bar: ProgressBar,
     /// Whether the line waits for the second to pass.
     waits: bool,
-    /// Who takes it instead, where somebody does.
-    listener: Option<ProgressListener>,
 }
 
-impl Progress {
-    /// Shows how many have been done so far.
-    pub fn set(&mut self, done: u64) {
+impl Progress for Bar {
+    fn set(&mut self, done: u64) {
         self.bar.set_position(done);
-        if let Some(listener) = &self.listener {
-            return listener(&self.bar.message(), done, self.bar.length());
-        }
         if self.waits && self.bar.elapsed() >= Duration::from_secs(1) {
             self.waits = false;
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
     }
 
-    /// From here on the work is called so.
-    pub fn doing(&mut self, what: String) {
+    fn doing(&mut self, what: String) {
         self.bar.set_message(what);
     }
 }
 
-impl Drop for Progress {
+impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
@@ -299,123 +277,6 @@ impl Answer {
         match self {
             Self::Fine => 0,
             Self::No => 1,
-        }
-    }
-}
-
-/// Why a command could not do its work.
-#[derive(Debug)]
-pub enum Failure {
-    /// What was asked for makes no sense.
-    Request(String),
-    /// A graph has mistakes.
-    Graph {
-        /// The mistakes.
-        diagnostics: Box<Diagnostics>,
-        /// The texts that they point into.
-        sources: Box<Sources>,
-    },
-    /// Something outside did not work.
-    Outside(String),
-    /// It was reported before; the program ends with this status.
-    Exit(u8),
-}
-
-impl Failure {
-    /// The exit status: 2 where the request was wrong, 3 where something outside failed.
-    #[must_use]
-    pub fn status(&self) -> u8 {
-        match self {
-            Self::Request(_) => 2,
-            Self::Graph { diagnostics, .. } => status_of(diagnostics),
-            Self::Outside(_) => 3,
-            Self::Exit(code) => *code,
-        }
-    }
-}
-
-/// The exit status of mistakes: 3 where the only ones are files of the command line that cannot be read, else 2.
-#[must_use]
-pub fn status_of(mistakes: &Diagnostics) -> u8 {
-    let is_unread = |of: &Diagnostic| of.code == UNREADABLE && of.place.is_none();
-    let mut errors = mistakes.iter().filter(|of| of.severity == Severity::Error);
-    if errors.all(is_unread) { 3 } else { 2 }
-}
-
-/// A file that cannot be read; one that another names has a place.
-const UNREADABLE: &str = "A002";
-
-impl From<ModelError> for Failure {
-    fn from(error: ModelError) -> Self {
-        match error {
-            ModelError::Graph {
-                diagnostics,
-                sources,
-            } => Self::Graph {
-                diagnostics,
-                sources,
-            },
-            ModelError::Unreadable { .. } => Self::Outside(error.to_string()),
-            other => Self::Request(other.to_string()),
-        }
-    }
-}
-
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        if error.is_closed_pipe() {
-            // Whoever read our output has seen enough.
-            return Self::Exit(0);
-        }
-        match error {
-            FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {
-                Self::Outside(error.to_string())
-            }
-            other => Self::Request(other.to_string()),
-        }
-    }
-}
-
-impl From<RunError> for Failure {
-    fn from(error: RunError) -> Self {
-        match error {
-            RunError::Source(error) | RunError::Sink(error) => outside(error),
-            RunError::State(error) => error.into(),
-            RunError::Engine(_) | RunError::Stage(_) | RunError::Copy(_) => {
-                Self::Request(error.to_string())
-            }
-        }
-    }
-}
-
-impl From<StateError> for Failure {
-    fn from(error: StateError) -> Self {
-        match error {
-            StateError::Foreign { .. } => Self::Request(error.to_string()),
-            StateError::Held { path } => Self::Outside(format!(
-                "{}: another run keeps its state there: end that one first, or name another file with `--state`",
-                path.display()
-            )),
-            other => Self::Outside(other.to_string()),
-        }
-    }
-}
-
-/// The failure of a source, a sink or a recording.
-pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
-    match error.downcast::<FileError>() {
-        Ok(error) => (*error).into(),
-        Err(error) if error.is::<FaultError>() => Failure::Request(error.to_string()),
-        Err(error) => Failure::Outside(error.to_string()),
-    }
-}
-
-impl From<FitError> for Failure {
-    fn from(error: FitError) -> Self {
-        match error {
-            FitError::Recording(error) => outside(error),
-            FitError::Engine(_) | FitError::Blocks(_) => Self::Request(error.to_string()),
-            FitError::Panicked { .. } => Self::Outside(error.to_string()),
         }
     }
 }

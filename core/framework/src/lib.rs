@@ -126,15 +126,15 @@ mod tests;
 
 // The vocabulary that a graph is written in; authors of nodes need one crate.
 pub use athermal_graph::{
-    channel, diagnostic, document, event, events, figures, message, quantity, time, unit,
+    channel, diagnostic, document, event, events, failure, figures, lacks, message, quantity,
+    register_error, registry, time, unit, watch,
 };
-
-#[doc(hidden)]
-pub use inventory;
 
 /// What [`register!`], [`state!`] and [`predictor!`] need at their place of use.
 #[doc(hidden)]
 pub mod __private {
     pub use crate::node::read;
+    pub use athermal_graph::registry::no_schema;
+    pub use athermal_graph::{list, schema_of};
     pub use {rmp_serde, schemars, serde_json, typetag};
 }

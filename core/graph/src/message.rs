@@ -40,6 +40,13 @@ impl Message {
         Self::new(name, Value::Object(facts.collect()), words)
     }
 
+    /// The same in other words.
+    #[must_use]
+    pub fn reworded(mut self, words: impl FnOnce(&str) -> String) -> Self {
+        self.words = words(&self.words);
+        self
+    }
+
     /// It counts for so many.
     #[must_use]
     pub fn counting(mut self, count: u64) -> Self {

@@ -9,6 +9,7 @@
 //! | [`fit`], [`score`] | training the nodes of a graph, and judging what they predict |
 //! | [`live`] | sources, sinks, running from one to the other; replacing a graph while it runs |
 
+mod failure;
 pub mod fit;
 pub mod live;
 pub mod model;

@@ -10,6 +10,7 @@ use crate::connector::ConnectorError;
 use crate::deployment::read_keys;
 use crate::diagnostic::Diagnostics;
 use crate::document::Value;
+use crate::registry::Sort;
 use crate::service::ServiceHandle;
 
 /// What runs beside a service: the parameters of one, as a machine file gives them.
@@ -34,25 +35,18 @@ pub struct Beside {
     pub handle: ServiceHandle,
 }
 
-/// A kind of companion, as registered.
+/// A kind of companion, by the name of the section of a machine file that is read for it, or `""`. Without the section it runs with what
+/// that has by default.
 #[derive(Debug)]
 pub struct CompanionKind {
-    /// The section of a machine file that is read for it, or `""`. Without the section it runs with what that has by default.
-    pub section: &'static str,
     /// Reads the section, or reports its mistakes.
     #[allow(clippy::type_complexity)] // it is this once
     pub read: fn(Option<&Value>, &str, &mut Diagnostics) -> Option<Box<dyn Companion>>,
-    /// The JSON Schema of the section.
-    pub schema: fn() -> serde_json::Value,
 }
 
-inventory::collect!(CompanionKind);
-
-/// All kinds of companions in this program.
-pub fn companion_kinds() -> impl Iterator<Item = &'static CompanionKind> {
-    let mut kinds: Vec<_> = inventory::iter::<CompanionKind>.into_iter().collect();
-    kinds.sort_by_key(|kind| kind.section);
-    kinds.into_iter()
+impl Sort for CompanionKind {
+    const ONE: &'static str = "section";
+    const MANY: &'static str = "sections";
 }
 
 /// Reads the section of a companion; [`register_companion!`](crate::register_companion) makes use of it.
@@ -74,15 +68,19 @@ pub fn read_companion<T: Companion + Default + DeserializeOwned + JsonSchema + '
 #[macro_export]
 macro_rules! register_companion {
     ($spec:ty, $section:literal) => {
-        $crate::__private::inventory::submit! {
-            $crate::__private::Section($section)
-        }
-        $crate::__private::inventory::submit! {
+        $crate::__private::list!(
+            $crate::__private::Section,
+            $section,
+            $crate::__private::no_schema,
+            $crate::__private::Section
+        );
+        $crate::__private::list!(
+            $crate::companion::CompanionKind,
+            $section,
+            $crate::__private::schema_of!($spec),
             $crate::companion::CompanionKind {
-                section: $section,
-                read: $crate::companion::read_companion::<$spec>,
-                schema: || $crate::__private::schemars::schema_for!($spec).into(),
+                read: $crate::companion::read_companion::<$spec>
             }
-        }
+        );
     };
 }

@@ -54,8 +54,8 @@ pub mod testkit;
 
 // The layers below, by the names that they have for everybody.
 use athermal_core::{
-    channel, compile, diagnostic, document, engine, event, figures, message, node, quantity, time,
-    unit,
+    channel, compile, diagnostic, document, engine, event, figures, message, node, quantity,
+    registry, time, unit,
 };
 pub use athermal_run::live::sequencer;
 
@@ -66,5 +66,6 @@ mod tests;
 #[doc(hidden)]
 pub mod __private {
     pub use super::document::Section;
-    pub use {inventory, schemars, serde_json};
+    pub use athermal_core::__private::{list, no_schema, schema_of};
+    pub use inventory;
 }

@@ -4,8 +4,9 @@ use super::Case;
 use super::fixture::Fixture;
 use crate::engine::{Engine, Fitted};
 use crate::fit::{FitOptions, Outcome, fit};
-use crate::node::{Kind, NodeSpec, kind};
+use crate::node::{Kind, NodeKind, NodeSpec};
 use crate::recording::Table;
+use crate::registry::all;
 use crate::time::Instant;
 
 /// A node in a graph of its own, fed by hand and stepped by the real engine.
@@ -60,7 +61,9 @@ impl Bench {
             .and_then(|parameters| parameters.as_table().cloned())
             .unwrap_or_else(|| panic!("{written} are no parameters"));
         Self {
-            kind: kind(T::kind_name()).expect("a type with a specification is registered"),
+            kind: all::<NodeKind>()
+                .find(|kind| kind.name == T::kind_name())
+                .expect("a type with a specification is registered"),
             parameters,
             case: Case::new(""),
             running: None,

@@ -80,7 +80,9 @@ pub mod __private {
 }
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{channel, compile, diagnostic, document, engine, node, prng, time, unit};
+use athermal_core::{
+    channel, compile, diagnostic, document, engine, node, prng, registry, time, unit,
+};
 use athermal_run::{fit, model, recording};
 
 inventory::collect!(Examined);

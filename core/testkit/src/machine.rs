@@ -5,9 +5,10 @@ use std::fmt;
 use super::compared::{none_of, same_bits};
 use super::tried::{PANICS, tried};
 use crate::document::is_name;
+use crate::registry::{NotFound, all, find};
 use crate::unit::Unit;
 use athermal_trial::machine::{
-    Channel, LONGEST_DAYS, Machine, Row, Schedule, Setup, SetupError, Simulation, machines,
+    Channel, KnownMachine, LONGEST_DAYS, Machine, Row, Schedule, Setup, SetupError, Simulation,
 };
 
 /// How many days of a machine are looked at.
@@ -115,8 +116,8 @@ pub fn broken_machine(machine: &dyn Machine) -> Vec<BrokenMachine> {
 /// # Panics
 /// Where a rule is broken, or there is no machine of the crate.
 pub fn assert_every_machine_conforms(package: &str) {
-    let all = machines().values().flatten();
-    let own: Vec<_> = all.filter(|known| known.package == package).collect();
+    let own = all::<KnownMachine>().filter(|known| known.package == package);
+    let own: Vec<_> = own.collect();
     assert!(
         !own.is_empty(),
         "{package} registers no machine that this test program links"
@@ -141,9 +142,9 @@ fn described(machine: &dyn Machine) -> Result<(), String> {
             found.push(text());
         }
     };
-    let same = machines().get(machine.name()).map_or(0, Vec::len);
-    check(same > 1, &|| {
-        "the name of the machine is taken twice".to_owned()
+    let unknown = find::<KnownMachine>(machine.name()).err();
+    check(unknown.is_some(), &|| {
+        unknown.as_ref().map_or_else(String::new, NotFound::message)
     });
     let summary = machine.summary();
     check(summary.len() < WORDS, &|| {

@@ -7,7 +7,8 @@ use super::derived;
 use super::rules::{self, Subject};
 use super::tried::{PANICS, tried};
 use super::{Case, Examined, Rule};
-use crate::node::{Kind, NodeSpec, kind, kinds};
+use crate::node::{Kind, NodeKind, NodeSpec};
+use crate::registry::all;
 
 /// A rule that a kind breaks.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,7 +44,8 @@ fn indented(text: &str) -> String {
 #[must_use]
 pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     let name = T::kind_name();
-    let kind = kind(name).expect("a type with a specification is registered");
+    let kind = all::<NodeKind>().find(|kind| kind.name == name);
+    let kind = kind.expect("a type with a specification is registered");
     let in_all = |rule, found: Vec<String>| -> Vec<Broken> {
         let each = |found| broken_in(rule, None, found);
         found.into_iter().map(each).collect()
@@ -124,13 +126,8 @@ pub fn assert_conforms<T: NodeSpec>(cases: &[Case]) {
 /// # Panics
 /// Where there is such a kind, or none at all.
 pub fn assert_every_kind_conforms(package: &str) {
-    let of_package = |kind: &&&Kind| kind.package == package;
-    let registered: BTreeSet<&str> = kinds()
-        .values()
-        .flatten()
-        .filter(of_package)
-        .map(|kind| kind.name)
-        .collect();
+    let of_package = all::<NodeKind>().filter(|kind| kind.package == package);
+    let registered: BTreeSet<&str> = of_package.map(|kind| kind.name).collect();
     let examined: BTreeSet<&str> = inventory::iter::<Examined>()
         .map(|examined| (examined.kind)())
         .collect();

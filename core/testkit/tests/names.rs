@@ -6,9 +6,10 @@
 use std::sync::LazyLock;
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Kind, Mistake, Operator, OutputPort, Outputs, RoleName, Tick,
-    Written, WrittenName,
+    Feature, InputPort, Inputs, Mistake, NodeKind, Operator, OutputPort, Outputs, RoleName,
+    StateForm, Tick,
 };
+use athermal_core::registry::{Listed, Registered};
 use athermal_testkit::{Case, broken};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -70,25 +71,38 @@ athermal_core::register!(Twin, Feature, "twin");
 athermal_core::state!(Kept, "kept/1");
 
 // As `state!` and `register!` of another crate would.
-athermal_core::inventory::submit! {
-    WrittenName { of: Written::State, name: "kept/1", package: "keepers", version: "0.3.1" }
-}
-
-athermal_core::inventory::submit! {
-    Kind {
-        name: "twin",
-        role: RoleName::Feature,
+const fn of_others<T>(name: &'static str, item: T) -> Registered<T> {
+    Registered {
+        name,
         package: "keepers",
         version: "0.3.1",
-        ports: || &[],
-        inputs: Keeper::inputs,
-        read: athermal_core::node::read::<Keeper>,
         schema: || {
             static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Keeper).into());
             &SCHEMA
         },
+        item,
     }
 }
+
+static KEPT: Registered<StateForm> = of_others(
+    "kept/1",
+    StateForm {
+        read: |_| unreachable!(),
+    },
+);
+static TWIN: Registered<NodeKind> = of_others(
+    "twin",
+    NodeKind {
+        role: RoleName::Feature,
+        ports: || &[],
+        inputs: Keeper::inputs,
+        facts: Keeper::facts,
+        read: athermal_core::node::read::<Keeper>,
+    },
+);
+
+athermal_testkit::inventory::submit! { Listed(&KEPT) }
+athermal_testkit::inventory::submit! { Listed(&TWIN) }
 
 #[test]
 fn a_graph_is_told_which_crates_took_the_name() {
@@ -104,13 +118,13 @@ fn a_graph_is_told_which_crates_took_the_name() {
     let told = told.map(|_| ()).map_err(|error| error.to_string());
     assert_eq!(
         told.unwrap_err(),
-        r#"error[A041]: `keeper` cannot be used, since the name of the state `kept/1` is taken twice, by `athermal-testkit`, `keepers`
+        r#"error[A041]: `keeper` cannot be used, since the state `kept/1` is brought by several crates: `athermal-testkit`, `keepers`
  --> model.json:1:1
   |
 1 | {"athermal_model": 1, "card": null, "fitted": {}, "graph": {
   | ^ which of them?
   |
-  = help: give one of them another name in its `state!`, or leave one of the crates out when the program is built
+  = help: leave one of the crates out when the program is built, or rename what one of them brings
 "#
     );
 }
@@ -124,7 +138,7 @@ fn the_kit_says_so_before_anything_else() {
     assert_eq!(
         told,
         [
-            "names: the name of the state `kept/1` is taken twice, by `athermal-testkit` and `keepers`\n  to do: take another name, and \
+            "names: the state `kept/1` is brought by several crates: `athermal-testkit`, `keepers`\n  to do: take another name, and \
           begin those of states and predictors with that of the kind: all crates of a program share them. Ports and kinds are a \
           letter, then letters, digits, `_` and `-`; a feature of several output ports declares them in `ports`"
         ]
@@ -136,6 +150,6 @@ fn a_kind_of_two_crates_is_told_by_both() {
     let told = broken::<Twin>(&[Case::new("")]);
     assert_eq!(
         told[0].found,
-        "the name of the kind `twin` is taken twice, by `athermal-testkit` and `keepers`"
+        "the node type `twin` is brought by several crates: `athermal-testkit`, `keepers`"
     );
 }

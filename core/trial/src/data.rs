@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::machine::{Schedule, Setup, Simulated, UnknownMachine, machine};
+use crate::machine::{KnownMachine, Schedule, Setup, Simulated};
 use crate::recording::Recording;
+use crate::registry::{NotFound, find};
 
 /// Data that can be read as often as needed.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,14 +33,14 @@ impl Simulation {
     ///
     /// # Errors
     /// There is no such machine, which declaring a test has made sure of.
-    pub fn recording(&self) -> Result<Box<dyn Recording>, UnknownMachine> {
+    pub fn recording(&self) -> Result<Box<dyn Recording>, NotFound> {
         let setup = Setup {
             days: self.days,
             seed: self.seed,
             schedule: self.schedule.clone(),
             ..Setup::default()
         };
-        let machine = machine(self.machine)?.machine;
+        let machine = find::<KnownMachine>(self.machine)?.machine;
         Ok(Box::new(Simulated::new(machine, setup)))
     }
 }

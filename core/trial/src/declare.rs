@@ -18,7 +18,8 @@ use crate::document::{
     Data, FileReader, GraphFile, Hint, Table, Value, decode, is_misspelt, known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
-use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine, plans};
+use crate::machine::{KnownMachine, LONGEST_DAYS, Machine, Schedule, plans};
+use crate::registry::find;
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -272,13 +273,12 @@ impl Declaring<'_> {
             let found = table.days.to_string();
             self.range(value, "days", found, "above 0 and at most 3653");
         }
-        let known = match machine(&table.simulate) {
-            Ok(known) => known,
-            Err(unknown) => {
-                self.diagnostics.report(place, unknown_machine(unknown));
-                return None;
-            }
-        };
+        let known = find::<KnownMachine>(&table.simulate);
+        let known = known.map_err(|why| {
+            self.diagnostics
+                .report(place, problem::UnknownMachine { why });
+        });
+        let known = known.ok()?;
         // What one lacks is lacking in every test that simulates it, and reported once.
         if self.compared.insert(known.machine.name()) {
             let test = self.diagnostics.scope(None);
@@ -523,19 +523,6 @@ impl Declaring<'_> {
             allowed,
         };
         self.diagnostics.report(value.place_of(key), problem);
-    }
-}
-
-fn unknown_machine(unknown: UnknownMachine) -> Box<dyn Problem> {
-    match unknown {
-        UnknownMachine::None { name, known, .. } => Box::new(problem::UnknownMachine {
-            machine: name,
-            known,
-        }),
-        UnknownMachine::Several { name, packages } => Box::new(problem::MachineTwice {
-            machine: name,
-            packages,
-        }),
     }
 }
 

@@ -33,8 +33,13 @@ pub use series::{Curve, Series, Shape, Synthetic};
 pub use table::TestTable;
 
 // The layers below, by the names that they have for everybody.
-use athermal_core::{compile, diagnostic, document, engine, node, prng, quantity, time, unit};
+use athermal_core::{
+    compile, diagnostic, document, engine, failure, node, prng, quantity, registry, time, unit,
+};
 use athermal_run::{fit, recording, score};
 
+/// What macros of this crate make use of.
 #[doc(hidden)]
-pub use inventory;
+pub mod __private {
+    pub use athermal_core::__private::{list, no_schema};
+}

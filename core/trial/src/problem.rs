@@ -1,6 +1,6 @@
 //! What can be wrong with a test before it is run.
 
-use crate::diagnostic::{Code, Place, Problem, names, nearest, problem};
+use crate::diagnostic::{Code, Place, Problem, names, problem};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
 use crate::unit::Unit;
@@ -47,23 +47,12 @@ problem! {
 
 problem! {
     /// A machine that cannot be simulated.
-    A073 UnknownMachine { machine: String, known: Vec<&'static str> }
+    A073 UnknownMachine { why: crate::registry::NotFound }
     error: "unknown machine",
     explanation: "`simulate` names a machine that no linked crate brings.",
-    message: format!("there is no simulated machine `{machine}`"),
-    label: "no such machine",
-    help: match nearest(machine, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("there are {}", names(known)),
-    },
-}
-
-problem! {
-    /// A machine that several crates bring.
-    A073 MachineTwice { machine: String, packages: Vec<&'static str> }
-    message: format!("the machine `{machine}` is in {}", packages.join(" and in ")),
-    label: "which of them?",
-    help: "leave one of these crates out of the program, or rename its machine",
+    message: why.message(),
+    label: if why.is_twice() { "which of them?" } else { "no such machine" },
+    help: why.help(),
 }
 
 problem! {

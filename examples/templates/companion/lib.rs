@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration as Wait;
 
+use athermal_command::{Answer, Command, Failure, Group, Terminal, register_command};
 use athermal_core::events;
 use athermal_core::time::Duration;
 use athermal_http::{Asked, Gives, Refused, Reply, mount};
@@ -16,6 +17,7 @@ use athermal_serve::connector::{ConnectorError, Stop};
 use athermal_serve::facts::{Look, OutputsFacts, State, StatusFacts};
 use athermal_serve::service::{Service, ServiceEvent};
 use athermal_serve::{facts, register_companion, register_events, register_facts};
+use clap::Args;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -116,3 +118,18 @@ mount!(
     Gives::Text(HTML),
     page
 );
+
+/// Show how often a service is looked at, where its file does not say so
+#[derive(Debug, Args)]
+struct Often {}
+
+impl Command for Often {
+    const GROUP: Group = Group::Service;
+
+    fn run(&self, _: &Terminal) -> Result<Answer, Failure> {
+        athermal_command::println!("every {}", MyNode::default().every);
+        Ok(Answer::Fine)
+    }
+}
+
+register_command!(Often, "my-node");

@@ -80,7 +80,7 @@ impl Machine for MyNode {
     }
 }
 
-athermal_trial::register_machine!(MyNode);
+athermal_trial::register_machine!(MyNode, "my-node");
 
 /// The machine as it runs.
 struct Warming {

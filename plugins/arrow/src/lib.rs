@@ -21,26 +21,32 @@ pub use sink::ParquetSink;
 
 use athermal_files::{FileKind, register_file_kind};
 
-register_file_kind!(FileKind {
-    name: "Parquet",
-    endings: &["parquet", "pq"],
-    mark: b"PAR1",
-    open: file::parquet,
-    create: Some(parquet_sink::create),
-});
+register_file_kind!(
+    "Parquet",
+    FileKind {
+        endings: &["parquet", "pq"],
+        mark: b"PAR1",
+        open: file::parquet,
+        create: Some(parquet_sink::create),
+    }
+);
 
-register_file_kind!(FileKind {
-    name: "Arrow",
-    endings: &["arrow", "feather", "ipc"],
-    mark: b"ARROW1",
-    open: file::arrow,
-    create: None,
-});
+register_file_kind!(
+    "Arrow",
+    FileKind {
+        endings: &["arrow", "feather", "ipc"],
+        mark: b"ARROW1",
+        open: file::arrow,
+        create: None,
+    }
+);
 
-register_file_kind!(FileKind {
-    name: "a stream of Arrow",
-    endings: &["arrows"],
-    mark: &[0xff, 0xff, 0xff, 0xff],
-    open: file::arrow_stream,
-    create: None,
-});
+register_file_kind!(
+    "a stream of Arrow",
+    FileKind {
+        endings: &["arrows"],
+        mark: &[0xff, 0xff, 0xff, 0xff],
+        open: file::arrow_stream,
+        create: None,
+    }
+);

@@ -1,6 +1,6 @@
 //! Combiners that pass one vote on: the best of late, or the first that is there.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Votes};
+use athermal_core::node::{Combine, Combiner, Duty, InputPort, KindFacts, Votes};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -96,6 +96,10 @@ pub(crate) fn all_on(one: Option<(usize, f64)>, votes: Votes<'_>, weights: &mut 
 }
 
 impl Combiner for Fallback {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Fallback)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[VOTERS] }
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use athermal_core::registry::find;
 use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
 use athermal_serve::connector::{
@@ -10,7 +11,9 @@ use athermal_serve::connector::{
     SourceWiring, Stamps, Stop,
 };
 use athermal_serve::{register_sink, register_source};
-use athermal_trial::machine::{Announcements, Machine, Row, Setup, Simulation, machine, plans};
+use athermal_trial::machine::{
+    Announcements, KnownMachine, Machine, Row, Setup, Simulation, plans,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -85,7 +88,9 @@ impl Source for SimulationSource {
     }
 
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
-        let known = machine(&self.machine).map_err(ConnectorError::new)?.machine;
+        let known = find::<KnownMachine>(&self.machine)
+            .map_err(ConnectorError::new)?
+            .machine;
         let setup = Setup {
             days: self.days,
             seed: self.seed,

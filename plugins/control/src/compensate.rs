@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -83,21 +83,16 @@ mod why {
     pub(super) const RATE: f64 = 4.0;
     pub(super) const RANGE: f64 = 5.0;
     pub(super) const SLEW: f64 = 6.0;
-}
-
-/// What a number of the port `why` says held a correction back; nothing where nothing did, or for a number that says nothing.
-#[must_use]
-pub fn held_back_by(number: f64) -> Option<&'static str> {
-    [
-        (why::INVALID, "no valid prediction"),
-        (why::STABLE, "stable"),
-        (why::DEADBAND, "below the deadband"),
-        (why::RATE, "rate cut"),
-        (why::RANGE, "at the end of its range"),
-        (why::SLEW, "slewing"),
-    ]
-    .into_iter()
-    .find_map(|(known, what)| (number == known).then_some(what))
+    /// What held a correction back, by the number.
+    pub(super) const WORDS: [&str; 7] = [
+        "",
+        "no valid prediction",
+        "stable",
+        "below the deadband",
+        "rate cut",
+        "at the end of its range",
+        "slewing",
+    ];
 }
 
 /// The limits in the unit of the correction and seconds.
@@ -183,6 +178,10 @@ impl Compensate {
 }
 
 impl Feature for Compensate {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Correct).change().reasons(&why::WORDS)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

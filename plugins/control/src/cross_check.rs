@@ -3,9 +3,9 @@
 use athermal_core::channel::ABSENT;
 use athermal_core::diagnostic::counted;
 use athermal_core::node::{
-    Encoder, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary,
-    Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Duty, Encoder, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Agreement, GramBlocks, Look};
@@ -72,6 +72,10 @@ mod reason {
 }
 
 impl Feature for CrossCheck {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Compare)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

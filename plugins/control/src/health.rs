@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -70,24 +70,17 @@ mod reason {
     pub(super) const NOISY: u8 = 5;
     pub(super) const SILENT: u8 = 6;
     pub(super) const RECOVERING: u8 = 7;
-}
-
-/// What a number of the port `reason` says; nothing for a number that says nothing.
-#[must_use]
-pub fn health_reason(number: f64) -> Option<&'static str> {
-    let whole = number.fract() == 0.0 && (0.0..256.0).contains(&number);
-    let known = match whole.then_some(number as u8)? {
-        reason::HEALTHY => "healthy",
-        reason::RANGE => "out of range",
-        reason::RATE => "changes too fast",
-        reason::STUCK => "stuck",
-        reason::QUIET => "too little noise",
-        reason::NOISY => "too much noise",
-        reason::SILENT => "silent",
-        reason::RECOVERING => "recovering",
-        _ => return None,
-    };
-    Some(known)
+    /// Each by its number.
+    pub(super) const WORDS: [&str; 8] = [
+        "healthy",
+        "out of range",
+        "changes too fast",
+        "stuck",
+        "too little noise",
+        "too much noise",
+        "silent",
+        "recovering",
+    ];
 }
 
 /// The limits in the unit of a channel and seconds; infinite or 0 where nothing is checked.
@@ -157,6 +150,10 @@ impl Health {
 }
 
 impl Feature for Health {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Watch).reasons(&reason::WORDS)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "the channels to watch")] }
     }

@@ -11,9 +11,9 @@ mod settled;
 mod stability;
 mod uncorrected;
 
-pub use compensate::{Compensate, Stop, held_back_by};
+pub use compensate::{Compensate, Stop};
 pub use cross_check::CrossCheck;
-pub use health::{Health, health_reason};
+pub use health::Health;
 pub use optical_loss::OpticalLoss;
 pub use remeasure::Remeasure;
 pub use safe_state::{SafeState, WhenLost};

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
@@ -152,6 +153,10 @@ impl OpticalLoss {
 }
 
 impl Feature for OpticalLoss {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Loss { over: "over" }).change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[InputPort::held(

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -75,6 +75,12 @@ impl Remeasure {
 }
 
 impl Feature for Remeasure {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Ask {
+            tolerance: "tolerance",
+        })
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Restored,
-    State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -77,6 +77,14 @@ impl Settled {
 }
 
 impl Feature for Settled {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Settle {
+            below: "below",
+            change: "change",
+        })
+        .change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -100,6 +100,14 @@ impl Stability {
 }
 
 impl Feature for Stability {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Grade {
+            stable: "stable_below",
+            transient: "transient_above",
+        })
+        .change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("drift", "the drift of the axes")] }
     }

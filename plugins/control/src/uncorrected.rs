@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,10 @@ pub enum UntilFirst {
 }
 
 impl Feature for Uncorrected {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::PutBack)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal_command::{Answer, Command, Failure, Format, Terminal, println};
+use athermal_command::{Answer, Command, Failure, Format, Group, Terminal, println};
 use athermal_core::engine::Engine;
 use athermal_core::time::Duration;
 use athermal_run::model::Model;
@@ -63,6 +63,7 @@ pub(crate) struct Export {
 athermal_command::register_command!(Export, "export");
 
 impl Command for Export {
+    const GROUP: Group = Group::Make;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.for_target()?;
         let mut engine = Model::load(&self.model)?.engine()?;

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
+    Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, PortSummary,
+    Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::unit::Unit;
@@ -177,6 +178,10 @@ impl Operator for Adding {
 }
 
 impl Feature for Product {
+    fn facts() -> KindFacts {
+        KindFacts::default().change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[TERMS] }
     }

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, PortSummary,
+    Reach, Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -56,6 +56,10 @@ impl Difference {
 }
 
 impl Feature for Difference {
+    fn facts() -> KindFacts {
+        KindFacts::default().change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what changes")] }
     }

@@ -5,6 +5,8 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use athermal_core::failure::Failure;
+
 use crate::cell;
 use crate::detect::LongFormat;
 use crate::machines::MachineFault;
@@ -399,6 +401,23 @@ impl FileError {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
     }
 }
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        if error.is_closed_pipe() {
+            // Whoever read our output has seen enough.
+            return Self::Exit(0);
+        }
+        match error {
+            FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {
+                Self::Outside(error.to_string())
+            }
+            other => Self::Request(other.to_string()),
+        }
+    }
+}
+
+athermal_core::register_error!(FileError);
 
 impl std::error::Error for FileError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {

@@ -77,5 +77,5 @@ pub use writer::{Flush, Writer};
 /// What the macros of this crate use.
 #[doc(hidden)]
 pub mod __private {
-    pub use inventory;
+    pub use athermal_core::__private::{list, no_schema};
 }

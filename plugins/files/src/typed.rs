@@ -5,6 +5,8 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 
+use athermal_core::registry::{Registered, Sort, all, find};
+
 use crate::cells::{Cells, Numbers};
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
@@ -14,8 +16,6 @@ use crate::{FileError, Layout, Place, TimeForm};
 /// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
 #[derive(Debug)]
 pub struct FileKind {
-    /// What it is called.
-    pub name: &'static str,
     /// How names of such files end, in small letters and without the dot.
     pub endings: &'static [&'static str],
     /// The first bytes of such a file.
@@ -27,13 +27,16 @@ pub struct FileKind {
     pub create: Option<fn(File, &str, &[String]) -> Box<dyn TypedSink>>,
 }
 
-inventory::collect!(FileKind);
+impl Sort for FileKind {
+    const ONE: &'static str = "kind of file";
+    const MANY: &'static str = "kinds of files";
+}
 
-/// Makes a kind of file known: a [`FileKind`](crate::FileKind).
+/// Makes a kind of file known: its name and a [`FileKind`](crate::FileKind).
 #[macro_export]
 macro_rules! register_file_kind {
-    ($kind:expr) => {
-        $crate::__private::inventory::submit! { $kind }
+    ($name:literal, $kind:expr) => {
+        $crate::__private::list!($crate::FileKind, $name, $crate::__private::no_schema, $kind);
     };
 }
 
@@ -122,19 +125,18 @@ pub trait TypedSink: Send {
 }
 
 /// The kind that the ending of a name says.
-pub(crate) fn kind_by_name(path: &Path) -> Option<&'static FileKind> {
+pub(crate) fn kind_by_name(path: &Path) -> Option<&'static Registered<FileKind>> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-    let mut kinds = inventory::iter::<FileKind>.into_iter();
-    kinds.find(|kind| kind.endings.contains(&ending.as_str()))
+    all::<FileKind>().find(|kind| kind.endings.contains(&ending.as_str()))
 }
 
 /// The kind of a file that is there, by its name, else by its first bytes.
-fn kind_of(path: &Path) -> Option<&'static FileKind> {
+fn kind_of(path: &Path) -> Option<&'static Registered<FileKind>> {
     if path == Path::new("-") || crate::Format::of_text(path).is_some() {
         return None;
     }
     kind_by_name(path).or_else(|| {
-        let mut kinds = inventory::iter::<FileKind>.into_iter().peekable();
+        let mut kinds = all::<FileKind>().peekable();
         kinds.peek().filter(|_| path.is_file())?;
         let mut first = Vec::new();
         let file = File::open(path).ok()?;
@@ -150,6 +152,9 @@ pub(crate) fn opened(path: &Path) -> Option<Result<Box<dyn TypedFile>, FileError
         return Some(table.map_err(unreadable));
     }
     let kind = kind_of(path)?;
+    if let Err(twice) = find::<FileKind>(kind.name) {
+        return Some(Err(FileError::unfit(path, twice.to_string())));
+    }
     // What cannot be opened at all says so as every file does.
     let there = File::open(path).map_err(|source| FileError::cannot_open(path, source));
     Some(there.and_then(|_| (kind.open)(path).map_err(unreadable)))

@@ -12,6 +12,8 @@ use crate::begun::Begun;
 use crate::cell::text_of;
 use crate::json_objects::JsonObjects;
 use crate::lines::BUFFER;
+use athermal_core::registry::Registered;
+
 use crate::typed::kind_by_name;
 use crate::{FileError, FileKind, Format, TimeColumn, TypedSink};
 
@@ -117,7 +119,7 @@ impl Writer {
     }
 
     fn of_kind(
-        kind: &FileKind,
+        kind: &Registered<FileKind>,
         path: &Path,
         time_column: &str,
         columns: &[String],

@@ -6,6 +6,7 @@ use athermal_core::quantity::Quantity;
 use athermal_files::{Bound, Stretch};
 use athermal_run::model::Model;
 use clap::Args;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::blocks::BlockOptions;
@@ -31,7 +32,7 @@ pub struct Reading {
 }
 
 /// Which rows of data are taken, by their times.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Args, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args, Serialize, Deserialize, JsonSchema)]
 pub struct Times {
     /// Read rows from this time on alone: an instant (`2026-03-01T06:00:00Z`), a date, or what stands in the log's column of time, such as
     /// seconds. Without an offset from UTC it goes by the `zone` of `[time]`

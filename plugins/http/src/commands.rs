@@ -4,7 +4,7 @@ use std::io::{self, BufRead as _, Read as _};
 use std::path::{Path, PathBuf};
 
 use athermal_command::{
-    Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
+    Answer, Command, Failure, Format, Group, Terminal, numbers, println, register_command,
 };
 use athermal_serve::facts::{ChannelsFacts, Known as _, StatusFacts};
 use clap::Args;
@@ -75,6 +75,7 @@ struct Status {
 }
 
 impl Command for Status {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut status = self.service.get(terminal, "/v1/status")?;
         let channels = self.service.get(terminal, "/v1/channels")?;
@@ -115,6 +116,7 @@ struct Tap {
 }
 
 impl Command for Tap {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut path = "/v1/events?ticks=1".to_owned();
         for channel in &self.channel {
@@ -183,6 +185,7 @@ struct Swap {
 }
 
 impl Command for Swap {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let given = given(&self.new)?;
         let mut staged = self.service.post(terminal, "/v1/stage", &given)?;
@@ -241,6 +244,7 @@ macro_rules! orders {
             }
 
             impl Command for $name {
+                const GROUP: Group = Group::Service;
                 fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
                     self.service.order(terminal, $path, $words)
                 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::time::Duration as Wait;
 
-use athermal_command::{Answer, Command, Failure, Terminal, print};
+use athermal_command::{Answer, Command, Failure, Group, Terminal, print};
 use athermal_core::document::placeholders;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -52,6 +52,7 @@ pub struct Browse {
 athermal_command::register_command!(Browse, "browse");
 
 impl Command for Browse {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut broker = self.broker.clone();
         broker.authorities.clone_from(&self.authorities);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use athermal_command::{
-    Answer, Command, Failure, Format, Terminal, numbers, println, register_command,
+    Answer, Command, Failure, Format, Group, Terminal, numbers, println, register_command,
 };
 use athermal_core::diagnostic::counted;
 use athermal_core::time::Duration;
@@ -87,6 +87,7 @@ impl Running {
 }
 
 impl Command for Retrain {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let service = Running::of(&self.machine, self.state.as_deref(), terminal)?;
         let running = service.model()?;
@@ -210,6 +211,7 @@ fn line(of: &Value) -> String {
 }
 
 impl Command for Models {
+    const GROUP: Group = Group::Service;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let service = Running::of(&self.machine, self.state.as_deref(), terminal)?;
         let all = shelf::all(&service.state);

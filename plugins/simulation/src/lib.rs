@@ -1,10 +1,11 @@
 //! Simulated machines whose axes drift with temperature. Decides which machines there are, not who runs them.
 //!
 //! ```
-//! use athermal_trial::machine::{Row, Setup, machine};
+//! use athermal_core::registry::find;
+//! use athermal_trial::machine::{KnownMachine, Row, Setup};
 //! use athermal_simulation as _;
 //!
-//! let machine = machine("linear-axis")?.machine;
+//! let machine = find::<KnownMachine>("linear-axis")?.machine;
 //! let mut simulation = machine.start(&Setup { days: 0.01, ..Setup::default() })?;
 //! let mut row = Row::empty(machine.channels());
 //! while simulation.next(&mut row) {
@@ -41,5 +42,5 @@ pub const MACHINES: [&dyn Machine; 2] = [DIE_TESTER, LINEAR_AXIS];
 const DIE_TESTER: &DieTester = &DieTester { world: World::SAME };
 const LINEAR_AXIS: &LinearAxis = &LinearAxis { world: World::SAME };
 
-athermal_trial::register_machine!(*DIE_TESTER);
-athermal_trial::register_machine!(*LINEAR_AXIS);
+athermal_trial::register_machine!(*DIE_TESTER, "die-tester");
+athermal_trial::register_machine!(*LINEAR_AXIS, "linear-axis");

@@ -4,6 +4,9 @@ mod next;
 mod offsets;
 mod tables;
 
+use athermal_core::watch::{Progress, Watch};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -18,6 +21,7 @@ use athermal::{Duration, Model};
 use clap::Args;
 use serde_json::json;
 
+use super::asked::in_memory;
 use super::beyond;
 use super::data::Data;
 use super::doubts::Doubts;
@@ -25,7 +29,7 @@ use super::faults::{FaultWatch, Purpose};
 use super::found::{self, Found};
 use super::model::load_fitted;
 use super::report::write_plots;
-use crate::terminal::{Answer, Failure, Format, Progress, Terminal, outside};
+use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 use athermal_analysis::figures::counted;
 use offsets::{OfFile, offsets};
 use tables::Tables;
@@ -37,7 +41,7 @@ use tables::Tables;
 /// each sensor contributes. Fits of its own on the data show how well each day is predicted from the others, and how many
 /// days are needed, and of several loggers how much their clocks differ. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all
 /// of them are.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Deserialize, JsonSchema)]
 #[command(after_help = "Examples:
   athermal diagnose model.json --data week.csv
   athermal diagnose model.json --data week.csv --window --plots plots
@@ -47,16 +51,20 @@ use tables::Tables;
 pub struct Diagnose {
     /// The model, or a graph that names one or in which nothing needs fitting
     #[arg(value_parser = crate::meant::graph_or_model())]
+    #[serde(skip, default = "in_memory")]
     model: PathBuf,
     #[command(flatten)]
+    #[serde(flatten)]
     data: Data,
     /// Show these predictions, by node, channel or axis, each with all its regressors; else the first of each truth that the graph
     /// puts out
     #[arg(long, num_args = 1.., value_name = "NAME")]
+    #[serde(default)]
     of: Vec<String>,
     /// Show the signal to noise of each drift against the window that it is taken over. Noise is the standard error of its
     /// slopes, in which scatter and curvature within the window both count
     #[arg(long)]
+    #[serde(default)]
     window: bool,
     /// How long a day is, of which each is left out once
     #[arg(
@@ -65,18 +73,26 @@ pub struct Diagnose {
         default_value = "1d",
         conflicts_with = "no_fit"
     )]
+    #[serde(default = "a_day")]
     day: Duration,
     /// Leave out what needs fits of its own: days left out, how many are needed, and how much clocks differ
     #[arg(long)]
+    #[serde(default)]
     no_fit: bool,
     /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
     plots: Option<PathBuf>,
 }
 
 /// So many numbers of a recording are kept in memory, where it has no more: 256 MB. A row takes so many beside its values.
 const IN_MEMORY: usize = 32 << 20;
 const ROW: usize = 6;
+
+/// How long a day is where nothing else is asked for.
+fn a_day() -> Duration {
+    Duration::from_ns(86_400_000_000_000)
+}
 
 impl Diagnose {
     /// Works out the facts and prints them.
@@ -87,15 +103,8 @@ impl Diagnose {
         self.data.check_lasting("--data")?;
         self.data.check_offsets(&[])?;
         let model = load_fitted(&self.model, Wanted::default(), terminal)?;
-        let mut found = None;
-        found::show(terminal, || {
-            let (shown, diagnosis) = self.find(&model, terminal)?;
-            found = Some(diagnosis);
-            Ok(shown)
-        })?;
-        let Some(diagnosis) = found else {
-            return Ok(Answer::Fine);
-        };
+        let with_others = terminal.format == Format::Table;
+        let (_, diagnosis) = found::show(terminal, |host| self.find(&model, with_others, host))?;
         if let Some(folder) = &self.plots {
             write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
         }
@@ -108,11 +117,16 @@ impl Diagnose {
         Ok(Answer::Fine)
     }
 
-    /// Diagnoses a model.
+    /// Diagnoses a model, and may note what else could be shown.
     ///
     /// # Errors
     /// When a name or the length of a day is none, or the data cannot be used.
-    pub fn find(&self, model: &Model, terminal: &Terminal) -> Result<(Found, Diagnosis), Failure> {
+    pub fn find(
+        &self,
+        model: &Model,
+        with_others: bool,
+        host: &dyn Watch,
+    ) -> Result<(Found, Diagnosis), Failure> {
         if self.day <= Duration::ZERO {
             return Err(Failure::Request(format!(
                 "--day is {} and must be greater than 0",
@@ -127,11 +141,11 @@ impl Diagnose {
             day: (!self.no_fit).then_some(self.day),
             windows: self.window,
         };
-        let mut bar: Option<(&str, Progress)> = None;
+        let mut bar: Option<(&str, Box<dyn Progress>)> = None;
         let mut progress = |what, done, total| match &mut bar {
             Some((of, bar)) if *of == what => bar.set(done),
             bar => bar
-                .insert((what, terminal.progress_to(what, total)))
+                .insert((what, host.progress_to(what, total)))
                 .1
                 .set(done),
         };
@@ -145,7 +159,7 @@ impl Diagnose {
         drop(bar);
         let clocks = match self.no_fit {
             true => Vec::new(),
-            false => offsets(model, &dataset, terminal)?,
+            false => offsets(model, &dataset, host)?,
         };
         let tables = Tables::new(&diagnosis, &self.of);
         let trace = &observation.trace;
@@ -164,27 +178,27 @@ impl Diagnose {
         doubts.add_to(&mut facts);
         let sentences = clocks.iter().map(OfFile::sentence);
         let text = tables.text() + &sentences.collect::<String>();
-        doubts.warn(terminal);
+        doubts.warn(host);
         for message in Lack::warnings(&diagnosis.lacks) {
-            terminal.warning(message);
+            host.warning(message);
         }
-        self.report(terminal, &diagnosis);
-        if self.of.is_empty() && terminal.format == Format::Table {
-            note_others(terminal, &model.plan, &diagnosis);
+        self.report(host, &diagnosis);
+        if self.of.is_empty() && with_others {
+            note_others(host, &model.plan, &diagnosis);
         }
-        warn_empty(terminal, &model.plan, &diagnosis, &observation);
+        warn_empty(host, &model.plan, &diagnosis, &observation);
         if self.window && !window::any(&model.plan) {
-            terminal.note("--window shows nothing, since no truth is a slope");
+            host.note("--window shows nothing, since no truth is a slope");
         }
         Ok((Found { text, facts }, diagnosis))
     }
 
-    fn report(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
+    fn report(&self, host: &dyn Watch, diagnosis: &Diagnosis) {
         if let Some(days) = &diagnosis.days {
-            warn_dropped(terminal, days);
+            warn_dropped(host, days);
         }
         if diagnosis.main.is_empty() {
-            terminal.warning(
+            host.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to diagnose",
             );
         } else if !self.no_fit && diagnosis.days.is_none() {
@@ -195,7 +209,7 @@ impl Diagnose {
                 "a longer --day leaves fewer out"
             };
             let most = day::MOST_DAYS;
-            terminal.note(format_args!(
+            host.note(format_args!(
                 "no days left out: the data have {count} of {day}, and from 2 to {most} can be; {advice}"
             ));
         }
@@ -218,7 +232,7 @@ impl Diagnose {
 }
 
 /// Warns of what only some of the fits on parts of the data had, so that they differ by more than their days.
-fn warn_dropped(terminal: &Terminal, days: &Days) {
+fn warn_dropped(host: &dyn Watch, days: &Days) {
     let left_out = || days.left_out.iter();
     let all = left_out().flat_map(|day| &day.dropped);
     let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
@@ -230,14 +244,14 @@ fn warn_dropped(terminal: &Terminal, days: &Days) {
             all if all == days.left_out.len() => continue,
             _ => format!("fits without day {}", without.join(", ")),
         };
-        terminal.warning(format_args!(
+        host.warning(format_args!(
             "{name} has a value in too few rows for {which}, which do without it; their scores suffer from that too"
         ));
     }
 }
 
 /// Names predictions that the graph puts out beside those that are shown.
-fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
+fn note_others(host: &dyn Watch, plan: &Plan, diagnosis: &Diagnosis) {
     let outputs = plan.outputs.iter().map(|of| &plan.channels[of.slot]);
     let predictions = outputs.filter(|of| of.predicts.is_some());
     let is_shown = |name: &str| diagnosis.main.iter().any(|main| main.prediction == name);
@@ -245,7 +259,7 @@ fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
     let nodes: BTreeSet<&str> = others.filter_map(|of| of.name.split('.').next()).collect();
     if !nodes.is_empty() {
         let nodes: Vec<&str> = nodes.into_iter().collect();
-        terminal.note(format_args!(
+        host.note(format_args!(
             "shown is the first prediction of each truth that the graph puts out; the others:\n  --of {}",
             nodes.join(" ")
         ));
@@ -253,7 +267,7 @@ fn note_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
 }
 
 /// Warns of predictions without a residual.
-fn warn_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
+fn warn_empty(host: &dyn Watch, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
     for main in &diagnosis.main {
         let residuals = diagnosis.residuals.iter();
         let mut of_main = residuals.filter(|of| of.prediction == main.prediction);
@@ -265,9 +279,9 @@ fn warn_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observati
         let there = truth.map_or(0, |of| of.values.iter().filter(|y| !y.is_nan()).count());
         if there == 0 {
             let truth = &main.truth;
-            terminal.warning(format_args!("the data have no value of the truth {truth}"));
+            host.warning(format_args!("the data have no value of the truth {truth}"));
         } else {
-            terminal.warning(format_args!(
+            host.warning(format_args!(
                 "{} is at none of the {} at which {} was measured, so it cannot be judged",
                 main.prediction,
                 counted(there as u64, "instant"),

@@ -3,9 +3,10 @@
 use athermal::diagnosis::offset::{Offset, offset};
 use athermal::files::Dataset;
 use athermal::{Duration, Model};
+use athermal_core::watch::Watch;
 use serde_json::{Value, json};
 
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::Failure;
 use athermal_analysis::figures::length;
 
 /// What is to be added to the times of a file, beside what is added already.
@@ -19,16 +20,12 @@ pub struct OfFile {
 ///
 /// # Errors
 /// When the data cannot be read.
-pub fn offsets(
-    model: &Model,
-    dataset: &Dataset,
-    terminal: &Terminal,
-) -> Result<Vec<OfFile>, Failure> {
+pub fn offsets(model: &Model, dataset: &Dataset, host: &dyn Watch) -> Result<Vec<OfFile>, Failure> {
     let mut all = Vec::new();
     for files in dataset.loggers(&model.plan)?.into_iter().skip(1) {
         let mut bar = None;
         let mut progress = |done: u64, total: u64| {
-            bar.get_or_insert_with(|| terminal.progress_to("comparing clocks", total))
+            bar.get_or_insert_with(|| host.progress_to("comparing clocks", total))
                 .set(done);
         };
         let shifted = |by| dataset.shifted(&files, by);

@@ -3,9 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use athermal::core::node::kinds;
-use athermal::trial::machine::machines;
-use athermal_serve::connector::{sink_kind, source_kind};
+use athermal::core::node::NodeKind;
+use athermal::core::registry::{Sort, all};
+use athermal::trial::machine::KnownMachine;
+use athermal_command::CommandKind;
+use athermal_serve::companion::CompanionKind;
+use athermal_serve::connector::{SinkKind, SourceKind};
 use clap::Args;
 use serde_json::json;
 
@@ -63,6 +66,7 @@ impl Plugin {
             ("CORE", of("core/framework")),
             ("SERVE", of("core/serve")),
             ("INTERFACE", of("plugins/http")),
+            ("COMMAND", of("core/command")),
             ("TRIAL", of("core/trial")),
             ("TESTKIT", of("core/testkit")),
         ];
@@ -108,30 +112,29 @@ impl Plugin {
 
     /// Refuses the name of what this program has already.
     fn free(&self, names: &Names) -> Result<(), Failure> {
-        let kind = kinds().get(names.kind.as_str()).and_then(|all| all.first());
-        let machine = machines()
-            .get(self.name.as_str())
-            .and_then(|all| all.first());
+        let kind = names.kind.as_str();
         let taken = match self.role {
-            Role::Machine => {
-                machine.map(|of| ("machine", of.machine.name(), of.package, of.version))
+            Role::Machine => bring::<KnownMachine>(&self.name),
+            Role::Source => bring::<SourceKind>(kind),
+            Role::Sink => bring::<SinkKind>(kind),
+            Role::Companion => {
+                bring::<CompanionKind>(kind).or_else(|| bring::<CommandKind>(&self.name))
             }
-            Role::Source => {
-                source_kind(&names.kind).map(|of| ("source", of.name, of.package, of.version))
-            }
-            Role::Companion => None,
-            Role::Sink => {
-                sink_kind(&names.kind).map(|of| ("sink", of.name, of.package, of.version))
-            }
-            _ => kind.map(|of| ("node type", of.name, of.package, of.version)),
+            _ => bring::<NodeKind>(kind),
         };
-        let Some((what, name, package, version)) = taken else {
-            return Ok(());
-        };
-        Err(Failure::Request(format!(
-            "there is a {what} `{name}` already, from {package} {version}; a second one of the name could not be used beside it"
-        )))
+        taken.map_or(Ok(()), |taken| Err(Failure::Request(taken)))
     }
+}
+
+/// That there is one of the name, where there is.
+fn bring<T: Sort>(name: &str) -> Option<String> {
+    let taken = all::<T>().find(|of| of.name == name)?;
+    Some(format!(
+        "there is a {} `{name}` already, from {} {}; a second one of the name could not be used beside it",
+        T::ONE,
+        taken.package,
+        taken.version
+    ))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

@@ -1,5 +1,5 @@
 //! The files of a new plugin crate. Their texts are those of `examples/templates/`, in which `my-node`, `my_node` and `MyNode` stand for the
-//! name, and `CORE`, `SERVE`, `INTERFACE`, `TRIAL`, `TESTKIT` and `VERSION` for the athermal that it builds on.
+//! name, and `CORE`, `SERVE`, `INTERFACE`, `COMMAND`, `TRIAL`, `TESTKIT` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -18,7 +18,7 @@ pub enum Role {
     Source,
     /// Where outputs go: a controller, a screen
     Sink,
-    /// What runs beside a service: a page, an alarm
+    /// What runs beside a service: a section, a page, a command
     Companion,
     /// A machine to simulate
     Machine,
@@ -199,8 +199,16 @@ mod tests {
     #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
-        let words = ["VERSION", "CORE", "SERVE", "INTERFACE", "TRIAL", "TESTKIT"]
-            .map(|word| (word, "\"/sources\"".to_owned()));
+        let words = [
+            "VERSION",
+            "CORE",
+            "SERVE",
+            "INTERFACE",
+            "COMMAND",
+            "TRIAL",
+            "TESTKIT",
+        ]
+        .map(|word| (word, "\"/sources\"".to_owned()));
         for role in Role::value_variants() {
             for (path, text) in files(&names, *role, &words) {
                 for left in [
@@ -210,6 +218,7 @@ mod tests {
                     "CORE",
                     "SERVE",
                     "INTERFACE",
+                    "COMMAND",
                     "TRIAL",
                     "TESTKIT",
                     "VERSION",

@@ -1,47 +1,40 @@
 //! The kinds of sources and sinks, beside the node types.
 
-use std::collections::BTreeMap;
-
+use athermal::core::registry::{Registered, Sort, all, find};
 use athermal_analysis::figures::{page, paragraph};
-use athermal_serve::connector::{ConnectorKind, sink_kind, sink_kinds, source_kind, source_kinds};
+use athermal_serve::connector::{SinkKind, SourceKind};
 use serde_json::{Map, Value, json};
 
 use super::parameters;
 use crate::terminal::{Format, Terminal};
 
-/// The names of all kinds.
-pub fn names() -> impl Iterator<Item = &'static &'static str> {
-    source_kinds().keys().chain(sink_kinds().keys())
-}
-
 /// Lists all kinds, by the crates that bring them.
 pub fn list() {
-    group("sources", source_kinds());
-    group("sinks", sink_kinds());
+    group::<SourceKind>("sources");
+    group::<SinkKind>("sinks");
 }
 
-fn group<S: ?Sized>(role: &str, kinds: &BTreeMap<&str, &ConnectorKind<S>>) {
-    let package = |kind: &ConnectorKind<S>| (kind.package, kind.version);
-    let mut packages: Vec<_> = kinds.values().map(|kind| package(kind)).collect();
+fn group<T: Sort>(role: &str) {
+    let mut packages: Vec<_> = all::<T>()
+        .map(|kind| (kind.package, kind.version))
+        .collect();
     packages.sort_unstable();
     packages.dedup();
-    for of in packages {
-        println!("{role}, from {} {}", of.0, of.1);
-        for kind in kinds.values().filter(|kind| package(kind) == of) {
+    for (package, version) in packages {
+        println!("{role}, from {package} {version}");
+        for kind in all::<T>().filter(|kind| (kind.package, kind.version) == (package, version)) {
             let name = format!("  {:<18} ", kind.name);
             print!("{}", paragraph(&name, name.len(), &kind.summary()));
         }
     }
 }
 
-/// All sources and all sinks, for programs.
-pub fn describe_all() -> (Vec<Value>, Vec<Value>) {
-    let sources = source_kinds().values().map(|kind| describe(kind));
-    let sinks = sink_kinds().values().map(|kind| describe(kind));
-    (sources.collect(), sinks.collect())
+/// All of a sort, for programs.
+pub fn describe_all<T: Sort>() -> Vec<Value> {
+    all::<T>().map(describe).collect()
 }
 
-fn describe<S: ?Sized>(kind: &ConnectorKind<S>) -> Value {
+fn describe<T>(kind: &Registered<T>) -> Value {
     json!({
         "name": kind.name,
         "summary": kind.summary(),
@@ -53,7 +46,7 @@ fn describe<S: ?Sized>(kind: &ConnectorKind<S>) -> Value {
 
 /// Explains the source and the sink of a name; false where there is neither.
 pub fn explain(terminal: &Terminal, name: &str) -> bool {
-    let (source, sink) = (source_kind(name), sink_kind(name));
+    let (source, sink) = (find::<SourceKind>(name).ok(), find::<SinkKind>(name).ok());
     if terminal.format == Format::Json {
         let mut both = Map::new();
         both.extend(source.map(|kind| ("source".to_owned(), describe(kind))));
@@ -75,7 +68,7 @@ pub fn explain(terminal: &Terminal, name: &str) -> bool {
     source.is_some() || sink.is_some()
 }
 
-fn explain_one<S: ?Sized>(role: &str, kind: &ConnectorKind<S>) {
+fn explain_one<T>(role: &str, kind: &Registered<T>) {
     let (name, package, version) = (kind.name, kind.package, kind.version);
     println!("{name} ({role}, from {package} {version})\n");
     println!("{}", page(kind.documentation()));

@@ -4,10 +4,11 @@ mod connectors;
 mod parameters;
 mod settings;
 
-use athermal::core::diagnostic::nearest;
 use athermal::core::node::{
-    FREEZE, Kind, Learns, Read, Role, RoleName, kind, kinds, written_names,
+    FREEZE, Kind, Learns, NodeKind, PredictorForm, Read, Role, RoleName, StateForm,
 };
+use athermal::core::registry::{NotFound, Registered, Sort, Why, all, find};
+use athermal_serve::connector::{SinkKind, SourceKind};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -31,48 +32,66 @@ impl Nodes {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match &self.name {
             None => list(terminal),
-            Some(name) => match kind(name) {
-                Some(kind) => explain(terminal, kind),
-                None if connectors::explain(terminal, name) => {}
-                None => return Err(unknown(name)),
+            Some(name) => match find::<NodeKind>(name) {
+                Ok(kind) => explain(terminal, kind),
+                Err(_) if connectors::explain(terminal, name) => {}
+                Err(why) => return Err(unknown(why)),
             },
         }
         Ok(Answer::Fine)
     }
 }
 
-fn unknown(name: &str) -> Failure {
-    let all = kinds().keys().chain(connectors::names());
-    let near = nearest(name, all.copied());
-    let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
+/// Of what has a name that no node type has: it may be meant as one of a source or sink.
+fn unknown(why: NotFound) -> Failure {
+    let name = &why.name;
+    let others = [find::<SourceKind>(name).err(), find::<SinkKind>(name).err()];
+    let is_better = |of: &NotFound| !matches!(of.why, Why::Unknown { nearest: None, .. });
+    let better = [Some(why.clone()), others[0].clone(), others[1].clone()];
+    let better = better.into_iter().flatten().find(is_better);
+    let help = better.map_or_else(String::new, |of| format!(", {}", of.help()));
     Failure::Request(format!(
-        "there is no node type, source or sink `{name}`{near} (`athermal nodes` lists them all)"
+        "there is no node type, source or sink `{name}`{help} (`athermal nodes` lists them all)"
     ))
 }
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all = kinds().values().flatten();
-        let all: Vec<Value> = all.map(|kind| describe(kind)).collect();
-        let (sources, sinks) = connectors::describe_all();
-        let all =
-            json!({ "nodes": all, "sources": sources, "sinks": sinks, "written": written_names() });
-        println!("{all:#}");
+        let nodes: Vec<Value> = all::<NodeKind>().map(describe).collect();
+        let written = [
+            written::<StateForm>("state"),
+            written::<PredictorForm>("predictor"),
+        ];
+        println!(
+            "{:#}",
+            json!({
+                "nodes": nodes,
+                "sources": connectors::describe_all::<SourceKind>(),
+                "sinks": connectors::describe_all::<SinkKind>(),
+                "written": written.concat(),
+            })
+        );
         return;
     }
     let group = |kind: &Kind| (kind.role, kind.package, kind.version);
-    let mut groups: Vec<_> = kinds().values().flatten().map(|kind| group(kind)).collect();
+    let mut groups: Vec<_> = all::<NodeKind>().map(group).collect();
     groups.sort();
     groups.dedup();
     for of in groups {
         let (role, package, version) = of;
         println!("{role}s, from {package} {version}");
-        for kind in kinds().values().flatten().filter(|kind| group(kind) == of) {
+        for kind in all::<NodeKind>().filter(|kind| group(kind) == of) {
             let name = format!("  {:<18} ", kind.name);
             print!("{}", paragraph(&name, name.len(), &kind.summary()));
         }
     }
     connectors::list();
+}
+
+/// The names under which something is written into snapshots or models.
+fn written<T: Sort>(role: &str) -> Vec<Value> {
+    let name = |of: &Registered<T>| json!({ "role": role, "name": of.name, "package": of.package, "version": of.version });
+    all::<T>().map(name).collect()
 }
 
 fn explain(terminal: &Terminal, kind: &Kind) {
@@ -84,7 +103,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         "{} ({}, from {} {})\n",
         kind.name, kind.role, kind.package, kind.version
     );
-    println!("{}", page(&kind.documentation()));
+    println!("{}", page(kind.documentation()));
     println!("Inputs:");
     for port in (kind.inputs)() {
         let read = match port.read {

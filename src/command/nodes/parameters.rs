@@ -1,6 +1,7 @@
 //! The parameters of a node type as text, from their schema.
 
-use athermal::core::node::{first_paragraph, inline_toml};
+use athermal::core::node::inline_toml;
+use athermal::core::registry::first_paragraph;
 use serde_json::{Map, Value};
 
 use athermal_analysis::figures::paragraph;

@@ -1,6 +1,7 @@
 //! A log in any of the known forms, written at random from one truth, is read to the same instants and values, or refused with the
 //! cause. `ATHERMAL_LONG=1` writes a hundred thousand, `ATHERMAL_SEED=7` that one, `ATHERMAL_SEED=0..50000` those.
 
+use athermal::core::watch::Kept;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -176,7 +177,9 @@ fn is_read(seed: u64, scratch: &Scratch) -> Result<(), Miss> {
     let (text, form) = written(random, &truth);
     let log = scratch.file("log.csv", &text);
     let head = text.lines().take(6).collect::<Vec<_>>().join("\n");
-    let starter = athermal::calls::init(&[log.display().to_string()]);
+    let asked = serde_json::json!({ "data": log });
+    let asked = asked.as_object().cloned().unwrap_or_default();
+    let starter = athermal::calls::init(&asked, &Kept::default());
     let starter = starter.map_err(|why| Miss::Refused(format!("{form}: {why:?}\n{head}")))?;
     let found = read(&starter.text, &log);
     let is_minutes = !form.contains("%S");

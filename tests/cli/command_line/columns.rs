@@ -22,8 +22,8 @@ fn listed<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 fn help_has_examples_and_fits_80_columns() {
     let all = athermal(&[&"--help"]).ended(0).out;
     assert_fits(all.lines());
-    let below = all.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let commands = listed(below.take_while(|line| !line.is_empty()));
+    let below = all.lines().skip_while(|line| *line != "Begin:");
+    let commands = listed(below.take_while(|line| *line != "Options:"));
     assert!(commands.len() > 15, "{commands:?}");
     for command in commands.into_iter().filter(|&command| command != "help") {
         let help = athermal(&[&command, &"--help"]).ended(0).out;

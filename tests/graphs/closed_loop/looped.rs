@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use athermal::core::registry::find;
 use athermal::run::fit::{FitOptions, fit};
 use athermal::trial::machine::{
-    ClosedLoop, Machine, Row, SECOND_NS, Schedule, Setup, Simulated, Simulation, machine,
+    ClosedLoop, KnownMachine, Machine, Row, SECOND_NS, Schedule, Setup, Simulated, Simulation,
 };
 use athermal::{Engine, Model};
 
@@ -24,7 +25,7 @@ pub struct Looped {
 impl Looped {
     /// Fits a graph on three days of a machine.
     pub fn new(name: &str, graph: &Path, range_nm: f64, slew_nm_per_s: f64) -> Self {
-        let machine = machine(name).unwrap().machine;
+        let machine = find::<KnownMachine>(name).unwrap().machine;
         let mut model = Model::load(graph).unwrap();
         let setup = Setup {
             days: 3.0,

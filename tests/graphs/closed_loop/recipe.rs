@@ -72,9 +72,10 @@ fn a_recipe_in_a_unit_of_something_else_is_refused_in_the_loop() {
     let scratch = Scratch::new("a_recipe_in_a_unit_of_something_else");
     let file = scratch.file("recipe.toml", text("V"));
     let model = athermal::Model::load(&file).unwrap();
-    let machine = athermal::trial::machine::machine("die-tester")
-        .unwrap()
-        .machine;
+    let machine =
+        athermal::core::registry::find::<athermal::trial::machine::KnownMachine>("die-tester")
+            .unwrap()
+            .machine;
     let setup = athermal::trial::machine::Setup::default();
     let simulation = machine.start(&setup).unwrap();
     let engine = model.engine().unwrap();

@@ -7,6 +7,7 @@
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
+use athermal_core::node::Duty;
 use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
 use athermal_run::fit::FitError;
@@ -145,7 +146,10 @@ pub(crate) fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
     };
     let entries = &plan.gathers[*gathers.first()?].entries;
     // Each channel has a slope for every window.
-    let (_, slopes) = node.ports.first().filter(|_| node.kind.name == "slope")?;
+    let (_, slopes) = node
+        .ports
+        .first()
+        .filter(|_| node.kind.duty() == Duty::Slope)?;
     let place = truth.checked_sub(slopes.start)? * entries.len();
     entries
         .get(place.checked_div(slopes.len())?)

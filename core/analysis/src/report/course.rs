@@ -4,9 +4,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use athermal_control::Stability;
 use athermal_core::compile::{Entry, Plan, PlannedRole};
 use athermal_core::engine::Engine;
+use athermal_core::node::Duty;
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
@@ -17,7 +17,7 @@ use serde::{Serialize, Serializer};
 
 use super::excursions::{NoveltyWatch, ask_for_novelty};
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
-use super::track::{Track, Unjudged, places, reads_drift};
+use super::track::{Track, Unjudged, parameter, places, reads_drift};
 use super::{ReportError, Series};
 
 /// What happened over time.
@@ -294,10 +294,13 @@ impl Axis {
 /// The limits of the states of stability in the unit of a drift, from the first node that has them; none where it is no drift, or
 /// nobody gives them.
 fn states(plan: &Plan, drift: usize, unit: &Unit) -> Option<(f64, f64)> {
-    let mut nodes = plan.nodes.iter();
-    let node =
-        nodes.find(|node| node.kind.name == "stability" && reads_drift(plan, node, drift))?;
-    let limits: Stability = serde_json::from_value(node.spec.parameters()).ok()?;
-    let in_unit = |quantity: &Quantity| quantity.in_unit(unit);
-    in_unit(&limits.stable_below).zip(in_unit(&limits.transient_above))
+    let limits = plan.nodes.iter().filter_map(|node| match node.kind.duty() {
+        Duty::Grade { stable, transient } => Some((node, [stable, transient])),
+        _ => None,
+    });
+    let (node, limits) = limits
+        .into_iter()
+        .find(|(node, _)| reads_drift(plan, node, drift))?;
+    let [stable, transient] = limits.map(|name| parameter::<Quantity>(node, name)?.in_unit(unit));
+    stable.zip(transient)
 }

@@ -59,7 +59,7 @@ pub(super) fn departures(track: &Track) -> Vec<Departure> {
         let share = |(by, ticks): (&&'static str, &u64)| (*by, *ticks as f64 / track.ticks as f64);
         Departure {
             axis: axis.name.clone(),
-            unit: track.positions[nth].clone(),
+            unit: track.positions[nth].1.clone(),
             rms_without: rms(without.iter().copied()),
             rms_with: rms(with.iter().copied()),
             largest_without: largest(&without),

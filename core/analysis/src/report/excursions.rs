@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use athermal_core::compile::{Outside, Plan, PlannedNode, PlannedRole, SourceChannel};
 use athermal_core::engine::Engine;
-use athermal_core::node::{Predictor, Role};
+use athermal_core::node::{Duty, Predictor, Role};
 use athermal_run::model::Model;
 
 use super::novelty::{Contradiction, Excursion, Novelty, Stretch};
@@ -118,8 +118,8 @@ impl NoveltyWatch {
 pub(super) type Periods = Vec<(usize, Vec<(f64, f64)>)>;
 
 fn checks<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = Check> + 'a {
-    let reasons = match node.kind.name {
-        "cross_check" => node.port("reason"),
+    let reasons = match node.kind.duty() {
+        Duty::Compare => node.port("reason"),
         _ => None,
     };
     let gather = node.role.inputs().next();

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use athermal_core::time::Duration;
-use athermal_core::unit::Unit;
 use serde::Serialize;
 
 use super::Series;
@@ -44,12 +43,12 @@ impl Light {
     /// What is known before the first row.
     pub(super) fn before(loss: Option<&TrackLoss>) -> Self {
         let settled = loss.and_then(|loss| loss.settled.as_ref());
-        let limit = |settled: &TrackSettled| settled.spec.below.in_unit(&Unit::parse("dB").ok()?);
+        let limit = |settled: &TrackSettled| settled.below;
         Self {
             loss: loss.map(|loss| loss.node.clone()),
             loss_limit: settled.and_then(limit).unwrap_or(LIMIT_DB),
             set_point_unit: settled.map(|settled| settled.set_point.clone()),
-            over: loss.map(|loss| loss.spec.over),
+            over: loss.and_then(|loss| loss.over),
             ..Self::default()
         }
     }

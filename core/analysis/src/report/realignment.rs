@@ -66,7 +66,7 @@ pub(super) fn realignment(track: &Track) -> Option<Realignment> {
         tolerance,
         per_day: count as f64 / days,
         largest,
-        unit: track.positions.first()?.clone(),
+        unit: track.positions.first()?.1.clone(),
         as_good_every_min: (1..=LONGEST_MIN).take_while(is_as_good).last(),
     })
 }
@@ -132,7 +132,7 @@ mod tests {
         let fast = (0..10).map(|minute| (10.0 + 5.0 * f64::from(minute), true));
         let all: Vec<_> = slow.chain(fast).collect();
         let mut track = Track::default();
-        track.positions.push("nm".to_owned());
+        track.positions.push(("Z".to_owned(), "nm".to_owned()));
         track.rows = rows(&all);
         track.remeasures = Some(("again".to_owned(), "5 nm".to_owned()));
         let found = realignment(&track).unwrap();

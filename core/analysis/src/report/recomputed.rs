@@ -11,7 +11,6 @@ use athermal_core::compile::{Plan, Wanted, compile};
 use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_core::document::{Memory, declare, load_text};
 use athermal_core::engine::{Engine, EngineError, Fitted};
-use serde::Serialize;
 use serde_json::Value;
 
 use super::ReportError;
@@ -139,17 +138,20 @@ fn graph(track: &Track) -> String {
     let mut text = String::from("schema = 1\n");
     let mut outputs = String::new();
     for way in WAYS {
-        for (nth, unit) in track.positions.iter().enumerate() {
+        for (nth, (name, unit)) in track.positions.iter().enumerate() {
+            // What goes by the letter of an axis finds it, whatever other signs its name has.
+            let axis = name.chars().next().filter(char::is_ascii_alphabetic);
+            let axis = axis.unwrap_or('a');
             let _ = write!(
                 text,
-                "[signals.position_{way}_{nth}]\nunit = \"{unit}\"\nchannels = [\"a{nth}\"]\nmax_age = \"10min\"\n"
+                "[signals.position_{way}_{nth}]\nunit = \"{unit}\"\nchannels = [\"{axis}{nth}\"]\nmax_age = \"10min\"\n"
             );
         }
         for (nth, drift) in track.drifts.iter().enumerate() {
             let _ = write!(
                 text,
-                "[nodes.drift_{way}_{nth}]\ntype = \"slope\"\ninputs.signal = \"position_{way}_{}\"\n",
-                drift.position
+                "[nodes.drift_{way}_{nth}]\ntype = \"{}\"\ninputs.signal = \"position_{way}_{}\"\n",
+                drift.kind, drift.position
             );
             parameters(&mut text, &drift.slope);
             let _ = writeln!(outputs, "drift_{way}_{nth} = \"drift_{way}_{nth}\"");
@@ -161,10 +163,11 @@ fn graph(track: &Track) -> String {
             let drifts: Vec<_> = drifts.map(|of| format!("\"drift_{way}_{of}\"")).collect();
             let _ = write!(
                 text,
-                "[nodes.loss_{way}_{nth}]\ntype = \"optical_loss\"\ninputs.drift = [{}]\n",
+                "[nodes.loss_{way}_{nth}]\ntype = \"{}\"\ninputs.drift = [{}]\n",
+                loss.kind,
                 drifts.join(", ")
             );
-            parameters(&mut text, &loss.spec);
+            parameters(&mut text, &loss.parameters);
             let _ = writeln!(outputs, "loss_{way}_{nth} = \"loss_{way}_{nth}\"");
         }
         let Some(settled) = &loss.settled else {
@@ -178,10 +181,11 @@ fn graph(track: &Track) -> String {
         for way in WAYS {
             let _ = write!(
                 text,
-                "[nodes.settled_{way}_{nth}]\ntype = \"settled\"\n\
-                 inputs = {{ loss = \"loss_{way}_{nth}\", set_point = \"set_point_{nth}\" }}\n"
+                "[nodes.settled_{way}_{nth}]\ntype = \"{}\"\n\
+                 inputs = {{ loss = \"loss_{way}_{nth}\", set_point = \"set_point_{nth}\" }}\n",
+                settled.kind
             );
-            parameters(&mut text, &settled.spec);
+            parameters(&mut text, &settled.parameters);
             let _ = writeln!(outputs, "settled_{way}_{nth} = \"settled_{way}_{nth}\"");
         }
         let _ = writeln!(outputs, "since_{nth} = \"settled_without_{nth}:since\"");
@@ -190,10 +194,9 @@ fn graph(track: &Track) -> String {
 }
 
 /// The parameters of a node as lines of TOML: texts, numbers and lists of them look the same in JSON.
-fn parameters(text: &mut String, spec: &impl Serialize) {
-    if let Ok(Value::Object(keys)) = serde_json::to_value(spec) {
-        for (key, value) in keys.iter().filter(|(_, value)| !value.is_null()) {
-            let _ = writeln!(text, "{key} = {value}");
-        }
+fn parameters(text: &mut String, of: &Value) {
+    let keys = of.as_object().into_iter().flatten();
+    for (key, value) in keys.filter(|(_, value)| !value.is_null()) {
+        let _ = writeln!(text, "{key} = {value}");
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use athermal_core::compile::{Plan, PlannedRole, SourceChannel};
 use athermal_core::engine::{Engine, SampleRange};
+use athermal_core::node::{Duty, KindFacts};
 use athermal_numerics::robust_deviation;
 use serde::Serialize;
 
@@ -71,8 +72,8 @@ struct Looking {
     limits: (f64, f64),
     /// Whether data may lack it, such as what a machine reports as applied, which may rest.
     optional: bool,
-    /// The slot of the reason that a `health` node gives.
-    reason: Option<usize>,
+    /// The slot of the reason that the node gives which watches over it, and what it says.
+    reason: Option<(usize, KindFacts)>,
 }
 
 /// One for each measured channel.
@@ -88,7 +89,10 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
             looking: Looking {
                 limits: source.range,
                 optional: source.rests(),
-                reason: reasons.get(&slot).copied(),
+                reason: reasons.get(&slot).and_then(|&at| {
+                    let node = plan.channels[at].node?;
+                    Some((at, (plan.nodes[node].kind.facts)()))
+                }),
                 finder: finder.filter(|_| source.planned.is_none() && !source.is_instant),
                 wanders: of_truths[slot],
                 ..Looking::default()
@@ -100,12 +104,14 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     sources.map(facts).collect()
 }
 
-/// Has every `health` and `cross_check` node give its reasons and every `compensate` what holds it back, whether or not the graph reads
-/// it.
+/// Has every node that watches over sensors or compares them give its reasons, and every correction what holds it back, whether or not
+/// the graph reads it.
 pub(super) fn ask_for_reasons(plan: &mut Plan) {
     for node in &mut plan.nodes {
-        if matches!(node.kind.name, "health" | "cross_check" | "compensate")
-            && let PlannedRole::Feature { wanted, .. } = &mut node.role
+        if matches!(
+            node.kind.duty(),
+            Duty::Watch | Duty::Compare | Duty::Correct
+        ) && let PlannedRole::Feature { wanted, .. } = &mut node.role
         {
             wanted.fill(true);
         }
@@ -114,11 +120,9 @@ pub(super) fn ask_for_reasons(plan: &mut Plan) {
 
 impl SensorFacts {
     pub(super) fn look(&mut self, now_s: f64, value: f64, engine: &Engine) {
-        if let Some(slot) = self.looking.reason {
-            let reason = athermal_control::health_reason(engine.value(slot));
-            if let Some(reason) = reason {
-                *self.health.entry(reason).or_default() += 1;
-            }
+        let reason = self.looking.reason;
+        if let Some(reason) = reason.and_then(|(slot, of)| of.reason(engine.value(slot))) {
+            *self.health.entry(reason).or_default() += 1;
         }
         let (low, high) = self.looking.limits;
         if value.is_nan() {

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::iter::successors;
 
-use athermal_control::{OpticalLoss, Settled, held_back_by};
 use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
+use athermal_core::node::{Duty, KindFacts};
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::diagnosis::window::measured_by;
@@ -24,8 +25,8 @@ pub(super) struct Track {
     /// Which drifts are recomputed: first that of each axis.
     pub(super) drifts: Vec<TrackDrift>,
     pub(super) losses: Vec<TrackLoss>,
-    /// The units of the positions: first that of each axis, then of those that are not corrected and yet cost light.
-    pub(super) positions: Vec<String>,
+    /// The names and units of the positions: first those of each axis, then of those that are not corrected and yet cost light.
+    pub(super) positions: Vec<(String, String)>,
     pub(super) rows: Vec<TrackRow>,
     pub(super) ticks: u64,
     /// Which axes have had a valid prediction: before, there is no correction to be judged.
@@ -53,6 +54,8 @@ pub(super) struct TrackDrift {
     /// Which of the positions.
     pub(super) position: usize,
     pub(super) unit: String,
+    /// The kind of the node that takes the slope.
+    pub(super) kind: &'static str,
     /// The parameters of the node that takes the slope, for this window alone.
     pub(super) slope: Value,
 }
@@ -64,7 +67,11 @@ pub(super) struct TrackLoss {
     pub(super) node: String,
     /// Which of the drifts, in the order in which the node reads them.
     pub(super) drifts: Vec<usize>,
-    pub(super) spec: OpticalLoss,
+    /// Its kind and its parameters.
+    pub(super) kind: &'static str,
+    pub(super) parameters: Value,
+    /// The window of the drifts.
+    pub(super) over: Option<Duration>,
     /// What measures how long it takes until the loss has settled.
     pub(super) settled: Option<TrackSettled>,
 }
@@ -72,7 +79,11 @@ pub(super) struct TrackLoss {
 /// A settle time.
 #[derive(Debug)]
 pub(super) struct TrackSettled {
-    pub(super) spec: Settled,
+    /// The kind and the parameters of the node.
+    pub(super) kind: &'static str,
+    pub(super) parameters: Value,
+    /// Where the loss has settled, in dB.
+    pub(super) below: Option<f64>,
     /// The unit of the set point.
     pub(super) set_point: String,
     /// The smallest change of it that counts, in its unit.
@@ -107,7 +118,7 @@ pub(super) struct Places {
     positions: Vec<usize>,
     corrections: Vec<usize>,
     /// Where each correction gives what holds it back.
-    why: Vec<usize>,
+    why: Vec<(usize, KindFacts)>,
     /// From the unit of each correction to that of its position.
     factors: Vec<f64>,
     set_points: Vec<Option<usize>>,
@@ -115,9 +126,9 @@ pub(super) struct Places {
     asks: Option<usize>,
 }
 
-fn of_kind<'a>(plan: &'a Plan, kind: &'static str) -> impl Iterator<Item = &'a PlannedNode> {
-    let nodes = plan.nodes.iter();
-    nodes.filter(move |node| node.kind.name == kind)
+/// A parameter of a node, where it has one that can be read so.
+pub(super) fn parameter<T: DeserializeOwned>(node: &PlannedNode, name: &str) -> Option<T> {
+    serde_json::from_value(node.spec.parameters()[name].take()).ok()
 }
 
 /// The slots that an input port of a feature reads.
@@ -194,10 +205,12 @@ impl Finder<'_> {
         let each = |node: &PlannedNode| {
             let port = |nth: usize| node.ports.get(nth).map_or(0..0, |(_, slots)| slots.clone());
             let rates = reads(plan, node, 0).into_iter();
-            let all = port(0).zip(port(1)).zip(rates);
+            let facts = (node.kind.facts)();
+            let all = port(0).zip(port(1).map(|slot| (slot, facts))).zip(rates);
             all.collect::<Vec<_>>()
         };
-        let all: Vec<_> = of_kind(plan, "compensate").flat_map(each).collect();
+        let corrects = |node: &&PlannedNode| node.kind.duty() == Duty::Correct;
+        let all: Vec<_> = plan.nodes.iter().filter(corrects).flat_map(each).collect();
         let named = |slot: usize| &plan.channels[slot].channel.name;
         for &((correction, why), rate) in &all {
             let namesakes = all
@@ -213,10 +226,11 @@ impl Finder<'_> {
             }
         }
         self.track.begun = vec![false; self.track.axes.len()];
-        if let Some(node) = of_kind(plan, "remeasure").next() {
-            let tolerance = node.spec.parameters()["tolerance"]
-                .as_str()
-                .map(str::to_owned);
+        let asks = |node: &&PlannedNode| matches!(node.kind.duty(), Duty::Ask { .. });
+        if let Some(node) = plan.nodes.iter().find(asks)
+            && let Duty::Ask { tolerance } = node.kind.duty()
+        {
+            let tolerance = parameter(node, tolerance);
             self.track.remeasures = tolerance.map(|tolerance| (node.instance(), tolerance));
             self.places.asks = node.port("ask").map(|slots| slots.start);
         }
@@ -227,7 +241,7 @@ impl Finder<'_> {
         &mut self,
         name: String,
         correction: usize,
-        why: usize,
+        why: (usize, KindFacts),
         rate: usize,
     ) -> Result<(), String> {
         let channels = &self.plan.channels;
@@ -260,7 +274,8 @@ impl Finder<'_> {
         self.places.positions.push(position);
         self.places.corrections.push(correction);
         self.places.why.push(why);
-        self.track.positions.push(unit.to_string());
+        let named = (channels[position].channel.name.clone(), unit.to_string());
+        self.track.positions.push(named);
         self.track.drifts.push(drift);
         self.track.axes.push(TrackAxis {
             name,
@@ -285,15 +300,20 @@ impl Finder<'_> {
         Some(TrackDrift {
             position,
             unit: channel.unit.to_string(),
+            kind: node.kind.name,
             slope,
         })
     }
 
     fn losses(&mut self) {
         let plan = self.plan;
-        let mut settled: Vec<&PlannedNode> = of_kind(plan, "settled").collect();
-        for node in of_kind(plan, "optical_loss") {
-            let (of, found) = (node.instance(), self.loss(node));
+        let settles = |node: &&PlannedNode| matches!(node.kind.duty(), Duty::Settle { .. });
+        let mut settled: Vec<&PlannedNode> = plan.nodes.iter().filter(settles).collect();
+        for node in &plan.nodes {
+            let Duty::Loss { over } = node.kind.duty() else {
+                continue;
+            };
+            let (of, found) = (node.instance(), self.loss(node, over));
             let of_loss = |settled: &&PlannedNode| {
                 let of = reads(plan, settled, 0);
                 of.iter().any(|slot| node.slots.contains(slot))
@@ -320,20 +340,9 @@ impl Finder<'_> {
         }
     }
 
-    fn loss(&mut self, node: &PlannedNode) -> Result<TrackLoss, String> {
-        let parameters = serde_json::from_value(node.spec.parameters());
-        let mut spec: OpticalLoss = parameters.map_err(|error| error.to_string())?;
+    fn loss(&mut self, node: &PlannedNode, over: &str) -> Result<TrackLoss, String> {
         let read = reads(self.plan, node, 0);
         let channels = &self.plan.channels;
-        if let Some(preset) = spec.preset.take() {
-            // A preset goes by names, and drifts have others where they are taken again.
-            let radius = |&slot: &usize| {
-                let value = preset.radius_um(&channels[slot].channel.name)?;
-                let unit = Unit::parse("um").ok()?;
-                Some(Quantity { value, unit })
-            };
-            spec.radii = read.iter().map(radius).collect();
-        }
         let mut drifts = Vec::with_capacity(read.len());
         for slot in read {
             let drift = measured_drift(self.plan, slot).map(|of| of.0);
@@ -355,7 +364,9 @@ impl Finder<'_> {
         Ok(TrackLoss {
             node: node.instance(),
             drifts,
-            spec,
+            kind: node.kind.name,
+            parameters: node.spec.parameters(),
+            over: parameter(node, over),
             settled: None,
         })
     }
@@ -375,8 +386,9 @@ impl Finder<'_> {
         let slope = self.slope(drift, place)?;
         if place == self.places.positions.len() {
             self.places.positions.push(measured);
-            let unit = &self.plan.channels[measured].channel.unit;
-            self.track.positions.push(unit.to_string());
+            let channel = &self.plan.channels[measured].channel;
+            let named = (channel.name.clone(), channel.unit.to_string());
+            self.track.positions.push(named);
         }
         let drifts = &mut self.track.drifts;
         let known = drifts.iter().position(|known| *known == slope);
@@ -387,12 +399,18 @@ impl Finder<'_> {
     }
 
     fn settled(&self, node: &PlannedNode, set_point: usize) -> Option<TrackSettled> {
-        let spec: Settled = serde_json::from_value(node.spec.parameters()).ok()?;
+        let Duty::Settle { below, change } = node.kind.duty() else {
+            return None;
+        };
+        let (below, change): (Quantity, Quantity) =
+            (parameter(node, below)?, parameter(node, change)?);
         let unit = &self.plan.channels[set_point].channel.unit;
         Some(TrackSettled {
-            change: spec.change.as_difference(&unit.difference())?,
+            kind: node.kind.name,
+            parameters: node.spec.parameters(),
+            below: Unit::parse("dB").ok().and_then(|unit| below.in_unit(&unit)),
+            change: change.as_difference(&unit.difference())?,
             set_point: unit.to_string(),
-            spec,
         })
     }
 }
@@ -401,8 +419,8 @@ impl Track {
     pub(super) fn look(&mut self, places: &Places, engine: &Engine, now: Instant, begins: bool) {
         self.ticks += 1;
         self.asks |= places.asks.is_some_and(|slot| engine.value(slot) == 1.0);
-        for (axis, &why) in self.axes.iter_mut().zip(&places.why) {
-            if let Some(by) = held_back_by(engine.value(why)) {
+        for (axis, (why, facts)) in self.axes.iter_mut().zip(&places.why) {
+            if let Some(by) = facts.reason(engine.value(*why)) {
                 *axis.held_back.entry(by).or_default() += 1;
             }
         }
@@ -427,8 +445,8 @@ impl Track {
         {
             return;
         }
-        for (begun, &why) in self.begun.iter_mut().zip(&places.why) {
-            *begun |= engine.value(why) != INVALID;
+        for (begun, (why, _)) in self.begun.iter_mut().zip(&places.why) {
+            *begun |= engine.value(*why) != INVALID;
         }
         let there = places.corrections.iter().zip(&places.factors);
         let correction = there

@@ -54,7 +54,10 @@ impl Worth {
             drift_without: empty(),
             drift_with: empty(),
             correction: empty(),
-            correction_units: track.positions[..track.axes.len()].to_vec(),
+            correction_units: track.positions[..track.axes.len()]
+                .iter()
+                .map(|(_, unit)| unit.clone())
+                .collect(),
             departures: departures(track),
             realignment: realignment(track),
             light: Light::before(losses.next()),

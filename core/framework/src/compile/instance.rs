@@ -10,7 +10,10 @@ use super::problem;
 use crate::diagnostic::{Diagnostics, Place, Problem};
 use crate::document::problem::InputAsKey;
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, out_of_range, taken_twice};
+use crate::node::{
+    Kind, Mistake, NodeKind, NodeSpec, PredictorForm, Role, StateForm, out_of_range,
+};
+use crate::registry::{self, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -100,22 +103,18 @@ fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> 
 
 /// The kind of a name.
 fn find(name: &str) -> Result<&'static Kind, Box<dyn Problem>> {
-    let kind = name.to_owned();
-    let Some(same) = kinds().get(name) else {
-        let known = kinds().keys().copied().collect();
-        return Err(problem::UnknownKind { kind, known }.into());
-    };
-    let [only] = same[..] else {
-        let packages = same.iter().map(|kind| kind.package).collect();
-        return Err(problem::KindTwice { kind, packages }.into());
-    };
-    match taken_twice(only.package) {
-        None => Ok(only),
-        Some((of, name, packages)) => Err(problem::WrittenTwice {
-            kind,
-            of,
-            name,
-            packages,
+    let kind = registry::find::<NodeKind>(name).map_err(|why| -> Box<dyn Problem> {
+        match why.is_twice() {
+            true => problem::KindTwice { why }.into(),
+            false => problem::UnknownKind { why }.into(),
+        }
+    })?;
+    let twice = taken_twice::<StateForm>(kind.package);
+    match twice.or_else(|| taken_twice::<PredictorForm>(kind.package)) {
+        None => Ok(kind),
+        Some(written) => Err(problem::WrittenTwice {
+            kind: kind.name,
+            written,
         }
         .into()),
     }

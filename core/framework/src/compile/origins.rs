@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Plan, PlannedNode};
+use crate::node::Duty;
 
 /// The slots from which others follow, these included, where `reads` gives those that a node goes by.
 #[must_use]
@@ -79,11 +80,15 @@ pub fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
     of_slot
 }
 
-/// The measured channels that a `health` node watches over, each with the slot of the port `reason` that is about it.
+/// The measured channels that a node watches over, each with the slot of the port `reason` that is about it.
 #[must_use]
 pub fn health_reasons(plan: &Plan) -> BTreeMap<usize, usize> {
     let mut reasons = BTreeMap::new();
-    for node in plan.nodes.iter().filter(|node| node.kind.name == "health") {
+    for node in plan
+        .nodes
+        .iter()
+        .filter(|node| node.kind.duty() == Duty::Watch)
+    {
         if let Some((_, slots)) = node.ports.get(1) {
             let watched = inputs(plan, node).into_iter().zip(slots.clone());
             reasons.extend(watched.filter(|(slot, _)| *slot < plan.sources.len()));

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{InputPort, Mistake, Restored, State};
+use super::{InputPort, KindFacts, Mistake, Restored, State};
 use crate::time::{Duration, Instant};
 
 /// A node that makes one prediction of several for the same instant.
@@ -51,6 +51,14 @@ pub trait Combiner: Debug + Send + Sync {
     fn inputs() -> &'static [InputPort]
     where
         Self: Sized;
+
+    /// What reports ask of the kind.
+    fn facts() -> KindFacts
+    where
+        Self: Sized,
+    {
+        KindFacts::default()
+    }
 
     /// Mistakes between parameters. The compiler has checked the ranges of the schema.
     fn mistakes(&self) -> Vec<Mistake> {

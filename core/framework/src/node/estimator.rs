@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Figure, Figures, InputPort, LearningLimits, Learns, Mistake, Predictor, TrainingError,
+    Figure, Figures, InputPort, KindFacts, LearningLimits, Learns, Mistake, Predictor,
+    TrainingError,
 };
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
@@ -86,6 +87,14 @@ pub trait Estimator: Debug + Send + Sync {
     fn inputs() -> &'static [InputPort]
     where
         Self: Sized;
+
+    /// What reports ask of the kind.
+    fn facts() -> KindFacts
+    where
+        Self: Sized,
+    {
+        KindFacts::default()
+    }
 
     /// Which regressors make up a row.
     fn regressors(&self) -> Regressors;

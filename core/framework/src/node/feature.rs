@@ -3,7 +3,9 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, PortSummary, Reach, Restored, State};
+use super::{
+    Encoder, InputPort, Inputs, KindFacts, Mistake, OutputPort, PortSummary, Reach, Restored, State,
+};
 use crate::channel::unless_infinite;
 use crate::time::{Duration, Instant};
 
@@ -87,6 +89,14 @@ pub trait Feature: Debug + Send + Sync {
         Self: Sized,
     {
         &[]
+    }
+
+    /// What reports ask of the kind.
+    fn facts() -> KindFacts
+    where
+        Self: Sized,
+    {
+        KindFacts::default()
     }
 
     /// Mistakes between parameters, whatever the inputs are. The compiler has checked the ranges of the schema.

@@ -16,6 +16,7 @@ mod estimator;
 mod feature;
 mod figure;
 mod forms;
+mod kind_facts;
 mod learner;
 mod learning_gate;
 mod linear_form;
@@ -31,7 +32,6 @@ mod recent_error;
 mod registry;
 mod state;
 mod training_error;
-mod written_name;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Evidence, Votes};
@@ -45,6 +45,7 @@ pub use feature::{Feature, Operator, Outputs, Tick};
 pub(crate) use feature::{PortValues, SlotTime};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
+pub use kind_facts::{Duty, KindFacts};
 pub use learner::{Learner, Learns, TrainedRange};
 pub use learning_gate::{Admission, LearningGate, LearningLimits};
 pub use linear_form::LinearForm;
@@ -58,12 +59,8 @@ pub use reach::Reach;
 pub(crate) use recent_error::RecentError;
 #[doc(hidden)]
 pub use registry::read;
-pub use registry::{
-    Kind, NodeSpec, ReadSpec, Role, RoleName, as_toml, first_paragraph, inline_toml, kind, kinds,
-};
+pub use registry::{Kind, NodeKind, NodeSpec, ReadSpec, Role, RoleName, as_toml, inline_toml};
 #[doc(hidden)]
 pub use state::StateForm;
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
-pub use written_name::taken_twice;
-pub use written_name::{Written, WrittenName, written_names};

@@ -7,6 +7,8 @@ use serde::de::{Deserialize, Deserializer, Error as _};
 use serde::ser::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::registry::{Sort, find};
+
 use super::{Coefficients, Learner, LinearForm, Mistake, TrainedRange};
 
 /// A fitted estimator, or what an [`Encoder`](super::Encoder) was fitted to. Predicting never changes what was learned.
@@ -82,11 +84,13 @@ pub trait InModel {}
 /// How a predictor of one name is read. A reader of one format alone is a tenth of the code of one for any format.
 #[doc(hidden)]
 pub struct PredictorForm {
-    pub name: &'static str,
     pub read: fn(Value) -> Result<Box<dyn Predictor>, serde_json::Error>,
 }
 
-inventory::collect!(PredictorForm);
+impl Sort for PredictorForm {
+    const ONE: &'static str = "fit";
+    const MANY: &'static str = "fits";
+}
 
 impl Serialize for dyn Predictor {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
@@ -101,13 +105,8 @@ impl<'de> Deserialize<'de> for Box<dyn Predictor> {
         let name = written.remove("type");
         let name = name.as_ref().and_then(Value::as_str);
         let name = name.ok_or_else(|| D::Error::missing_field("type"))?;
-        let mut forms = inventory::iter::<PredictorForm>();
-        match forms.find(|form| form.name == name) {
-            Some(form) => (form.read)(Value::Object(written)).map_err(D::Error::custom),
-            None => Err(D::Error::custom(format_args!(
-                "no node of this program has the fit `{name}`"
-            ))),
-        }
+        let form = find::<PredictorForm>(name).map_err(D::Error::custom)?;
+        (form.read)(Value::Object(written)).map_err(D::Error::custom)
     }
 }
 
@@ -124,16 +123,16 @@ macro_rules! predictor {
             impl $crate::node::InModel for $predictor {}
         };
 
-        $crate::inventory::submit! {
+        $crate::__private::list!(
+            $crate::node::PredictorForm,
+            $name,
+            $crate::__private::no_schema,
             $crate::node::PredictorForm {
-                name: $name,
                 read: |written| {
                     let fit: $predictor = $crate::__private::serde_json::from_value(written)?;
                     Ok(Box::new(fit))
                 },
             }
-        }
-
-        $crate::__written!(Predictor, $name);
+        );
     };
 }

@@ -1,16 +1,15 @@
-//! Decides how a kind becomes known and is looked up by name; not what kinds there are.
+//! Decides what a kind of node is, and how it becomes known; not what kinds there are.
 
-use std::collections::BTreeMap;
 use std::fmt::Debug;
-use std::sync::OnceLock;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
+use super::{Combiner, Duty, Estimator, Feature, InputPort, KindFacts, PortSummary, Read};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 use crate::document::{Value, decode_beside};
+use crate::registry::{Registered, Sort};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -66,29 +65,37 @@ impl std::fmt::Display for RoleName {
 /// The parameters of a node; nothing where they have mistakes.
 pub type ReadSpec = Option<Box<dyn NodeSpec>>;
 
-/// A kind of node, as registered.
+/// A kind of node, by its name in graph files; its schema is that of its parameters, with the ranges that the compiler checks.
+pub type Kind = Registered<NodeKind>;
+
+/// What a kind of node is.
 #[derive(Debug)]
-pub struct Kind {
-    /// What a graph file says as `type`.
-    pub name: &'static str,
+pub struct NodeKind {
     /// Its role.
     pub role: RoleName,
-    /// The crate that brings it.
-    pub package: &'static str,
-    /// The version of that crate.
-    pub version: &'static str,
     /// The input ports.
     pub inputs: fn() -> &'static [InputPort],
     /// Of a feature, the output ports as it tells them: see [`Feature::ports`].
     pub ports: fn() -> &'static [PortSummary],
+    /// What reports ask of it.
+    pub facts: fn() -> KindFacts,
     /// Reads its parameters, or reports their mistakes. The keys are those of the node
     /// that are read elsewhere.
     pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
-    /// The JSON Schema of its parameters, with the documentation and the ranges that the compiler checks.
-    pub schema: fn() -> &'static serde_json::Value,
 }
 
-impl Kind {
+impl Sort for NodeKind {
+    const ONE: &'static str = "node type";
+    const MANY: &'static str = "types";
+}
+
+impl NodeKind {
+    /// What it does, where reports go by that.
+    #[must_use]
+    pub fn duty(&self) -> Duty {
+        (self.facts)().duty
+    }
+
     /// The specification that parameters as a table give, with defaults for the others; none where they cannot be read.
     #[must_use]
     pub fn given(&self, parameters: &serde_json::Value) -> Option<Box<dyn NodeSpec>> {
@@ -124,31 +131,7 @@ impl Kind {
             ],
         }
     }
-
-    /// Whom a mistake in its code is for.
-    #[must_use]
-    pub fn author(&self) -> String {
-        format!(
-            "the author of `{}`, from {} {}",
-            self.name, self.package, self.version
-        )
-    }
-
-    /// The first paragraph of the documentation.
-    #[must_use]
-    pub fn summary(&self) -> String {
-        first_paragraph(&self.documentation())
-    }
-
-    /// The documentation of the parameters' struct.
-    #[must_use]
-    pub fn documentation(&self) -> String {
-        let text = (self.schema)()["description"].as_str();
-        text.unwrap_or_default().to_owned()
-    }
 }
-
-inventory::collect!(Kind);
 
 /// Reads parameters of one concrete type; [`register!`](crate::register) makes use of it.
 #[doc(hidden)]
@@ -157,12 +140,7 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
 ) -> ReadSpec {
-    let advice = |key: &str| {
-        let schema = serde_json::Value::from(schemars::schema_for!(T));
-        let description = schema["properties"][key]["description"].as_str()?;
-        Some(format!("add `{key}`: {}", first_paragraph(description)))
-    };
-    let read = decode_beside::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
+    let read = decode_beside::<T>(value, "the node", elsewhere, diagnostics)?;
     Some(Box::new(read))
 }
 
@@ -195,34 +173,6 @@ pub fn as_toml(json: &serde_json::Value) -> Option<toml::Value> {
     })
 }
 
-/// The first paragraph of a documentation, on one line.
-#[must_use]
-pub fn first_paragraph(documentation: &str) -> String {
-    let paragraph = documentation.split("\n\n").next().unwrap_or_default();
-    paragraph.replace('\n', " ")
-}
-
-/// All kinds linked into this program, by name; where two crates brought the same name, both.
-pub fn kinds() -> &'static BTreeMap<&'static str, Vec<&'static Kind>> {
-    static KINDS: OnceLock<BTreeMap<&'static str, Vec<&'static Kind>>> = OnceLock::new();
-    KINDS.get_or_init(|| {
-        let mut kinds = BTreeMap::<_, Vec<_>>::new();
-        for kind in inventory::iter::<Kind> {
-            kinds.entry(kind.name).or_default().push(kind);
-        }
-        for same in kinds.values_mut() {
-            same.sort_by_key(|kind| kind.package);
-        }
-        kinds
-    })
-}
-
-/// The kind of a name, if there is one.
-#[must_use]
-pub fn kind(name: &str) -> Option<&'static Kind> {
-    kinds().get(name).and_then(|same| same.first().copied())
-}
-
 /// Makes a kind of node known: its parameters' type, its role, and the name that graph files use.
 ///
 /// The type implements the role's trait, `Serialize`, `Deserialize` and `JsonSchema`; its doc comments become the
@@ -249,27 +199,23 @@ macro_rules! register {
             }
         }
 
-        $crate::inventory::submit! {
-            $crate::node::Kind {
-                name: $name,
+        $crate::__private::list!(
+            $crate::node::NodeKind,
+            $name,
+            $crate::__private::schema_of!($spec),
+            $crate::node::NodeKind {
                 role: $crate::node::RoleName::$role,
-                package: env!("CARGO_PKG_NAME"),
-                version: env!("CARGO_PKG_VERSION"),
                 inputs: <$spec as $crate::node::$role>::inputs,
                 ports: $ports,
+                facts: <$spec as $crate::node::$role>::facts,
                 read: $crate::__private::read::<$spec>,
-                schema: || {
-                    use $crate::__private::{schemars::schema_for, serde_json::Value};
-                    static SCHEMA: std::sync::OnceLock<Value> = std::sync::OnceLock::new();
-                    SCHEMA.get_or_init(|| schema_for!($spec).into())
-                },
             }
-        }
+        );
     };
     ($($other:tt)*) => {
         compile_error!(
             "expected the type of the parameters, the role and the name of the kind: \
-             `register!(Difference, Feature, \"difference\")`; the roles are Feature, Estimator and Combiner"
+             `register!(Mine, Feature, \"mine\")`; the roles are Feature, Estimator and Combiner"
         );
     };
 }

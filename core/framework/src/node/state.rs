@@ -6,6 +6,8 @@ use std::fmt;
 use rmp_serde::decode;
 use serde::Deserialize;
 
+use crate::registry::{Sort, find};
+
 /// What a running node knows: all that its next outputs depend on, beside its inputs.
 ///
 /// A state is a serde struct whose registered name ends in the version of its form, `"slope/1"`. A form that has been
@@ -23,11 +25,13 @@ type ReadState = fn(&[u8]) -> Result<Box<dyn State>, decode::Error>;
 /// How a state of one name is read. A reader of one format alone is a tenth of the code of one for any format.
 #[doc(hidden)]
 pub struct StateForm {
-    pub name: &'static str,
     pub read: ReadState,
 }
 
-inventory::collect!(StateForm);
+impl Sort for StateForm {
+    const ONE: &'static str = "state";
+    const MANY: &'static str = "states";
+}
 
 /// The name that a written state begins with.
 #[derive(Deserialize)]
@@ -42,13 +46,8 @@ impl dyn State {
     /// When this program does not know its name, or it has another form.
     pub fn read(written: &[u8]) -> Result<Box<Self>, decode::Error> {
         let Tag { state } = rmp_serde::from_slice(written)?;
-        let mut forms = inventory::iter::<StateForm>();
-        match forms.find(|form| form.name == state) {
-            Some(form) => (form.read)(written),
-            None => Err(serde::de::Error::custom(format_args!(
-                "no node of this program has the state `{state}`"
-            ))),
-        }
+        let form = find::<StateForm>(state).map_err(<decode::Error as serde::de::Error>::custom)?;
+        (form.read)(written)
     }
 
     /// The state as one of type `T`.
@@ -124,16 +123,16 @@ macro_rules! state {
             }
         };
 
-        $crate::inventory::submit! {
+        $crate::__private::list!(
+            $crate::node::StateForm,
+            $name,
+            $crate::__private::no_schema,
             $crate::node::StateForm {
-                name: $name,
                 read: |written| {
                     let state: $state = $crate::__private::rmp_serde::from_slice(written)?;
                     Ok(Box::new(state))
                 },
             }
-        }
-
-        $crate::__written!(State, $name);
+        );
     };
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::doubt::FROM_PAST_ALONE;
 use super::{EstimatorFit, FitReport, Outcome};
 use crate::compile::{Plan, PlannedRole};
+use crate::node::Duty;
 
 /// An output of which voters have no regressor left.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,7 +76,7 @@ impl FitReport {
         let nodes = plan
             .nodes
             .iter()
-            .filter(|node| node.kind.name == "fallback");
+            .filter(|node| node.kind.duty() == Duty::Fallback);
         let found = nodes.filter_map(|node| {
             let gather = node.role.inputs().next()?;
             let first = plan.gathers[gather].entries.first()?.slot;

@@ -8,6 +8,7 @@ use super::hide_much;
 use crate::compile::{Plan, PlannedRole};
 use crate::diagnostic::count;
 use crate::engine::Engine;
+use crate::node::Duty;
 
 /// A `fallback` node whose first voter was not there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,7 +64,10 @@ pub(super) struct Fallen {
 impl Fallen {
     /// One for each `fallback`.
     pub(super) fn all(plan: &Plan) -> Vec<Self> {
-        let nodes = plan.nodes.iter().filter(|of| of.kind.name == "fallback");
+        let nodes = plan
+            .nodes
+            .iter()
+            .filter(|of| of.kind.duty() == Duty::Fallback);
         let watched = nodes.filter_map(|node| match node.role {
             PlannedRole::Combiner { voters, .. } => Some(Self {
                 slot: node.slots.start,

@@ -57,18 +57,6 @@ const OF_LEVELS: [&str; 12] = [
     "m", "rad", "1", "K", "V", "A", "Ohm", "g", "Pa", "N", "m/s2", "F",
 ];
 
-/// Kinds of nodes whose outputs are changes or figures of their own, whatever they read.
-const OF_CHANGES: [&str; 8] = [
-    "difference",
-    "slope",
-    "product",
-    "compensate",
-    "optical_loss",
-    "settled",
-    "stability",
-    "encoder",
-];
-
 /// Whether a channel is a level with an arbitrary zero, such as a position: measured as one, or made of such by a node that keeps it.
 #[must_use]
 pub fn is_level(plan: &Plan, slot: usize) -> bool {
@@ -87,7 +75,7 @@ pub fn is_level(plan: &Plan, slot: usize) -> bool {
     };
     let node = &plan.nodes[node];
     let mut entries = node.role.inputs().flat_map(|of| &plan.gathers[of].entries);
-    !OF_CHANGES.contains(&node.kind.name) && entries.any(|entry| is_level(plan, entry.slot))
+    !(node.kind.facts)().is_change && entries.any(|entry| is_level(plan, entry.slot))
 }
 
 /// Sums of the truths that are levels, as an engine is stepped over the data of a fit.

@@ -19,10 +19,7 @@ pub use error::ConnectorError;
 pub use inlet::{
     Inlet, Mapped, Mapping, ParameterRemark, Seen, Source, SourceWiring, Stamps, WiredChannel,
 };
-pub use kind::{
-    ConnectorKind, SinkKind, SourceKind, sink_kind, sink_kinds, source_kind, source_kinds,
-};
-pub(crate) use kind::{Kinds, all_sinks, all_sources};
+pub use kind::{ConnectorKind, SinkKind, SourceKind};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
 pub use left_out::{LeftOut, LeftOutCounts};

@@ -21,11 +21,12 @@ use std::path::PathBuf;
 
 use athermal_run::recording::{ThinnedChannels, Thinning};
 
-use crate::companion::{Companion, companion_kinds};
+use crate::companion::{Companion, CompanionKind};
 use crate::compile::{Plan, SourceChannel};
 use crate::connector::{Mapped, Sink, SinkKind, Source, SourceKind, SourceWiring, WiredChannel};
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::document::GraphFile;
+use crate::registry::{self, Registered};
 use crate::sequencer::ClockRule;
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
@@ -52,7 +53,7 @@ pub struct DeclaredSource {
     /// Its name.
     pub name: String,
     /// Its kind.
-    pub kind: &'static SourceKind,
+    pub kind: &'static Registered<SourceKind>,
     /// Its parameters.
     pub parameters: Box<dyn Source>,
     /// The folder of the file in which its `path` stands, if it has one: relative paths start there.
@@ -88,7 +89,7 @@ pub struct DeclaredSink {
     /// Its name.
     pub name: String,
     /// Its kind.
-    pub kind: &'static SinkKind,
+    pub kind: &'static Registered<SinkKind>,
     /// Its parameters.
     pub parameters: Box<dyn Sink>,
     /// As of a source.
@@ -177,9 +178,14 @@ impl Deployment {
             .map(|section| sinks::read(section, graph, plan, files, diagnostics))
             .unwrap_or_default();
         let mut companions = Vec::new();
-        for kind in companion_kinds() {
-            let what = format!("`[{}]`", kind.section);
-            companions.extend((kind.read)(section(kind.section), &what, diagnostics));
+        for kind in registry::all::<CompanionKind>() {
+            let found = section(kind.name);
+            if let (Some(value), Err(why)) = (found, registry::find::<CompanionKind>(kind.name)) {
+                diagnostics.report(value.place, problem::KindTwice { why });
+                break;
+            }
+            let what = format!("`[{}]`", kind.name);
+            companions.extend((kind.read)(found, &what, diagnostics));
         }
         let deployment = Self {
             runtime: runtime?,

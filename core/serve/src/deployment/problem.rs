@@ -2,35 +2,19 @@
 
 use std::sync::Arc;
 
-use crate::diagnostic::{Names, Place, names, nearest, problem};
+use crate::diagnostic::{Names, Place, names, problem};
 use crate::quantity::Quantity;
+use crate::registry::NotFound;
 use crate::unit::Unit;
-
-/// Roles and kinds that the program has only where it was built with the feature of that name.
-const OF_FEATURES: [(&str, &str); 3] = [("source", "mqtt"), ("sink", "mqtt"), ("sink", "parquet")];
 
 problem! {
     /// A `type` that no linked crate brings.
-    A200 UnknownKind {
-        /// `source` or `sink`.
-        role: &'static str,
-        kind: String,
-        known: Vec<&'static str>,
-    }
+    A200 UnknownKind { why: NotFound }
     error: "unknown kind of source or sink",
     explanation: "No crate in this program has a source or sink of this kind. `athermal nodes` lists the kinds that there are.",
-    message: format!("there is no kind of {role} `{kind}`"),
+    message: why.message(),
     label: "no such kind",
-    help: match nearest(kind, known.iter().copied()) {
-        _ if OF_FEATURES.contains(&(*role, &**kind)) => {
-            format!("this needs a program that was built with `--features {kind}`")
-        }
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!(
-            "`athermal build --with CRATE` brings those of a plugin crate; kinds of {role}s in this program: {}",
-            names(known)
-        ),
-    },
+    help: why.help(),
 }
 
 problem! {
@@ -208,18 +192,14 @@ problem! {
 }
 
 problem! {
-    /// Two crates bring the same kind.
-    A211 KindTwice {
-        /// `source` or `sink`.
-        role: &'static str,
-        kind: String,
-        packages: Vec<&'static str>,
-    }
+    /// Two crates bring the same kind, or the same section.
+    A211 KindTwice { why: NotFound }
     error: "ambiguous kind of source or sink",
-    explanation: "Two crates in this program bring a source, or a sink, of the same kind, so that a file could mean either.",
-    message: format!("the kind of {role} `{kind}` is brought by several crates: {}", names(packages)),
+    explanation: "Two crates in this program bring a source, or a sink, of the same kind, or read the same section, so that a file could \
+        mean either.",
+    message: why.message(),
     label: "which of them?",
-    help: "leave one of the crates out when the program is built",
+    help: why.help(),
 }
 
 problem! {

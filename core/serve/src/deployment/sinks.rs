@@ -13,7 +13,7 @@ use super::problem::{NoOutput, NotACommand, OtherRate, Unbounded};
 use super::sources::of_kind;
 use super::{DeclaredSink, keys};
 use crate::compile::{Plan, PlannedOutput};
-use crate::connector::{Purpose, all_sinks};
+use crate::connector::{Purpose, Sink};
 use crate::diagnostic::{Diagnostics, Names, Place, Sources};
 use crate::document::{Data, Entry, GraphFile, Pattern, Table, Value, decode};
 use crate::quantity::Quantity;
@@ -113,7 +113,7 @@ fn sink(
     let (by_hand, own) = keys::split(&own, &["outputs", "rate"]);
     let by_hand = |key: &str| by_hand.as_table().and_then(|table| table.get(key));
     let role = ("sink", name);
-    let kind = of_kind(role, entry, &parameters, all_sinks(), &KEYS, diagnostics);
+    let kind = of_kind::<dyn Sink>(role, entry, &parameters, &KEYS, diagnostics);
     let what = format!("the sink `{name}`");
     let keys = keys::read::<SinkKeys>(&own, &what, diagnostics);
     let columns = match by_hand("outputs") {

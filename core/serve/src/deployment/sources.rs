@@ -12,10 +12,11 @@ use super::channels::{ChannelsForm, Claim, GraphChannels};
 use super::problem::{ChannelTwice, KindTwice, NoAddress, NoSource, UnfitParameter, UnknownKind};
 use super::{DeclaredChannel, DeclaredSource, keys};
 use crate::compile::Plan;
-use crate::connector::{ConnectorKind, Kinds, Source, SourceKind, all_sources};
+use crate::connector::{ConnectorKind, Source, SourceKind};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::problem::MissingKey;
 use crate::document::{Entry, GraphFile, Table, Value};
+use crate::registry::{Registered, Sort, all, find};
 use crate::sequencer::{ClockRemedy, ClockRule};
 use crate::time::Duration;
 
@@ -135,17 +136,22 @@ pub(super) fn of_kind<S: ?Sized>(
     (role, name): (&'static str, &str),
     entry: &Entry,
     parameters: &Value,
-    kinds: &'static Kinds<S>,
     generic: &[&str],
     diagnostics: &mut Diagnostics,
-) -> Option<(&'static ConnectorKind<S>, Box<S>)> {
+) -> Option<(&'static Registered<ConnectorKind<S>>, Box<S>)>
+where
+    ConnectorKind<S>: Sort,
+{
     let what = format!("the {role} `{name}`");
     let Some(written) = entry.value.as_table()?.get("type") else {
         let problem = MissingKey {
             key: "type".to_owned(),
             what,
             advice: Some(format!(
-                "name its kind, such as type = \"csv\"; `athermal nodes` lists the kinds of {role}s"
+                "name its kind, such as type = \"{}\"; `athermal nodes` lists the kinds of {role}s",
+                all::<ConnectorKind<S>>()
+                    .next()
+                    .map_or("", |kind| kind.name)
             )),
         };
         diagnostics.report(entry.key, problem);
@@ -155,34 +161,26 @@ pub(super) fn of_kind<S: ?Sized>(
         super::channels::wrong_type(written, "type", "a kind in quotes", diagnostics);
         return None;
     };
-    let Some(kind) = kinds.by_name.get(text) else {
-        let problem = UnknownKind {
-            role,
-            kind: text.to_owned(),
-            known: kinds.by_name.keys().copied().collect(),
-        };
-        diagnostics.report(written.place, problem);
-        return None;
+    let kind = match find::<ConnectorKind<S>>(text) {
+        Ok(kind) => kind,
+        Err(why) => {
+            match why.is_twice() {
+                true => diagnostics.report(written.place, KindTwice { why }),
+                false => diagnostics.report(written.place, UnknownKind { why }),
+            }
+            return None;
+        }
     };
-    if let Some(packages) = kinds.ambiguous.get(text) {
-        let problem = KindTwice {
-            role,
-            kind: text.to_owned(),
-            packages: packages.clone(),
-        };
-        diagnostics.report(written.place, problem);
-        return None;
-    }
     let elsewhere = [&["type"], generic].concat();
     let read = (kind.read)(parameters, &what, &elsewhere, diagnostics)?;
-    keys::is_in_range((kind.schema)(), parameters, diagnostics).then_some((*kind, read))
+    keys::is_in_range((kind.schema)(), parameters, diagnostics).then_some((kind, read))
 }
 
 /// A source as far as it could be read.
 struct Part<'a> {
     name: &'a str,
     place: Place,
-    kind: Option<(&'static SourceKind, Box<dyn Source>)>,
+    kind: Option<(&'static Registered<SourceKind>, Box<dyn Source>)>,
     keys: Option<SourceKeys>,
     thinning: Option<Thinning>,
     folder: PathBuf,
@@ -239,7 +237,7 @@ fn part<'a>(
     let what = format!("the source `{name}`");
     let named = named.as_table().and_then(|table| table.get("channels"));
     let role = ("source", name);
-    let kind = of_kind(role, entry, &parameters, all_sources(), &KEYS, diagnostics);
+    let kind = of_kind::<dyn Source>(role, entry, &parameters, &KEYS, diagnostics);
     let mut claims = named.map(|value| channels.read(value, diagnostics));
     let addressed = claims.as_ref().map_or(0, Vec::len);
     let remarks = kind.as_ref().map(|(_, source)| source.remarks(addressed));

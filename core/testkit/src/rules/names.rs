@@ -4,25 +4,18 @@ use super::super::compared::none_of;
 use super::Subject;
 use crate::compile::PlannedRole;
 use crate::document::is_name;
-use crate::node::{Kind, Role, kinds, taken_twice};
+use crate::node::{Kind, NodeKind, PredictorForm, Role, StateForm};
+use crate::registry::{find, taken_twice};
 
 /// What of a kind, and of its crate, has the name of something else, or one that no graph could write.
 pub(in super::super) fn shared(kind: &Kind) -> Vec<String> {
     let mut found = Vec::new();
-    let same = kinds().get(kind.name).map_or(&[][..], Vec::as_slice);
-    if same.len() > 1 {
-        let packages = listed(same.iter().map(|kind| kind.package));
-        found.push(format!(
-            "the name of the kind `{}` is taken twice, by {packages}",
-            kind.name
-        ));
-    }
-    if let Some((of, name, packages)) = taken_twice(kind.package) {
-        let packages = listed(packages.into_iter());
-        found.push(format!(
-            "the name of the {of} `{name}` is taken twice, by {packages}"
-        ));
-    }
+    let written = [
+        find::<NodeKind>(kind.name).err(),
+        taken_twice::<StateForm>(kind.package),
+        taken_twice::<PredictorForm>(kind.package),
+    ];
+    found.extend(written.into_iter().flatten().map(|twice| twice.message()));
     let ports = (kind.inputs)().iter().map(|port| port.name);
     found.extend(unfit("the kind", std::iter::once(kind.name)));
     found.extend(unfit("the input port", ports));
@@ -86,9 +79,4 @@ fn unfit<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
 fn is_channel(name: &str) -> bool {
     let fits = |c: char| c.is_alphanumeric() || "_-@./".contains(c);
     !name.is_empty() && name.chars().all(fits)
-}
-
-fn listed<'a>(packages: impl Iterator<Item = &'a str>) -> String {
-    let quoted: Vec<_> = packages.map(|package| format!("`{package}`")).collect();
-    quoted.join(" and ")
 }

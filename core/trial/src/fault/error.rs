@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::FaultKind;
+use crate::failure::Failure;
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -159,5 +160,13 @@ impl fmt::Display for FaultError {
         }
     }
 }
+
+impl From<FaultError> for Failure {
+    fn from(error: FaultError) -> Self {
+        Self::Request(error.to_string())
+    }
+}
+
+athermal_core::register_error!(FaultError);
 
 impl std::error::Error for FaultError {}

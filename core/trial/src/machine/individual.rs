@@ -53,7 +53,7 @@ impl Individual {
 }
 
 /// The standard deviation of the logarithm of a parameter over machines, 0 to 1: `30%`, or as a share `0.3`.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd)]
 pub struct Spread(f64);
 
 impl Spread {

@@ -19,7 +19,7 @@ pub use faulty::Faulty;
 pub use individual::{Individual, Spread, SpreadError};
 pub use planned::{Announcements, plans};
 pub use recording::{MachineError, Simulated};
-pub use registry::{KnownMachine, UnknownMachine, machine, machines};
+pub use registry::{KnownMachine, facts};
 pub use schedule::{Schedule, ScheduleError};
 pub use simulation::{Machine, Simulation};
 

@@ -50,9 +50,10 @@ use super::{Channel, Row, Schedule, SetPoint, Setup, SetupError};
 ///     }
 /// }
 ///
-/// athermal_trial::register_machine!(Plate);
+/// athermal_trial::register_machine!(Plate, "plate");
 /// # fn main() {
-/// let plate = athermal_trial::machine::machine("plate").expect("it has just been registered").machine;
+/// let plate = athermal_core::registry::find::<athermal_trial::machine::KnownMachine>("plate");
+/// let plate = plate.expect("it has just been registered").machine;
 /// assert_eq!(plate.channels()[1].reference(), "position.Z");
 /// let mut simulation = plate.start(&Setup { days: 0.01, ..Setup::default() }).expect("it is short");
 /// let mut row = Row::empty(plate.channels());

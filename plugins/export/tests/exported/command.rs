@@ -4,16 +4,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use athermal_command::terminal::Options;
-use athermal_command::{Failure, Terminal};
+use athermal_command::{CommandKind, Failure, Terminal};
 use athermal_core::engine::{Engine, fnv_1a};
 use athermal_core::prng::Prng;
+use athermal_core::registry::find;
 use athermal_run::model::Model;
 
 use crate::random::{events, graph};
 use crate::support::{Scratch, made_up, stepped};
 
 fn export(words: &[&str]) -> Result<(), String> {
-    let kind = athermal_command::kind("export").unwrap();
+    let kind = find::<CommandKind>("export").unwrap();
     let matches = (kind.declare)().try_get_matches_from(["export"].iter().chain(words));
     let matches = matches.map_err(|error| error.to_string())?;
     let terminal = Terminal::new(&Options {

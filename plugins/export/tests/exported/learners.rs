@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use athermal_core::engine::Engine;
 use athermal_core::prng::Prng;
+use athermal_core::registry::find;
 use athermal_export::{ExportError, Options, Rates, export_c, lower};
 use athermal_run::fit::{FitOptions, fit};
-use athermal_trial::machine::{Setup, Simulated, machine};
+use athermal_trial::machine::{KnownMachine, Setup, Simulated};
 
 use crate::random::events;
 use crate::shipped::second;
@@ -37,7 +38,7 @@ of_vote = "vote:novelty"
         days: 1.0,
         ..Setup::default()
     };
-    let recording = Simulated::new(machine("die-tester").unwrap().machine, setup);
+    let recording = Simulated::new(find::<KnownMachine>("die-tester").unwrap().machine, setup);
     let (fitted, _) = fit(&plan, &recording, &FitOptions::default(), &mut |_| {}).unwrap();
     Engine::new(Arc::clone(&plan), &fitted).unwrap()
 }

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use athermal_core::engine::Engine;
+use athermal_core::registry::find;
 use athermal_export::{Options, Rates, export_c};
 use athermal_run::fit::{FitOptions, fit};
 use athermal_run::recording::{self, Recording as _, Samples};
-use athermal_trial::machine::{Setup, Simulated, machine};
+use athermal_trial::machine::{KnownMachine, Setup, Simulated};
 
 use crate::shipped::second;
 use crate::support::{
@@ -26,7 +27,7 @@ fn day() -> Simulated<'static> {
         days: 1.0,
         ..Setup::default()
     };
-    Simulated::new(machine("die-tester").unwrap().machine, setup)
+    Simulated::new(find::<KnownMachine>("die-tester").unwrap().machine, setup)
 }
 
 #[test]

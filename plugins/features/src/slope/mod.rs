@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -92,6 +92,10 @@ impl Slope {
 }
 
 impl Feature for Slope {
+    fn facts() -> KindFacts {
+        KindFacts::of(Duty::Slope).change()
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what the slope is taken of")] }
     }

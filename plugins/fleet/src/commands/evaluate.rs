@@ -1,5 +1,6 @@
 //! `athermal fleet evaluate`: scores the model of each machine on recorded data.
 
+use athermal_core::watch::Watch;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -102,7 +103,7 @@ impl Scoring {
             abs_truth_below: self.abs_truth_below.clone(),
             ..Setup::default()
         };
-        let mut progress = terminal.progress_to("evaluating", jobs.len() as u64);
+        let mut progress = terminal.begin("evaluating", Some(jobs.len() as u64));
         let mut done = 0;
         run(&setup, self.workers.count(), jobs, |event| {
             warn_died(terminal, &event);

@@ -1,5 +1,6 @@
 //! `athermal fleet fit`: fits a graph on each machine of a fleet.
 
+use athermal_core::watch::Watch;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -155,7 +156,7 @@ impl Fit {
             memory: self.memory.saturating_mul(1 << 20),
             ..Setup::default()
         };
-        let mut progress = terminal.progress_to("fitting", jobs.len() as u64);
+        let mut progress = terminal.begin("fitting", Some(jobs.len() as u64));
         let mut done = 0;
         run(&setup, self.workers.count(), jobs, |event| {
             warn_died(terminal, &event);

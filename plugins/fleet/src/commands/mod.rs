@@ -10,7 +10,7 @@ mod table;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use athermal_command::{Answer, Command, Failure, Terminal, numbers, register_command};
+use athermal_command::{Answer, Command, Failure, Group, Terminal, numbers, register_command};
 use athermal_core::diagnostic::listed;
 use athermal_run::model::Model;
 use clap::{Args, Subcommand};
@@ -48,6 +48,7 @@ enum Action {
 }
 
 impl Command for Fleet {
+    const GROUP: Group = Group::Fleet;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match &self.action {
             Action::Fit(command) => command.run(terminal),

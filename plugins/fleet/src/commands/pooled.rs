@@ -1,5 +1,6 @@
 //! `athermal fleet fit --pooled`: what the machines of a fleet have in common, as a prior for new ones.
 
+use athermal_core::watch::Watch;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -54,7 +55,7 @@ impl Pooled<'_> {
             threads: self.threads,
             ..FitOptions::default()
         };
-        let mut progress = terminal.progress_to("pooling", self.machines.len() as u64);
+        let mut progress = terminal.begin("pooling", Some(self.machines.len() as u64));
         let mut failed = BTreeMap::new();
         for (nth, (machine, files)) in self.machines.iter().enumerate() {
             let Some(watch) = pooling.watched(&graph.plan) else {

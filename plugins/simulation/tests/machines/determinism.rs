@@ -8,7 +8,9 @@ use athermal_trial::machine::{
 };
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
-    machine::machine(name).ok().map(|known| known.machine)
+    athermal_core::registry::find::<machine::KnownMachine>(name)
+        .ok()
+        .map(|known| known.machine)
 }
 
 fn start(machine: &dyn Machine, days: f64, seed: u64) -> Box<dyn Simulation> {

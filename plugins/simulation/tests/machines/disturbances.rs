@@ -1,7 +1,8 @@
 //! What is disturbed changes as stated, from then on and until then; everything else keeps its bits.
 
+use athermal_core::registry::find;
 use athermal_simulation::{Disturbance, disturbed};
-use athermal_trial::machine::{Row, Setup, machine};
+use athermal_trial::machine::{KnownMachine, Row, Setup};
 
 const PLATE1: usize = 0;
 const HOLDER1: usize = 1;
@@ -11,7 +12,7 @@ const ROOM: usize = 4;
 fn rows(name: &str, by: &[&str]) -> Vec<Row> {
     let by: Vec<Disturbance> = by.iter().map(|text| text.parse().unwrap()).collect();
     let disturbed = disturbed(name, &by).unwrap();
-    let same = machine(name).unwrap().machine;
+    let same = find::<KnownMachine>(name).unwrap().machine;
     let machine = disturbed.as_deref().unwrap_or(same);
     let setup = Setup {
         days: 0.25,

@@ -4,7 +4,9 @@ use athermal_simulation as _;
 use athermal_trial::machine::{self, Machine, Row, SECOND_NS, Setup};
 
 fn machine(name: &str) -> Option<&'static dyn Machine> {
-    machine::machine(name).ok().map(|known| known.machine)
+    athermal_core::registry::find::<machine::KnownMachine>(name)
+        .ok()
+        .map(|known| known.machine)
 }
 
 const DAY_ROWS: usize = 8640;

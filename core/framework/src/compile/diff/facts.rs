@@ -9,8 +9,9 @@ use serde_json::Value;
 use super::ParameterChange;
 use crate::compile::plan::{NOVELTY, Plan, PlannedNode, PlannedRole, TruthLink};
 use crate::document::{TimeBase, TimeForm};
-use crate::node::{FREEZE, Kind, Read, Role, TruthLags, kinds};
+use crate::node::{FREEZE, Kind, NodeKind, Read, Role, TruthLags};
 use crate::quantity::Quantity;
+use crate::registry::all;
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -214,8 +215,9 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
     // By name alone, since no plan has a kind of a name that two crates brought.
     static KNOWN: OnceLock<HashMap<&str, OnceLock<Vec<String>>>> = OnceLock::new();
     let known = KNOWN.get_or_init(|| {
-        let names = kinds().keys();
-        names.map(|&name| (name, OnceLock::new())).collect()
+        all::<NodeKind>()
+            .map(|kind| (kind.name, OnceLock::new()))
+            .collect()
     });
     let Some(measured) = known.get(kind.name) else {
         return &[];

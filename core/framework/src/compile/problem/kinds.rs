@@ -1,51 +1,37 @@
 //! Mistakes about node types: which there are, and what a type refuses or doubts.
 
-use super::nearest_or_all;
 use crate::compile::KindFault;
-use crate::diagnostic::{names, problem};
-use crate::node::{Kind, Written};
+use crate::diagnostic::problem;
+use crate::node::Kind;
+use crate::registry::NotFound;
 
 problem! {
     /// A `type` that no linked crate brings.
-    A040 UnknownKind { kind: String, known: Vec<&'static str> }
+    A040 UnknownKind { why: NotFound }
     error: "unknown node type",
     explanation: "No crate in this program has a node of this type. `athermal nodes` lists the types that there are.",
-    message: format!("there is no node type `{kind}`"),
+    message: why.message(),
     label: "no such type",
-    help: nearest_or_all(
-        kind,
-        known,
-        "`athermal build --with CRATE` brings those of a plugin crate; types in this program:",
-    ),
+    help: why.help(),
 }
 
 problem! {
     /// Two crates bring the same kind.
-    A041 KindTwice { kind: String, packages: Vec<&'static str> }
+    A041 KindTwice { why: NotFound }
     error: "ambiguous name",
     explanation: "Two crates in this program have a node of the same type, or write what a node knows under the same name, so that a \
         graph or a file could mean either.",
-    message: format!("the node type `{kind}` is brought by several crates: {}", names(packages)),
+    message: why.message(),
     label: "which of them?",
-    help: "leave one of the crates out when the program is built",
+    help: why.help(),
 }
 
 problem! {
     /// Something that the kind's crate writes has a name that is taken twice.
-    A041 WrittenTwice {
-        kind: String,
-        of: Written,
-        name: &'static str,
-        packages: Vec<&'static str>,
-    }
-    message: format!(
-        "`{kind}` cannot be used, since the name of the {of} `{name}` is taken twice, by {}",
-        names(packages)
-    ),
+    A041 WrittenTwice { kind: &'static str, written: NotFound }
+    message: format!("`{kind}` cannot be used, since {}", written.message()),
     label: "which of them?",
-    help: format!(
-        "give one of them another name in its `{of}!`, or leave one of the crates out when the program is built"
-    ),
+    help: written.help(),
 }
 
 problem! {

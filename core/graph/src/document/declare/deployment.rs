@@ -1,29 +1,33 @@
 //! The sections that only a running machine needs: their form; what stands in them is decided by what runs there.
 
+use std::collections::BTreeSet;
+
 use indexmap::IndexMap;
 
 use super::names::name_rule;
 use super::reading::{table, text};
 use crate::diagnostic::Diagnostics;
 use crate::document::tree::{Table, Value};
+use crate::registry::{Sort, names_of};
 
 const SOURCES: &str = "sources";
 const SINKS: &str = "sinks";
 const MODEL: &str = "model";
-/// Sections of keys that every program knows.
-const TABLES: [&str; 3] = ["runtime", "control", "retrain"];
+const RUNTIME: &str = "runtime";
 
-/// The name of a section of keys that a linked crate reads, if it is none that every program knows.
+/// A section of keys that a linked crate reads, or would with a feature that was left out.
 #[derive(Debug)]
-pub struct Section(pub &'static str);
+pub struct Section;
 
-inventory::collect!(Section);
+impl Sort for Section {
+    const ONE: &'static str = "section";
+    const MANY: &'static str = "sections";
+}
 
 /// The sections of keys in this program.
 fn tables() -> impl Iterator<Item = &'static str> {
-    let more = inventory::iter::<Section>.into_iter().map(|of| of.0);
-    let more = more.filter(|name| !name.is_empty() && !TABLES.contains(name));
-    TABLES.into_iter().chain(more)
+    let more = names_of::<Section>().filter(|name| !name.is_empty());
+    [RUNTIME].into_iter().chain(BTreeSet::from_iter(more))
 }
 
 /// All of these sections.

@@ -73,7 +73,7 @@ fn node(
                 &entry.value,
                 "type",
                 &what,
-                Some("say which kind of node it is, e.g. type = \"slope\""),
+                Some("say which kind of node it is; `athermal nodes` lists them"),
                 diagnostics,
             );
             None

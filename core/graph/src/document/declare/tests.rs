@@ -156,11 +156,11 @@ fn a_range_is_given_in_the_unit_of_its_signal() {
 #[test]
 fn deployment_sections_are_handed_on_as_they_stand() {
     let graph = graph(
-        "model = \"m.json\"\n[sources.b]\nx = 1\n[sinks.a]\ny = 2\n[retrain]\nz = 3\n[[tests]]\nname = \"t\"",
+        "model = \"m.json\"\n[sources.b]\nx = 1\n[sinks.a]\ny = 2\n[runtime]\nz = 3\n[[tests]]\nname = \"t\"",
     );
     assert_eq!(
         graph.deployment.keys().collect::<Vec<_>>(),
-        ["sources", "sinks", "model", "retrain"]
+        ["sources", "sinks", "model", "runtime"]
     );
     assert_eq!(
         graph.tests.map(|tests| tests.to_json()),

@@ -9,10 +9,12 @@ mod tree;
 
 use std::cell::RefCell;
 
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 
 use super::tree::Value;
 use crate::diagnostic::Diagnostics;
+use crate::registry::first_paragraph;
 use error::Mistake;
 use tree::TreeDeserializer;
 
@@ -23,12 +25,26 @@ pub fn decode<T: DeserializeOwned>(
     what: &str,
     diagnostics: &mut Diagnostics,
 ) -> Option<T> {
-    decode_beside(value, what, &[], &|_| None, diagnostics)
+    decode_with(value, what, &[], &|_| None, diagnostics)
 }
 
-/// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one, and with what to write where
-/// one of its own is missing.
-pub fn decode_beside<T: DeserializeOwned>(
+/// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one. Where a key is missing, its
+/// documentation says what to write.
+pub fn decode_beside<T: DeserializeOwned + JsonSchema>(
+    value: &Value,
+    what: &str,
+    elsewhere: &[&str],
+    diagnostics: &mut Diagnostics,
+) -> Option<T> {
+    let advice = |key: &str| {
+        let schema = serde_json::Value::from(schemars::schema_for!(T));
+        let description = schema["properties"][key]["description"].as_str()?;
+        Some(format!("add `{key}`: {}", first_paragraph(description)))
+    };
+    decode_with(value, what, elsewhere, &advice, diagnostics)
+}
+
+fn decode_with<T: DeserializeOwned>(
     value: &Value,
     what: &str,
     elsewhere: &[&str],

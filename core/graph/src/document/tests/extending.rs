@@ -224,13 +224,13 @@ fn brackets_and_dotted_keys_nested_by_the_thousand_are_refused() {
 
 #[test]
 fn json_holds_a_tree_exactly() {
-    let text = "schema = 1\n[control]\nwhole = 9007199254740993\nthird = 0.3333333333333333\none = 1.0\nsmall = 5e-324\n\
+    let text = "schema = 1\n[runtime]\nwhole = 9007199254740993\nthird = 0.3333333333333333\none = 1.0\nsmall = 5e-324\n\
         t = 2020-01-01\nno = nan\nup = inf\ndown = -inf\nlist = [true, \"x\", {}]";
     let graph = graph(&[("a.toml", text)]);
     let stored = serde_json::to_string(&graph.tree.to_json()).expect("trees are serialisable");
     let json: serde_json::Value = serde_json::from_str(&stored).expect("what was written is JSON");
     assert_eq!(
-        json["control"].to_string(),
+        json["runtime"].to_string(),
         r#"{"whole":9007199254740993,"third":0.3333333333333333,"one":1.0,"small":5e-324,"t":"2020-01-01","no":"NaN","up":"inf","down":"-inf","list":[true,"x",{}]}"#
     );
     let place = graph.tree.place;

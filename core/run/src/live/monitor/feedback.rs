@@ -5,11 +5,15 @@
 
 use crate::compile::origins::{of_truths, slots, upstream};
 use crate::compile::{Plan, PlannedNode, PlannedRole};
+use crate::node::Duty;
 
 /// The measured channels that a correction moves and goes by.
 #[must_use]
 pub fn corrected_channels(plan: &Plan) -> Vec<String> {
-    let corrections = plan.nodes.iter().filter(|of| of.kind.name == "compensate");
+    let corrections = plan
+        .nodes
+        .iter()
+        .filter(|of| of.kind.duty() == Duty::Correct);
     let rates = corrections.flat_map(|node| slots(plan, node.role.gathers()));
     let seen = upstream(plan, rates, |node| goes_by(plan, node));
     let of_truths = of_truths(plan);
@@ -20,9 +24,9 @@ pub fn corrected_channels(plan: &Plan) -> Vec<String> {
         .collect()
 }
 
-/// The slots that a node goes by at a tick, past truths among them; none of those before an `uncorrected` node.
+/// The slots that a node goes by at a tick, past truths among them; none of those before one that puts back what was taken away.
 fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
-    if node.kind.name == "uncorrected" {
+    if node.kind.duty() == Duty::PutBack {
         return Vec::new();
     }
     // A model that is only fitted on truths does not go by those of now.

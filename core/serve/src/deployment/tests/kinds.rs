@@ -38,6 +38,7 @@ crate::register_sink!(Log, "test_log");
 crate::register_source!(Bus, "test_twice");
 crate::register_source!(Table, "test_twice");
 crate::register_sink!(Stage, "test_stage");
+athermal_core::lacks!(crate::connector::SinkKind, "parquet", "parquet");
 
 fn never<T>() -> Result<T, ConnectorError> {
     Err(ConnectorError::new("it is only read"))

@@ -178,7 +178,7 @@ impl Simulation for Following {
     }
 }
 
-athermal_trial::register_machine!(Plate(Fault::None));
+athermal_trial::register_machine!(Plate(Fault::None), "sabotaged-plate");
 
 /// Asserts that one rule is broken, and what is found contains these words.
 #[track_caller]

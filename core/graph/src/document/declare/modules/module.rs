@@ -53,7 +53,7 @@ impl<'a> Module<'a> {
             .and_then(|value| table(value, "parameters", diagnostics));
         let outputs =
             meant(keys, "outputs", &KEYS).and_then(|value| table(value, "outputs", diagnostics));
-        let advice = "describe its nodes under it, e.g. nodes.slope = { type = \"slope\" }";
+        let advice = "describe its nodes under it: `nodes.NAME = { type = … }`";
         let nodes = match meant(keys, "nodes", &KEYS) {
             Some(nodes) => table(nodes, "nodes", diagnostics)?,
             None => {
