@@ -1,11 +1,11 @@
 //! Recorded data on the command line: how files are named, and the warnings after reading them.
 
 mod cards;
+mod offset;
 
 use athermal_core::watch::Watch;
 use schemars::JsonSchema;
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -33,6 +33,7 @@ use athermal_analysis::figures::{DATES_S, count, counted, instant};
 use athermal_command::findings;
 use athermal_fleet::RowsId;
 use athermal_fleet::job::Times;
+use offset::{offset, offsets};
 
 /// Recorded data.
 #[derive(Debug, Args, Deserialize, JsonSchema)]
@@ -94,27 +95,6 @@ pub struct Reading {
     #[serde(default, rename = "offset", deserialize_with = "offsets")]
     #[schemars(with = "Vec<String>")]
     offsets: Vec<(PathBuf, Duration)>,
-}
-
-/// Reads a file and what is added to its times.
-fn offset(text: &str) -> Result<(PathBuf, Duration), String> {
-    let (file, by) = text
-        .rsplit_once('=')
-        .ok_or("expected a file and a time, such as `positions.csv=1.5s`")?;
-    let (sign, length) = match by.strip_prefix(['-', '−']) {
-        Some(length) => (-1, length),
-        None => (1, by.strip_prefix('+').unwrap_or(by)),
-    };
-    let length: Duration = length.parse().map_err(|error| format!("{error}"))?;
-    Ok((file.into(), Duration::from_ns(sign * length.as_ns())))
-}
-
-/// The same of several.
-fn offsets<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(PathBuf, Duration)>, D::Error> {
-    let texts = Vec::<String>::deserialize(from)?.into_iter();
-    texts
-        .map(|text| offset(&text).map_err(D::Error::custom))
-        .collect()
 }
 
 /// The state folder of a service whose journal `journal:FOLDER` names.

@@ -1,5 +1,7 @@
 //! What has queued up while a service was away: it is caught up with, however much it is, and all goes on.
 
+use std::fs;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration as Wait, Instant as Clock};
 
@@ -155,4 +157,37 @@ fn a_replica_that_was_lost_is_made_again_by_itself() {
     bench.more(&mut service, 50);
     service.stop().unwrap();
     assert!(bench.check_replay() > 20_000);
+}
+
+/// Rows that come as fast as they are taken, to a slow sink.
+const FLOOD: &str = "[runtime]\nwait = \"0 s\"\nsettle = \"0 s\"\ncheckpoint = \"50 ms\"\n\
+                     [sources.in]\ntype = \"burst\"\nrows = 50000\n[sinks.out]\ntype = \"slow_lines\"\n";
+
+#[test]
+fn a_slow_sink_has_every_row_of_a_flood_once_and_the_engine_does_not_wait_for_it() {
+    let mut bench = Bench::new();
+    bench.sections = FLOOD;
+    let mut service = bench.start(GRAPH);
+    let (began, mut most) = (Clock::now(), 0);
+    while !service.is_over() {
+        let events = service.pump();
+        let is_missed = |of: &ServiceEvent| matches!(of, ServiceEvent::Swap(Notice::Missed { .. }));
+        assert!(!events.iter().any(is_missed), "a tick was missed");
+        let rows = bench.out().len();
+        let happenings = service.snapshot().happenings;
+        most = most.max(happenings.saturating_sub(rows as u64));
+        assert!(began.elapsed() < Wait::from_secs(120), "{rows}");
+        std::thread::sleep(Wait::from_millis(20));
+    }
+    let counts = Arc::clone(&service.sinks()[0].1);
+    let (ended, _) = service.stop().unwrap();
+    assert_eq!((ended.happenings, ended.journal.lost), (50_000, 0));
+    assert_eq!(counts.dropped.load(Ordering::Relaxed), 0);
+    let written = fs::read_to_string(bench.path("out")).unwrap();
+    let numbers = written
+        .lines()
+        .map(|line| line.split_once(' ').unwrap().0.parse::<i64>().unwrap());
+    assert!(numbers.eq(1..=50_000), "each once, in order");
+    assert!(most > 20_000, "the sink was never far behind: {most}");
+    assert_eq!(bench.check_replay(), 50_000);
 }
