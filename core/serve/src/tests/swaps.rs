@@ -467,10 +467,9 @@ fn a_service_is_asked_from_other_threads_and_one_that_has_ended_says_so() {
 
 #[test]
 fn an_observer_sees_every_tick_and_what_happens_until_it_goes() {
-    struct Counts(
-        Arc<std::sync::Mutex<(Vec<(Instant, bool)>, usize)>>,
-        Arc<AtomicBool>,
-    );
+    /// Each tick and whether there was a replica at it, and how many events there were.
+    type Seen = (Vec<(Instant, bool)>, usize);
+    struct Counts(Arc<Mutex<Seen>>, Arc<AtomicBool>);
     impl crate::service::Observer for Counts {
         fn event(&mut self, _: &ServiceEvent) {
             self.0.lock().unwrap().1 += 1;
