@@ -25,12 +25,15 @@ pub fn in_memory() -> PathBuf {
     PathBuf::from(IN_MEMORY)
 }
 
+fn schema_of<T: JsonSchema>() -> Value {
+    schemars::schema_for!(T).into()
+}
+
 /// The options of a job.
 ///
 /// # Errors
 /// When there is no such option, or a value does not fit one.
-fn options<T: DeserializeOwned + JsonSchema>(asked: &Asked) -> Result<T, Failure> {
-    let schema = Value::from(schemars::schema_for!(T));
+fn options<T: DeserializeOwned>(asked: &Asked, schema: &Value) -> Result<T, Failure> {
     let known: Vec<&String> = schema["properties"]
         .as_object()
         .into_iter()
@@ -88,12 +91,13 @@ pub fn done<T: DeserializeOwned + JsonSchema, R>(
     host: &dyn Watch,
     job: impl FnOnce(&T, &dyn Watch) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
-    let words = Words::of::<T>();
+    let schema = schema_of::<T>();
+    let words = Words::of(&schema);
     let worded = Worded {
         host,
         words: &words,
     };
-    let done = options::<T>(asked).and_then(|options| job(&options, &worded));
+    let done = options::<T>(asked, &schema).and_then(|options| job(&options, &worded));
     done.map_err(|failure| match failure {
         Failure::Request(text) => Failure::Request(words.put(&text)),
         Failure::Outside(text) => Failure::Outside(words.put(&text)),
@@ -105,8 +109,7 @@ pub fn done<T: DeserializeOwned + JsonSchema, R>(
 struct Words(Vec<(String, String, bool)>);
 
 impl Words {
-    fn of<T: JsonSchema>() -> Self {
-        let schema = Value::from(schemars::schema_for!(T));
+    fn of(schema: &Value) -> Self {
         let properties = schema["properties"].as_object().into_iter().flatten();
         let option = |(key, of): (&String, &Value)| {
             let flag = format!("--{}", key.replace('_', "-"));
@@ -229,7 +232,7 @@ mod tests {
         ];
         let of_words = crate::program::whole().try_get_matches_from(words).unwrap();
         let of_words = Fit::from_arg_matches(of_words.subcommand().unwrap().1).unwrap();
-        let of_data: Fit = options(all.as_object().unwrap()).unwrap();
+        let of_data: Fit = options(all.as_object().unwrap(), &schema_of::<Fit>()).unwrap();
         let of_words = format!("{of_words:?}").replace("output: \"x\"", "output: \"\"");
         assert_eq!(format!("{of_data:?}"), of_words);
         // What is left out is the same, too.
@@ -238,7 +241,8 @@ mod tests {
             .unwrap();
         let of_words = Simulate::from_arg_matches(of_words.subcommand().unwrap().1).unwrap();
         let asked = json!({ "machine": "die-tester" });
-        let of_data: Simulate = options(asked.as_object().unwrap()).unwrap();
+        let schema = schema_of::<Simulate>();
+        let of_data: Simulate = options(asked.as_object().unwrap(), &schema).unwrap();
         assert_eq!(format!("{of_data:?}"), format!("{of_words:?}"));
     }
 
@@ -269,7 +273,7 @@ mod tests {
 
     #[test]
     fn remarks_name_options_as_whoever_asks_knows_them() {
-        let words = Words::of::<Evaluate>();
+        let words = Words::of(&schema_of::<Evaluate>());
         for (text, own) in [
             (
                 "read it leniently (`--lenient`)",

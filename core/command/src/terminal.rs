@@ -85,14 +85,6 @@ impl Terminal {
         self.write("warning", Some("\x1b[1;33m"), &message.into());
     }
 
-    /// Warns of a fault, and notes what is none.
-    pub fn report(&self, (is_fault, message): (bool, Message)) {
-        match is_fault {
-            true => self.warning(message),
-            false => self.note(message),
-        }
-    }
-
     /// Reports why the program gives up.
     pub fn error(&self, failure: &Failure) {
         match failure {

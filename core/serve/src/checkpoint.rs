@@ -103,6 +103,18 @@ pub(crate) struct LeftState {
     pub(crate) last: Option<Instant>,
 }
 
+impl LeftState {
+    /// That of an engine after so many ticks, beats, breaks and freezes.
+    pub(crate) fn of(engine: &Engine, happenings: u64) -> Self {
+        Self {
+            happenings,
+            state: engine.state(),
+            plan: Arc::clone(engine.plan()),
+            last: engine.last(),
+        }
+    }
+}
+
 /// Where it is asked for, and left.
 #[derive(Debug, Default)]
 pub(crate) struct StateDesk {
@@ -128,12 +140,7 @@ impl StateDesk {
     /// Leaves what an engine knows, unless somebody is looking at this moment: then it is asked again.
     pub(crate) fn leave(&self, engine: &Engine, happenings: u64) {
         if let Ok(mut left) = self.left.try_lock() {
-            *left = Some(LeftState {
-                happenings,
-                state: engine.state(),
-                plan: Arc::clone(engine.plan()),
-                last: engine.last(),
-            });
+            *left = Some(LeftState::of(engine, happenings));
             self.is_asked.store(false, Ordering::Release);
         }
     }

@@ -7,9 +7,7 @@ use std::time::{Duration as Wait, Instant as Clock};
 use athermal_run::live::{Control, Notice, StageError};
 
 use crate::aside::{Aside, PATIENCE, within};
-use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints};
-use crate::compile::Plan;
-use crate::engine::EngineState;
+use crate::checkpoint::{Checkpoint, CheckpointError, Checkpoints, LeftState};
 use crate::folder::FolderError;
 use crate::journal::Progress;
 use crate::time::{Duration, Instant};
@@ -17,8 +15,8 @@ use crate::time::{Duration, Instant};
 /// How often is looked whether a checkpoint has been saved, or can be.
 const LOOK: Wait = Wait::from_millis(100);
 
-/// Takes checkpoints from the replica, so that the engine thread never serialises; where there is none, from a copy that it hands out in
-/// a moment in which nothing is due.
+/// Takes checkpoints from the replica where there is one, and else from what the engine thread leaves in a moment in which nothing is
+/// due. It never writes them itself.
 #[derive(Debug)]
 pub struct Keeper {
     control: Control,
@@ -79,10 +77,7 @@ impl Keeper {
     pub fn pump(&mut self) -> Result<Vec<Notice>, CheckpointError> {
         let notices = self.control.pump();
         if self.is_due() {
-            match self.control.replica() {
-                Some(_) => self.take(),
-                None => self.take_left(),
-            }
+            self.take();
         }
         self.save()?;
         Ok(notices)
@@ -197,38 +192,34 @@ impl Keeper {
         &mut self.control
     }
 
-    /// Takes what the engine thread has left, or asks for it.
-    fn take_left(&mut self) {
-        let left = self.progress.desk.take();
-        // A graph that was committed meanwhile is not in it.
-        let Some(left) = left.filter(|_| std::mem::take(&mut self.is_asking)) else {
-            self.is_asking = !self.control.is_on_the_way();
-            if self.is_asking {
-                self.progress.desk.ask();
-            }
-            return;
-        };
-        self.taken = Clock::now();
-        if left.happenings > self.last {
-            self.held = Held::of(&left.state, (&left.plan, left.last), &mut self.first);
-            self.waiting = Some(Checkpoint::of_state(&left.state, left.happenings));
+    /// What the engine thread has left since it was asked and no graph was sent to it; else it is asked.
+    fn left(&mut self) -> Option<LeftState> {
+        let left = self.progress.desk.take().filter(|_| self.is_asking);
+        self.is_asking = left.is_none();
+        if self.is_asking {
+            self.progress.desk.ask();
         }
+        left
     }
 
     fn take(&mut self) {
-        self.taken = Clock::now();
-        // Until what is on its way has taken over, the replica is not what a start is to go on from.
-        let is_on_the_way = self.control.is_on_the_way();
+        // Until what is on its way has taken over, what runs is not what a start is to go on from. What a node that was given up had
+        // learned is not whole: the journal goes on from before.
+        let is_fit = !self.control.is_on_the_way() && self.control.given_up().is_empty();
         let happenings = self.before + self.control.events();
-        if let Some(replica) = self.control.replica()
-            && happenings > self.last
-            && !is_on_the_way
-            // What a node that was given up had learned is not whole: the journal goes on from before.
-            && replica.panics().is_empty()
-        {
-            let state = replica.state();
-            self.held = Held::of(&state, (replica.plan(), replica.last()), &mut self.first);
-            self.waiting = Some(Checkpoint::of_state(&state, happenings));
+        let mut taken = None;
+        if is_fit && happenings > self.last {
+            let replica = self.control.replica();
+            taken = replica.map(|of| LeftState::of(of, happenings));
+            taken = taken.or_else(|| self.left());
+            if taken.is_none() {
+                return;
+            }
+        }
+        self.taken = Clock::now();
+        if let Some(of) = taken.filter(|of| of.happenings > self.last) {
+            self.held = Held::of(&of, &mut self.first);
+            self.waiting = Some(Checkpoint::of_state(&of.state, of.happenings));
         }
     }
 
@@ -265,12 +256,8 @@ pub struct Held {
 }
 
 impl Held {
-    fn of(
-        state: &EngineState,
-        (plan, last): (&Plan, Option<Instant>),
-        first: &mut Option<(u64, Instant)>,
-    ) -> Option<Self> {
-        let (tick, last) = (state.tick(), last?);
+    fn of(left: &LeftState, first: &mut Option<(u64, Instant)>) -> Option<Self> {
+        let (tick, last) = (left.state.tick(), left.last?);
         let (begin, since) = *first.get_or_insert((tick, last));
         let passed = (last - since).secs();
         if tick <= begin || passed <= 0.0 {
@@ -279,7 +266,7 @@ impl Held {
         let rate = (tick - begin) as f64 / passed;
         // What an earlier run kept came at this rate too, as far as is known.
         let span = Duration::from_secs_f64(tick as f64 / rate).unwrap_or(Duration::MAX);
-        let (bytes, full) = state.held(plan, span);
+        let (bytes, full) = left.state.held(&left.plan, span);
         Some(Self { bytes, full, rate })
     }
 }

@@ -22,6 +22,8 @@ pub enum MergeError {
         files: Vec<String>,
         /// The columns, with what they may be called.
         missing: Vec<MissingColumn>,
+        /// The pattern of the files in which a column is renamed to one of them, that column, and that one.
+        renamed: Option<(String, String, String)>,
     },
     /// No file has all columns, and some stand in two.
     InTwoFiles {
@@ -74,7 +76,11 @@ pub enum MergeError {
 impl fmt::Display for MergeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::InNoFile { files, missing } => {
+            Self::InNoFile {
+                files,
+                missing,
+                renamed,
+            } => {
                 let names = quoted(missing.iter().map(|of| of.name.as_str()));
                 write!(f, "{}: no file has a column {names}", files.join(", "))?;
                 for of in missing {
@@ -82,7 +88,9 @@ impl fmt::Display for MergeError {
                         write!(f, "; did you mean `{nearest}` for `{}`?", of.name)?;
                     }
                 }
-                Ok(())
+                renamed.iter().try_for_each(|(named, from, to)| {
+                    write!(f, "; `{to}` is `{from}` of files named `{named}` by `[[table.files]]`: is a file or its column called otherwise?")
+                })
             }
             Self::InTwoFiles {
                 column,
@@ -296,7 +304,15 @@ fn logs(paths: &[PathBuf], layout: &Layout, options: &Options) -> Result<Vec<Log
         let missing: Vec<&str> = missing.map(|of| of.column.as_str()).collect();
         if !missing.is_empty() {
             let names: Vec<String> = files.iter().flat_map(|file| file.names.clone()).collect();
+            let renamed = layout.table.files.iter().find_map(|(named, table)| {
+                let (from, to) = table
+                    .rename
+                    .iter()
+                    .find(|(_, to)| missing.contains(&to.as_str()))?;
+                Some((named.to_string(), from.clone(), to.clone()))
+            });
             return Err(MergeError::InNoFile {
+                renamed,
                 files: files.into_iter().map(|file| file.name).collect(),
                 missing: columns::nearest(missing, &names),
             }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use athermal::Instant;
 use athermal::core::event::Event as _;
+use athermal::core::watch::Watch;
 use athermal::run::live::monitor::Finding;
 use athermal::run::live::{Report, Reporter};
 
@@ -27,8 +28,8 @@ impl Reporter for Reports {
             Report::Unusable(error) => terminal.setback(&error.into()),
             Report::Unfit(error) => terminal.setback(&Failure::Request(error)),
             report => {
-                let all = report.messages(!terminal.events);
-                all.into_iter().for_each(|of| terminal.report(of));
+                let (all, host): (_, &dyn Watch) = (report.messages(!terminal.events), terminal);
+                all.into_iter().for_each(|of| host.report(of));
             }
         }
     }

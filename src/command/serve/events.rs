@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 
 use athermal::core::engine::NodeCarry;
 use athermal::core::event::Event as _;
+use athermal::core::watch::Watch;
 use athermal::run::live::Report;
 use athermal::serve::recovery::{RecoveryReport, Start};
 use athermal::serve::service::{ServiceEvent, SinkCounts};
@@ -26,7 +27,8 @@ impl Events {
             }
             event => event.messages(!terminal.events),
         };
-        all.into_iter().for_each(|of| terminal.report(of));
+        let host: &dyn Watch = terminal;
+        all.into_iter().for_each(|of| host.report(of));
         if let ServiceEvent::Staged { carry, .. } = &event {
             let text = NodeCarry::words(carry);
             if !text.is_empty() {

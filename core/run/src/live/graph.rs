@@ -379,9 +379,9 @@ impl<K: Keep> LiveGraph<K> {
     /// Makes a graph ready to take over, where this one has its own control: see [`Control::stage`].
     ///
     /// # Errors
-    /// When it cannot take over; what runs, and what was staged before, is untouched.
+    /// When it cannot take over, or there is no control; what runs, and what was staged before, is untouched.
     pub fn stage(&mut self, model: &Model, carry_learned: bool) -> Result<&Staged, StageError> {
-        let control = self.control.as_mut().ok_or(StageError::NoCopy)?;
+        let control = self.control.as_mut().ok_or(StageError::NoControl)?;
         if !control.needs_replica() {
             self.stepper.mirror();
         }

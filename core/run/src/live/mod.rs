@@ -3,8 +3,9 @@
 //!
 //! Below it, [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
 //! a hand-over. The **control thread** (or the same one, for recorded data) owns a [`Control`], to which every tick is
-//! mirrored through a bounded ring. It steps a replica of what runs, to the same bits, so that states are copied, candidates
-//! warmed and compared, and old graphs kept warm without the engine thread noticing.
+//! mirrored through a bounded ring, with what came of it. While a graph is staged or can be taken back, it steps a replica of what runs,
+//! to the same bits, so that states are copied, candidates warmed and compared, and old graphs kept warm without the engine thread
+//! noticing. A [`LiveGraph`] is a graph at work as its hosts have it: with both ends, or with one.
 //!
 //! ```text
 //!  engine thread                              control thread

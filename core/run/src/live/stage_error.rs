@@ -44,6 +44,8 @@ pub enum StageError {
     NothingToTakeBack,
     /// Ticks were missed, so that what runs is not known here.
     NotMirrored,
+    /// What runs has no control.
+    NoControl,
     /// What runs has not been copied in time.
     NoCopy,
     /// A node does not take its own state back, so that the graph cannot be copied to the engine thread.
@@ -106,6 +108,10 @@ impl fmt::Display for StageError {
             Self::NotMirrored => write!(
                 f,
                 "ticks were missed, so that there is nothing to compare with: commit without a comparison"
+            ),
+            Self::NoControl => write!(
+                f,
+                "the graph that runs has no control, so that it cannot be replaced: a host makes it replaceable when it begins"
             ),
             Self::NoCopy => write!(
                 f,

@@ -258,6 +258,9 @@ impl Stepper {
 
     /// Writes an event down for an engine that comes late, and for the control thread.
     fn record(&mut self, what: Happening, samples: &[f64]) {
+        if self.ticks.is_none() {
+            return;
+        }
         let width = self.feed.len() + 1;
         let row = (self.event % RECENT) as usize * width;
         self.recent[row] = what.write();

@@ -146,7 +146,7 @@ impl EngineThread {
     fn work(&mut self) -> Result<(), EngineError> {
         let mut left = self.sources.len();
         let (mut published, mut sound) = (Moment::START, self.clock.now());
-        // Since when no copy has been asked for in vain.
+        // Since when nothing that takes a moment has been asked for in vain.
         let mut copied = self.clock.now();
         let mut is_stopped = false;
         // When something came the last two times.
@@ -188,7 +188,7 @@ impl EngineThread {
                 came = [came[1], now];
             }
             let sinks = &mut self.sinks;
-            // What the replica cannot take in is stepped later: a backlog of any length.
+            // What the control thread cannot take in is stepped later: a backlog of any length.
             let goes_on = |graph: &LiveGraph<_>| !is_patient || !graph.is_crowded();
             self.graph
                 .pass_while(now, goes_on, |output| sinks.put(output))?;
@@ -216,7 +216,7 @@ impl EngineThread {
             if has_more {
                 continue;
             }
-            // What is due waits for the replica, and sources for what is due.
+            // What is due waits for the control thread, and sources for what is due.
             let is_held = is_crowded || self.graph.is_crowded();
             let longest = match (is_held || is_full, self.graph.keep().has_gap()) {
                 (true, _) => HOLD,

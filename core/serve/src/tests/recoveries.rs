@@ -494,3 +494,39 @@ fn the_engine_thread_allocates_nothing_in_the_steady_state() {
     assert_eq!(counted.count_total, 0);
     assert!(ticks > 500, "{ticks}");
 }
+
+#[test]
+fn where_nothing_happened_since_the_last_checkpoint_the_engine_thread_is_not_asked_for_one() {
+    let (path, model) = (Folder::new(), model());
+    let (folder, recovered, _) = recover(&path.0, &model);
+    let recorder = Recorder::start(&folder.journal(), recovered.begin(), small()).unwrap();
+    let progress = Arc::clone(recorder.progress());
+    let live = LiveOptions {
+        mirrors: false,
+        ..LiveOptions::default()
+    };
+    let (stepper, control) = pair_from(recovered.engine, live).unwrap();
+    let checkpoints = (checkpoints(&folder), folder.commits());
+    let every = Wait::from_millis(1);
+    let mut keeper = Keeper::new(control, checkpoints, Arc::clone(&progress), 0, every);
+    let mut graph = LiveGraph::new(None, stepper, recorder);
+    let is_asked = |keeper: &mut Keeper| {
+        std::thread::sleep(Wait::from_millis(2));
+        keeper.pump().unwrap();
+        progress.desk.is_asked()
+    };
+    assert!(!is_asked(&mut keeper) && !is_asked(&mut keeper));
+    graph.row(Instant::from_ns(1), &[20.0; 3]).unwrap();
+    assert!(is_asked(&mut keeper));
+    let began = std::time::Instant::now();
+    while keeper.last() == 0 {
+        graph.keep().sync();
+        graph.rest();
+        is_asked(&mut keeper);
+        assert!(began.elapsed() < Wait::from_secs(10));
+    }
+    // What was asked for while that one was saved is of no more use.
+    graph.rest();
+    is_asked(&mut keeper);
+    assert!(!is_asked(&mut keeper) && !is_asked(&mut keeper));
+}

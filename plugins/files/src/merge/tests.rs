@@ -1,3 +1,5 @@
+use athermal_core::document::{Pattern, TableFormat};
+
 use super::*;
 use crate::TimeForm;
 
@@ -253,11 +255,19 @@ fn a_column_in_no_file_is_named_with_what_it_may_be_called() {
         optional: false,
         is_instant: false,
     });
-    let refused = read("none", &files, layout, &Options::default()).unwrap_err();
-    assert_eq!(
-        refused,
-        "a.csv, z.csv: no file has a column `height_um`; did you mean `height_mm` for `height_um`?"
-    );
+    let refused = read("none", &files, layout.clone(), &Options::default()).unwrap_err();
+    let words =
+        "a.csv, z.csv: no file has a column `height_um`; did you mean `height_mm` for `height_um`?";
+    assert_eq!(refused, words);
+    // One that files of another name would have.
+    let table = TableFormat {
+        rename: [("Value".to_owned(), "height_um".to_owned())].into(),
+        ..TableFormat::default()
+    };
+    layout.table.files.push((Pattern::new("height*"), table));
+    let refused = read("renamed", &files, layout, &Options::default()).unwrap_err();
+    let more = "; `height_um` is `Value` of files named `height*` by `[[table.files]]`: is a file or its column called otherwise?";
+    assert_eq!(refused, format!("{words}{more}"));
 }
 
 #[test]

@@ -240,14 +240,14 @@ impl SwapSchedule {
     /// Lets go of what is in the shadow, since its file is no more what it was.
     fn withdraw(&mut self, live: &mut LiveGraph, path: &Path, why: Why, reporter: &dyn Reporter) {
         self.staged = None;
-        discard(live);
+        live.control().into_iter().for_each(Control::discard);
         reporter.report(Report::not_taken_over(path, why));
     }
 
     /// Lets go of the watched file as it has become.
     fn refuse(&mut self, live: &mut LiveGraph, error: &StageError, reporter: &dyn Reporter) {
         self.staged = None;
-        discard(live);
+        live.control().into_iter().for_each(Control::discard);
         if let Some(watched) = &self.watched {
             Report::unfit(watched.path(), error)
                 .into_iter()
@@ -327,7 +327,7 @@ impl SwapSchedule {
         if let Some((_, path)) = self.staged.take() {
             reporter.report(Report::not_taken_over(&path, why));
         }
-        discard(live);
+        live.control().into_iter().for_each(Control::discard);
         Ok(())
     }
 
@@ -347,12 +347,6 @@ impl SwapSchedule {
         for path in shadowed.chain(waiting) {
             reporter.report(Report::not_taken_over(path, DATA_ENDED));
         }
-    }
-}
-
-fn discard(live: &mut LiveGraph) {
-    if let Some(control) = live.control() {
-        control.discard();
     }
 }
 
