@@ -1,6 +1,10 @@
 //! Commands that the user may try next, with the program named as the user named it.
 
+use std::path::Path;
 use std::sync::OnceLock;
+
+use athermal_jobs::data::Data;
+pub use athermal_jobs::path::quoted;
 
 static CALLED: OnceLock<String> = OnceLock::new();
 
@@ -17,14 +21,13 @@ pub fn program() -> String {
     name.map_or_else(|| "athermal".to_owned(), |name| quoted(name))
 }
 
-/// A word for a shell.
+/// The words of a command that takes a model and data; more of them may follow.
 #[must_use]
-pub fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-+:@%,=".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
+pub fn words_with(data: &Data, command: &str, model: &Path) -> Vec<String> {
+    let model = quoted(&model.display().to_string());
+    let mut words = vec![program(), command.to_owned(), model];
+    words.extend(data.words());
+    words
 }
 
 /// A command for a shell, in lines of at most 80 columns.

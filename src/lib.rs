@@ -27,6 +27,9 @@ pub use athermal_run::model::{Model, ModelError};
 pub use athermal_serve as serve;
 pub use athermal_trial as trial;
 
+#[cfg(feature = "cli")]
+pub use athermal_jobs as jobs;
+
 #[cfg(feature = "analysis")]
 pub use athermal_analysis::{chart, diagnosis, drawing, report};
 
@@ -34,8 +37,6 @@ pub use athermal_analysis::{chart, diagnosis, drawing, report};
 #[macro_use(print, println)]
 extern crate athermal_command;
 
-#[cfg(feature = "cli")]
-pub mod calls;
 #[cfg(feature = "cli")]
 mod checkout;
 #[cfg(feature = "cli")]
@@ -48,8 +49,6 @@ mod meant;
 mod program;
 #[cfg(feature = "cli")]
 pub mod schema;
-#[cfg(feature = "cli")]
-mod starter;
 
 #[cfg(feature = "cli")]
 pub use program::{command_line, command_line_of};

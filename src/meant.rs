@@ -1,107 +1,15 @@
 //! What a file on the command line is, and the call that was meant where it is not what is expected there.
 
 use std::ffi::OsString;
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use athermal_command::CommandKind;
 use athermal_core::registry::{Why, find};
-use clap::builder::{PathBufValueParser, StyledStr, TypedValueParser};
+use athermal_jobs::path::Given;
+use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use crate::program::whole;
-
-/// What a file shows itself to be, by how it ends or begins.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Given {
-    Folder,
-    Graph,
-    Model,
-    Log,
-}
-
-const ENDINGS_OF_LOGS: [&str; 9] = [
-    "csv", "tsv", "txt", "dat", "log", "lvm", "jsonl", "ndjson", "parquet",
-];
-/// The first key of a model.
-const MARK: &str = "\"athermal_model\"";
-
-impl Given {
-    fn of(path: &Path) -> Option<Self> {
-        if path.is_dir() {
-            return Some(Self::Folder);
-        }
-        let ending = path.extension().and_then(|of| of.to_str()).unwrap_or("");
-        let ending = ending.to_ascii_lowercase();
-        if ending == "toml" {
-            return Some(Self::Graph);
-        }
-        // What is read from a pipe is gone.
-        let is_file = path.metadata().is_ok_and(|of| of.is_file());
-        let file = is_file.then(|| File::open(path).ok()).flatten();
-        let mut begin = Vec::new();
-        let _ = file.map(|file| file.take(64).read_to_end(&mut begin));
-        if String::from_utf8_lossy(&begin).contains(MARK) {
-            return Some(Self::Model);
-        }
-        ENDINGS_OF_LOGS
-            .contains(&ending.as_str())
-            .then_some(Self::Log)
-    }
-}
-
-/// A path, unless the file there is what cannot stand in its place.
-fn path_but(refuse: fn(&Path, Given) -> Option<String>) -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(move |path| {
-        let refused = Given::of(&path).and_then(|given| refuse(&path, given));
-        refused.map_or(Ok(path), Err)
-    })
-}
-
-/// Reads the path of a graph or a model.
-pub fn graph_or_model() -> impl TypedValueParser<Value = PathBuf> {
-    path_but(|_, given| {
-        let words = "this is a log, and a graph or model stands here; `athermal init` writes a graph for a log, and `athermal fit` a model";
-        (given == Given::Log).then(|| words.to_owned())
-    })
-}
-
-/// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
-pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
-    path_but(|_, given| match given {
-        Given::Graph => {
-            Some("this is a graph and holds no data; name graphs before this option".to_owned())
-        }
-        Given::Model => {
-            Some("this is a model and holds no data; name models before this option".to_owned())
-        }
-        Given::Folder | Given::Log => None,
-    })
-}
-
-/// Reads the path of a log that is looked at for the first time.
-pub fn new_log() -> impl TypedValueParser<Value = PathBuf> {
-    path_but(|_, given| {
-        let what = match given {
-            Given::Graph => "a graph, which init writes,",
-            Given::Model => "a model, which fit writes,",
-            Given::Folder | Given::Log => return None,
-        };
-        Some(format!(
-            "this is {what} and holds no data; give it a log, and the graph to write with -o"
-        ))
-    })
-}
-
-/// Reads the path of a file that is written.
-pub fn written() -> impl TypedValueParser<Value = PathBuf> {
-    path_but(|path, given| {
-        let inside = path.join("NAME");
-        (given == Given::Folder)
-            .then(|| format!("this is a folder; name a file in it: {}", inside.display()))
-    })
-}
 
 /// What other programs call a command.
 fn synonym(command: &str) -> Option<&'static str> {

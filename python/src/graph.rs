@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal::calls;
 use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::drawing::{diagram, svg};
+use athermal::jobs::fit::Fit;
+use athermal::jobs::init::Init;
 use athermal::run::model::{Model as Run, ModelError};
 use pyo3::prelude::*;
 
@@ -113,18 +115,20 @@ impl Graph {
 
     /// A picture as SVG.
     fn svg(&self) -> String {
-        calls::picture(&self.inner.plan)
+        svg::text(&diagram(&self.inner.plan, false))
     }
 
     /// Fits it, with the options of `athermal fit`. Gives the model, and how the fit went in words.
     fn fit(&self, py: Python<'_>, call: Call) -> PyResult<(Model, String)> {
-        let fitted = work(py, &call, |asked, host| {
-            calls::fit(&self.inner, asked, host)
+        let (inner, outcome) = work(py, &call, |job: &Fit, host| {
+            let mut model = self.inner.clone();
+            let outcome = job.fit(&mut model, host)?;
+            Ok((model, outcome))
         })?;
-        match fitted.model {
-            Some(inner) => Ok((Model { inner }, fitted.text)),
-            None => Err(unfitted(py, &fitted.failed)),
+        if outcome.is_nothing() {
+            return Err(unfitted(py, &outcome.failed()));
         }
+        Ok((Model { inner }, outcome.text(false)))
     }
 
     /// The model of it, where nothing needs a fit.
@@ -146,6 +150,6 @@ impl Graph {
 /// A starter graph, with the options of `athermal init`: its text, and what was found and guessed.
 #[pyfunction]
 pub fn init(py: Python<'_>, call: Call) -> PyResult<(String, Vec<String>)> {
-    let starter = work(py, &call, |asked, host| calls::init(asked, host))?;
+    let starter = work(py, &call, |job: &Init, _| job.find())?;
     Ok((starter.text, starter.remarks))
 }

@@ -1,9 +1,15 @@
 //! A graph with its fits, as a Python object.
 
 use arrow_schema::DataType;
-use athermal::calls::{self, Found};
 use athermal::core::compile::Plan;
 use athermal::core::document::{TimeBase, Value as Tree};
+use athermal::jobs::compare::Compare;
+use athermal::jobs::diagnose::Diagnose;
+use athermal::jobs::evaluate::Evaluate;
+use athermal::jobs::predict::Predict;
+use athermal::jobs::report::Report;
+use athermal::jobs::{Found, model::for_scores};
+use athermal::report::page;
 use athermal::run::model::Model as Run;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -109,8 +115,8 @@ impl Model {
         let outputs = outputs.map(|of| of.name.clone()).collect();
         let like = self.time_type(&call);
         let mut sink = Predictions::new(time, like.as_ref(), outputs);
-        let sink = work(py, &call, move |asked, host| {
-            calls::predict(&self.inner, asked, &mut sink, host)?;
+        let sink = work(py, &call, move |job: &Predict, host| {
+            job.run(&self.inner, &mut sink, host)?;
             Ok(sink)
         })?;
         sink.table()
@@ -121,8 +127,8 @@ impl Model {
     fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         found(
             py,
-            &work(py, &call, |asked, host| {
-                calls::evaluate(&self.inner, asked, host)
+            &work(py, &call, |job: &Evaluate, host| {
+                job.find(&for_scores(&self.inner)?, host)
             })?,
         )
     }
@@ -131,8 +137,8 @@ impl Model {
     fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         found(
             py,
-            &work(py, &call, |asked, host| {
-                calls::diagnose(&self.inner, asked, host)
+            &work(py, &call, |job: &Diagnose, host| {
+                Ok(job.find(&self.inner, false, host)?.0)
             })?,
         )
     }
@@ -143,8 +149,9 @@ impl Model {
         py: Python<'py>,
         call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
-        let (of, page) = work(py, &call, |asked, host| {
-            calls::report(&self.inner, asked, host)
+        let (of, page) = work(py, &call, |job: &Report, host| {
+            let (found, facts) = job.find(&for_scores(&self.inner)?, host)?;
+            Ok((found, page(&facts)))
         })?;
         let (text, facts) = found(py, &of)?;
         Ok((text, facts, page))
@@ -174,8 +181,8 @@ pub fn compare<'py>(
     let graphs: Vec<_> = graphs.collect();
     found(
         py,
-        &work(py, &call, move |asked, host| {
-            calls::compare(graphs, asked, host)
+        &work(py, &call, move |job: &Compare, host| {
+            Ok(job.find(graphs, host)?.0)
         })?,
     )
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, Float64Array};
-use athermal::calls;
+use athermal::jobs::simulate::Simulate;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::work::{Call, work};
 #[pyfunction]
 pub fn simulate(py: Python<'_>, call: Call) -> PyResult<Table> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    let (names, columns) = work(py, &call, move |asked, host| {
+    let (names, columns) = work(py, &call, move |job: &Simulate, host| {
         let mut put = |time_ns: i64, values: &[f64]| {
             columns.resize(values.len() + 1, Vec::new());
             for (column, value) in columns
@@ -23,9 +23,11 @@ pub fn simulate(py: Python<'_>, call: Call) -> PyResult<Table> {
             {
                 column.push(value);
             }
+            Ok(())
         };
-        let names = calls::simulate(asked, &mut put, host)?;
-        Ok((names, columns))
+        let machine = job.machine()?;
+        job.rows(&*machine, host, &mut put)?;
+        Ok((job.columns(&*machine), columns))
     })?;
     let names = std::iter::once("time_s".to_owned()).chain(names);
     let columns = columns.into_iter().map(|values| -> ArrayRef {

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use athermal::calls::{Asked, WITHOUT_ZONE};
 use athermal::core::watch::{Kept, ProgressListener, Remark, Watch};
-use athermal::files::{OpenTable, with_tables};
+use athermal::files::OpenTable;
+use athermal::jobs::asked::{Asked, Job, done};
+use athermal::jobs::remarks::WITHOUT_ZONE;
 use athermal_command::Failure;
 use pyo3::prelude::*;
 
@@ -85,11 +86,11 @@ impl Stop {
     }
 }
 
-/// Does some work with the options of a call. Its warnings are raised as Python's.
-pub fn work<R: Send>(
+/// Does a job with the options of a call. Its warnings are raised as Python's.
+pub fn work<J: Job, R: Send>(
     py: Python<'_>,
     call: &Call,
-    work: impl FnOnce(&Asked, &dyn Watch) -> Result<R, Failure> + Send,
+    work: impl FnOnce(&J, &dyn Watch) -> Result<R, Failure> + Send,
 ) -> PyResult<R> {
     let stop = Stop::default();
     let go_on = stop.clone().check();
@@ -102,12 +103,11 @@ pub fn work<R: Send>(
     let tables = call.tables.iter().map(open).collect();
     let progress = call.progress.as_ref().map(|of| of.clone_ref(py));
     let progress = progress.map(|listener| stop.clone().progress(listener));
-    let asked: Asked =
+    let options =
         serde_json::from_str(&call.options).map_err(|error| request(py, &error.to_string()))?;
+    let asked = Asked { options, tables };
     let host = Kept::with(progress);
-    let done = guarded(py, || {
-        py.detach(|| with_tables(tables, || work(&asked, &host)))
-    });
+    let done = guarded(py, || py.detach(|| done(&asked, &host, work)));
     if let Some(error) = stop.take() {
         return Err(error);
     }

@@ -30,7 +30,7 @@ const PATIENCE: std::time::Duration = std::time::Duration::from_secs(10);
 )]
 pub struct Check {
     /// Graph files and machine files
-    #[arg(required = true, value_name = "GRAPH", value_parser = crate::meant::graph_or_model())]
+    #[arg(required = true, value_name = "GRAPH", value_parser = athermal_jobs::path::graph_or_model())]
     graphs: Vec<PathBuf>,
     /// Fail on warnings too (exit status 1)
     #[arg(long)]

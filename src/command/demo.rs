@@ -8,19 +8,18 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::registry::find;
-use athermal::run::fit::FitOptions;
 use athermal::run::score::{Score, ScoreOptions, Scores, score};
 use athermal::trial::machine::{KnownMachine, Setup, Simulated};
 use clap::Args;
 use serde_json::json;
 
 use super::aside::write_aside;
-use super::data::{Data, Reading};
-use super::fit::{fit_on, text_of};
 use super::simulate::write_recording;
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::{count, or_dash, table};
+use athermal_jobs::data::{Data, Reading};
+use athermal_jobs::fit::{Fit, text_of};
 
 const GRAPH: &str = include_str!("../../graphs/die-tester.toml");
 const MACHINE: &str = "die-tester";
@@ -113,7 +112,7 @@ fn fit_model(
 ) -> Result<Model, Failure> {
     let mut model = Model::load(graph)?;
     let data = Data::of(vec![train.to_owned()], Reading::default());
-    fit_on(&mut model, &data, &FitOptions::default(), host)?;
+    Fit::on(data).fit(&mut model, host)?;
     write_aside(output, text_of(&model)?)?;
     Ok(model)
 }

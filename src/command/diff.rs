@@ -7,8 +7,8 @@ use athermal::core::diagnostic::Sources;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::model;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_jobs::model;
 
 /// Show what differs in meaning between two graphs or models
 ///

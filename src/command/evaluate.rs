@@ -1,29 +1,16 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
-use athermal_core::watch::Watch;
-use schemars::JsonSchema;
-use serde::Deserialize;
 use std::path::PathBuf;
 
-use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::report;
-use athermal::run::score::{FellBack, Lack, Score, ScoreOptions, score};
+use athermal_jobs::evaluate as job;
+use athermal_jobs::model::load_fitted;
+use athermal_jobs::path::graph_or_model;
 use clap::Args;
-use serde_json::json;
 
-use super::asked::in_memory;
-use super::beyond;
-use super::data::Data;
-use super::doubts::Doubts;
-use super::faults::{FaultWatch, Purpose};
-use super::found::{self, Found};
-use super::model::load_fitted;
-use super::scored::Scored;
-use super::unscored;
-use crate::invocation::next;
+use super::found;
+use crate::invocation::{next, words_with};
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal_analysis::figures::seconds;
 
 /// Score a model's predictions on recorded data
 ///
@@ -51,7 +38,7 @@ use athermal_analysis::figures::seconds;
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
 /// stay as they were measured, and so do the weights of votes. Standard deviations are those of as many steps as there are
 /// since the newest measured truth, under the model's own noise.
-#[derive(Debug, Args, Deserialize, JsonSchema)]
+#[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
                         athermal evaluate model.json --data test.csv --format json \\\n      \
@@ -60,19 +47,10 @@ use athermal_analysis::figures::seconds;
 )]
 pub struct Evaluate {
     /// The model, or a graph that names one or in which nothing needs fitting
-    #[arg(value_parser = crate::meant::graph_or_model())]
-    #[serde(skip, default = "in_memory")]
+    #[arg(value_parser = graph_or_model())]
     model: PathBuf,
     #[command(flatten)]
-    #[serde(flatten)]
-    data: Data,
-    /// Score each prediction on all instants of its own
-    #[arg(long)]
-    #[serde(default)]
-    each_on_its_own: bool,
-    #[command(flatten)]
-    #[serde(flatten)]
-    scored: Scored,
+    job: job::Evaluate,
 }
 
 impl Evaluate {
@@ -82,88 +60,13 @@ impl Evaluate {
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
-        let (found, ()) = found::show(terminal, |host| Ok((self.find(&model, host)?, ())))?;
+        self.job.data.thin(Some(&self.model), &model)?;
+        let (found, ()) = found::show(terminal, |host| Ok((self.job.find(&model, host)?, ())))?;
         let mut scores = found.facts["scores"].as_array().into_iter().flatten();
         if terminal.format == Format::Table && scores.any(|of| of["n"] != 0) {
             // Why the scores are what they are.
-            terminal.note(next(&self.data.words_with("diagnose", &self.model)));
+            terminal.note(next(&words_with(&self.job.data, "diagnose", &self.model)));
         }
         Ok(Answer::Fine)
-    }
-
-    /// Scores a model that is compiled for scores.
-    ///
-    /// # Errors
-    /// When the data cannot be used.
-    pub fn find(&self, model: &Model, host: &dyn Watch) -> Result<Found, Failure> {
-        self.scored.check(model)?;
-        self.data.check_offsets(&[])?;
-        self.data.thin(&self.model, &model.graph)?;
-        let dataset = self.data.dataset();
-        let options = ScoreOptions {
-            each_on_its_own: self.each_on_its_own,
-            levels: model.levels(),
-            ..self.scored.options()?
-        };
-        let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let mut progress = host.progress("evaluating");
-        let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
-            progress.set(ticks)
-        })?;
-        drop(progress);
-        let doubts = Doubts {
-            plan: &model.plan,
-            dataset: &dataset,
-            refused: scores.refused,
-            rejected: &scores.rejected,
-            faults: watch.found(),
-            outside_fit: beyond::beyond(model.sample_ranges(), &scores.ranges),
-        };
-        let period = scores.period.map(|(from, to)| {
-            json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
-        });
-        let mut facts = json!({ "data": self.data.names() });
-        self.scored.add_to(&mut facts);
-        facts["each_on_its_own"] = self.each_on_its_own.into();
-        facts["period"] = json!(period);
-        facts["scores"] = json!(scores.scores);
-        facts["unscored"] = json!(scores.unscored);
-        facts["lacks"] = json!(scores.lacks);
-        facts["fell_back"] = json!(scores.fell_back);
-        doubts.add_to(&mut facts);
-        doubts.warn(host);
-        let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
-        self.data.warn_fitted_on(host, model, period);
-        unscored::warn(host, &scores.unscored);
-        let fell_back = FellBack::warnings(&scores.fell_back);
-        for message in Lack::warnings(&scores.lacks).into_iter().chain(fell_back) {
-            host.warning(message);
-        }
-        let none = |of: &Score| of.valid.is_some() && of.n == 0;
-        if let Some(steps) = self.scored.steps()
-            && scores.scores.iter().any(none)
-        {
-            host.warning(format_args!(
-                "where no truth was predicted {steps} steps ahead, no stretch of the data may be that long: try fewer `--steps`"
-            ));
-        }
-        if scores.scores.is_empty() {
-            host.warning(
-                "the graph has no prediction of a measured truth, so there is nothing to score",
-            );
-        }
-        Ok(Found {
-            text: report::scores(&scores, &self.in_words()),
-            facts,
-        })
-    }
-
-    /// How it is scored, where otherwise than usual.
-    fn in_words(&self) -> Vec<String> {
-        let mut words = self.scored.in_words();
-        if self.each_on_its_own {
-            words.push("each prediction is scored on all instants of its own".to_owned());
-        }
-        words
     }
 }

@@ -7,8 +7,8 @@ use athermal_serve::deployment::Deployment;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::model::load_to_fit;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_jobs::model::load_to_fit;
 
 /// Explain the code of a mistake, or what a machine file wires; or list all codes
 ///

@@ -1,19 +1,10 @@
 //! What a command found out: for people and for programs.
 
 use athermal_core::watch::{Kept, Progress, Watch};
-use serde_json::Value;
+use athermal_jobs::Found;
 
 use crate::message::Message;
 use crate::terminal::{Failure, Format, Terminal};
-
-/// What a command found out, before it is printed.
-#[derive(Debug)]
-pub struct Found {
-    /// For people.
-    pub text: String,
-    /// For programs.
-    pub facts: Value,
-}
 
 /// A terminal that shows progress at once, and remarks behind what is found.
 struct Behind<'a>(&'a Terminal, Kept);

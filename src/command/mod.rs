@@ -1,42 +1,30 @@
 //! The commands, each in a file of its own.
 
 pub(crate) mod aside;
-pub(crate) mod asked;
-pub(crate) mod beyond;
 mod build;
 mod check;
 pub(crate) mod compare;
 mod completions;
-pub(crate) mod data;
 mod demo;
 pub(crate) mod diagnose;
 mod diff;
-pub(crate) mod doubts;
 pub(crate) mod evaluate;
 mod explain;
-pub(crate) mod faults;
 pub(crate) mod fit;
-mod fit_blocks;
 pub(crate) mod found;
 pub(crate) mod init;
 mod man;
-pub(crate) mod model;
 mod new;
 mod nodes;
-mod refused;
 mod replay;
 pub(crate) mod report;
 mod run;
 mod schema;
-mod scored;
 mod serve;
 mod show;
 pub(crate) mod simulate;
 mod test;
-mod thinned;
-mod threads;
 mod unread;
-mod unscored;
 
 use athermal_command::{Command, Group, numbers, register_command};
 

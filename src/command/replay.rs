@@ -29,7 +29,7 @@ pub struct Replay {
     #[arg(long)]
     check: bool,
     /// Write a row for each tick, as CSV, or JSON lines by its ending; `-` is standard output
-    #[arg(long, short, value_name = "FILE", value_parser = crate::meant::written())]
+    #[arg(long, short, value_name = "FILE", value_parser = athermal_jobs::path::written())]
     output: Option<PathBuf>,
 }
 

@@ -1,37 +1,26 @@
 //! `athermal report`: what a model is worth on recorded data, as a page.
 
-use athermal_core::watch::Watch;
-use schemars::JsonSchema;
-use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use athermal::Model;
 use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
-use athermal::core::engine::SampleRange;
-use athermal::diagnosis::feedback;
-use athermal::report::{Facts, gather, page, plots, text};
-use athermal::run::fit::FitError;
-use athermal::run::score::{FellBack, Lack};
+use athermal::core::watch::Watch;
+use athermal::report::{page, plots};
+use athermal_jobs::model::load_fitted;
+use athermal_jobs::path::{graph_or_model, written};
+use athermal_jobs::report as job;
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};
-use super::asked::in_memory;
-use super::beyond::beyond;
-use super::data::{self, Data};
-use super::doubts;
-use super::faults::{FaultWatch, Purpose};
-use super::found::Found;
-use super::model::load_fitted;
-use crate::terminal::{Answer, Failure, Format, Terminal, outside};
+use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Show what a model is worth on recorded data, as one page
 ///
 /// Prints a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
 /// With `-o` it writes a self-contained HTML page that also has scores, drift and its correction over time, votes and
 /// errors, chosen features, all sensors, and the model's card. With `--format json` the same facts go to standard output.
-#[derive(Debug, Args, Deserialize, JsonSchema)]
+#[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal report model.json --data test.csv\n  \
                         athermal report model.json --data test.csv -o report.html\n  \
@@ -40,19 +29,15 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 )]
 pub struct Report {
     /// The model, or a graph that names one or in which nothing needs fitting
-    #[arg(value_parser = crate::meant::graph_or_model())]
-    #[serde(skip, default = "in_memory")]
+    #[arg(value_parser = graph_or_model())]
     model: PathBuf,
     #[command(flatten)]
-    #[serde(flatten)]
-    data: Data,
+    job: job::Report,
     /// Where the page goes; `-` is standard output
-    #[arg(long, short, value_name = "FILE", value_parser = crate::meant::written())]
-    #[serde(skip)]
+    #[arg(long, short, value_name = "FILE", value_parser = written())]
     output: Option<PathBuf>,
     /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
-    #[serde(skip)]
     plots: Option<PathBuf>,
 }
 
@@ -62,19 +47,19 @@ impl Report {
     /// # Errors
     /// When the model or the data cannot be used, or a file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        self.data.check_lasting("--data")?;
-        self.data.check_offsets(&[])?;
+        self.job.data.check_lasting("--data")?;
         let to_stdout = self.output.as_deref() == Some(Path::new("-"));
         if let Some(output) = &self.output {
             if to_stdout && terminal.format == Format::Json {
                 let message = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
                 return Err(Failure::Request(message.to_owned()));
             }
-            let read = self.data.paths().chain([&*self.model]);
+            let read = self.job.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
         }
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
-        let (found, facts) = self.find(&model, terminal)?;
+        self.job.data.thin(Some(&self.model), &model)?;
+        let (found, facts) = self.job.find(&model, terminal)?;
         match terminal.format {
             Format::Json => println!("{:#}", found.facts),
             Format::Table if to_stdout => {}
@@ -94,64 +79,6 @@ impl Report {
             write_plots(terminal, folder, &plots(&facts))?;
         }
         Ok(Answer::Fine)
-    }
-
-    /// Gathers the facts on a model that is compiled for scores.
-    ///
-    /// # Errors
-    /// When the data cannot be used.
-    pub fn find(&self, model: &Model, host: &dyn Watch) -> Result<(Found, Facts), Failure> {
-        self.data.thin(&self.model, &model.graph)?;
-        let dataset = self.data.dataset();
-        let watch = FaultWatch::new(&dataset, Purpose::Scores);
-        let facts = gather(model, &watch, self.data.names()).map_err(|error| {
-            let of_a_pass = error.downcast::<FitError>();
-            of_a_pass.map_or_else(outside, |error| Failure::from(*error))
-        })?;
-        let course = &facts.course;
-        data::warn(
-            host,
-            &model.plan,
-            &dataset.reports(),
-            course.refused,
-            &course.rejected,
-        );
-        self.data.warn_fitted_on(host, model, course.period_s);
-        if let Some(message) = feedback::in_words(&model.plan) {
-            host.warning(message);
-        }
-        let fell_back = FellBack::warnings(&facts.fell_back);
-        for message in Lack::warnings(&facts.lacks).into_iter().chain(fell_back) {
-            host.warning(message);
-        }
-        for of in &facts.unjudged {
-            host.warning(format_args!("`{}` cannot be judged: {}", of.of, of.why));
-        }
-        if course.axes.is_empty() {
-            host.warning(
-                "the graph has no prediction of a measured truth, so there is little to report",
-            );
-        }
-        let mut json =
-            serde_json::to_value(&facts).map_err(|error| Failure::Outside(error.to_string()))?;
-        let ranges = course.sensors.iter().filter_map(|of| {
-            let (channel, (lowest, highest)) = (of.name.clone(), of.range?);
-            Some(SampleRange {
-                channel,
-                lowest,
-                highest,
-            })
-        });
-        let ranges: Vec<SampleRange> = ranges.collect();
-        let outside_fit = beyond(model.sample_ranges(), &ranges);
-        for (key, found) in doubts::facts(&watch.found(), &outside_fit, &dataset) {
-            json[key] = found;
-        }
-        let found = Found {
-            text: text(&facts),
-            facts: json,
-        };
-        Ok((found, facts))
     }
 }
 

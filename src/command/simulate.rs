@@ -1,39 +1,29 @@
 //! `athermal simulate`: the recording of a simulated machine, as a file.
 
-use athermal_core::watch::{Progress, Watch};
-use schemars::JsonSchema;
-use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use athermal::core::compile::Wanted;
-use athermal::core::document::{NO_FILE, lasts};
-use athermal::core::registry::{all, find};
+use athermal::core::registry::all;
+use athermal::core::watch::Watch;
 use athermal::diagnosis::text::grouped;
 use athermal::files::{Flush, Format as FileFormat, Writer};
-use athermal::trial::fault::FaultSpec;
-use athermal::trial::machine::{
-    ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation,
-    Spread, facts,
-};
-use athermal_simulation::{Disturbance, disturbed, table_columns, write_set_points, write_table};
+use athermal::trial::machine::{KnownMachine, Machine, Simulated, facts};
+use athermal_analysis::figures::counted;
+use athermal_jobs::path::{check_ending, written};
+use athermal_jobs::simulate::{self as job, started};
+use athermal_simulation::{write_set_points, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::aside::{check_apart, not_written, write_aside, written_aside};
-use super::asked::{all_by_text, by_text};
-use super::data;
-use super::model::load_fitted;
-use super::numbers;
 use crate::terminal::{Answer, Failure, Format, Terminal};
-use athermal_analysis::figures::counted;
 
 /// Write the recording of a simulated machine, or list the machines
 ///
 /// The same machine, days, seed, schedule and faults give the same bytes everywhere. A schedule is a CSV file such as
 /// `time_h,chuck_degC` with rows `0,20`, `4,50` and, to start again, `8,repeat`.
-#[derive(Debug, Args, Deserialize, JsonSchema)]
+#[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal simulate
   athermal simulate die-tester -o train.csv
@@ -46,92 +36,14 @@ use athermal_analysis::figures::counted;
 
 Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` may be left out.")]
 pub struct Simulate {
-    /// The machine; all are listed when none is named
-    machine: Option<String>,
+    #[command(flatten)]
+    job: job::Simulate,
     /// CSV, JSON lines or what else is written, by its ending, CSV without one; `-` is standard output, as CSV
-    #[arg(long, short, value_name = "FILE", requires = "machine", value_parser = crate::meant::written())]
-    #[serde(skip)]
+    #[arg(long, short, value_name = "FILE", requires = "machine", value_parser = written())]
     output: Option<PathBuf>,
-    /// Length of the recording in days
-    #[arg(
-        long,
-        default_value_t = a_week(),
-        allow_negative_numbers = true,
-        requires = "machine",
-        value_parser = numbers::read::<f64>("a number of days, such as 0.5")
-    )]
-    #[serde(default = "a_week")]
-    days: f64,
-    /// Another seed is another week of weather, motions and noise
-    #[arg(
-        long,
-        default_value_t = first(),
-        allow_negative_numbers = true,
-        requires = "machine",
-        value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
-    )]
-    #[serde(default = "first")]
-    seed: u64,
-    /// One machine of a fleet: its parameters lie around those of the design, by so much
-    ///
-    /// Expansion, conductivity and heat capacity of each body, its skin, joints and views, the time constant of the chuck, the power of
-    /// motors and creep are each multiplied with exp(SPREAD n), `n` standard normal: a log-normal distribution. Sensors of temperature
-    /// have offsets of SPREAD times 0.5 K. Measures are those of the drawing. 0% is the design.
-    #[arg(long, default_value = "0%", requires = "machine")]
-    #[serde(default = "of_design", deserialize_with = "by_text")]
-    #[schemars(with = "String")]
-    spread: Spread,
-    /// Which machine of the fleet it is; weather, motions and noise follow `--seed`
-    #[arg(
-        long,
-        default_value_t = first(),
-        allow_negative_numbers = true,
-        requires = "spread",
-        value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
-    )]
-    #[serde(default = "first")]
-    machine_seed: u64,
-    /// Add the true drift of each axis as a column
-    #[arg(long, requires = "machine")]
-    #[serde(default)]
-    truth: bool,
-    /// Set points over time; the machine has a schedule of its own
-    #[arg(long, value_name = "FILE", requires = "machine")]
-    #[serde(default)]
-    schedule: Option<PathBuf>,
     /// Write what the schedule plans too: a row half an hour before each set point applies
     #[arg(long, value_name = "FILE", requires = "output")]
-    #[serde(skip)]
     set_points: Option<PathBuf>,
-    /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
-    #[arg(long, value_name = "MODEL", requires = "machine")]
-    #[serde(default)]
-    compensate: Option<PathBuf>,
-    /// A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…]
-    #[arg(long = "fault", value_name = "SPEC", requires = "machine")]
-    #[serde(default, rename = "fault", deserialize_with = "all_by_text")]
-    #[schemars(with = "Vec<String>")]
-    faults: Vec<FaultSpec>,
-    /// The world changes: `door,from=8h,for=3h,size=3`, `lamp,size=0.6 mK/s` or `loose=SENSOR,size=0.5`
-    ///
-    /// While a door stands open, the air couples to all bodies so many times as strongly. A lamp heats all of a stage. A loose sensor reads
-    /// so much of the room instead of its body.
-    #[arg(long = "disturb", value_name = "SPEC", requires = "machine")]
-    #[serde(default, rename = "disturb", deserialize_with = "all_by_text")]
-    #[schemars(with = "Vec<String>")]
-    disturbances: Vec<Disturbance>,
-}
-
-fn a_week() -> f64 {
-    7.0
-}
-
-fn first() -> u64 {
-    1
-}
-
-fn of_design() -> Spread {
-    Spread::default()
 }
 
 impl Simulate {
@@ -140,20 +52,20 @@ impl Simulate {
     /// # Errors
     /// When there is no such machine, the schedule or a fault does not fit it, or the file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let Some(name) = &self.machine else {
+        let job = &self.job;
+        let Some(name) = &job.machine else {
             list(terminal);
             return Ok(Answer::Fine);
         };
-        let known = find::<KnownMachine>(name)
-            .map_err(|error| refused(format!("{error} (`athermal simulate` lists them all)")))?;
+        let machine = job.machine()?;
         if self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::Request(format!(
                 "a recording is long; name a file for it: athermal simulate {name} -o {name}.csv"
             )));
         }
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
-        data::check_ending(output)?;
-        let read = || self.compensate.iter().chain(&self.schedule);
+        check_ending(output)?;
+        let read = || job.compensate.iter().chain(&job.schedule);
         check_apart("--output", output, read().map(|path| &**path))?;
         if let Some(path) = &self.set_points {
             let others = read().map(|path| &**path).chain([output]);
@@ -164,10 +76,10 @@ impl Simulate {
                     path.display()
                 )));
             }
-            let plan = write_set_points(known.machine, &self.setup(known.machine)?);
+            let plan = write_set_points(&*machine, &job.setup(&*machine)?);
             write_aside(path, plan)?;
         }
-        let rows = self.write(known.machine, output, terminal)?;
+        let rows = self.write(&*machine, output, terminal)?;
         if output.as_os_str() == "-" {
             return Ok(Answer::Fine);
         }
@@ -176,17 +88,17 @@ impl Simulate {
                 "output": output,
                 "rows": rows,
                 "machine": name,
-                "days": self.days,
-                "seed": self.seed,
-                "spread": self.spread.share(),
-                "machine_seed": self.machine_seed,
+                "days": job.days,
+                "seed": job.seed,
+                "spread": job.spread.share(),
+                "machine_seed": job.machine_seed,
             });
             println!("{facts:#}");
         } else {
-            let (rows, days) = (counted(rows, "row"), counted(self.days, "day"));
-            let (file, seed) = (output.display(), self.seed);
-            let one = if self.spread.share() > 0.0 {
-                format!(", machine {} of spread {}", self.machine_seed, self.spread)
+            let (rows, days) = (counted(rows, "row"), counted(job.days, "day"));
+            let (file, seed) = (output.display(), job.seed);
+            let one = if job.spread.share() > 0.0 {
+                format!(", machine {} of spread {}", job.machine_seed, job.spread)
             } else {
                 String::new()
             };
@@ -203,107 +115,27 @@ impl Simulate {
         output: &Path,
         host: &dyn Watch,
     ) -> Result<u64, Failure> {
-        let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
-        let machine = disturbed.as_deref().unwrap_or(machine);
-        let recording = self.recording(machine)?;
-        written_aside(output, |output| match &self.compensate {
-            None => write_recording(&recording, machine, self.truth, output, host),
-            Some(model) => self.write_corrected(model, &recording, machine, output, host),
-        })
-    }
-
-    fn recording<'a>(&self, machine: &'a dyn Machine) -> Result<Simulated<'a>, Failure> {
-        let setup = self.setup(machine)?;
-        Ok(Simulated::new(machine, setup).with_faults(self.faults.clone()))
-    }
-
-    /// Simulates a machine by its own: each row with its time in ns goes to `put`. Gives the names of the columns behind the time.
-    ///
-    /// # Errors
-    /// When there is no such machine, or the schedule or a fault does not fit it.
-    pub fn rows(
-        &self,
-        host: &dyn Watch,
-        put: &mut dyn FnMut(i64, &[f64]),
-    ) -> Result<Vec<String>, Failure> {
-        let name = self.machine.as_deref().unwrap_or_default();
-        let machine = find::<KnownMachine>(name).map_err(refused)?.machine;
-        let disturbed = disturbed(machine.name(), &self.disturbances).map_err(refused)?;
-        let machine = disturbed.as_deref().unwrap_or(machine);
-        let mut simulation = Watched::start(&self.recording(machine)?, host)?;
-        let channels = machine.channels();
-        let (mut row, mut values) = (Row::empty(channels), Vec::new());
-        while simulation.next(&mut row) {
-            values.clear();
-            take(&row, self.truth, &mut values);
-            put(row.time_ns, &values);
-        }
-        Ok(table_columns(channels, self.truth))
-    }
-
-    /// Writes a recording of the machine under the correction of a graph.
-    fn write_corrected(
-        &self,
-        model: &Path,
-        recording: &Simulated,
-        machine: &dyn Machine,
-        output: &Path,
-        host: &dyn Watch,
-    ) -> Result<u64, Failure> {
-        let engine = load_fitted(model, Wanted::default(), host)?.engine()?;
-        let simulation = Box::new(Watched::start(recording, host)?);
-        let setup = recording.setup();
-        let mut simulation =
-            ClosedLoop::new(machine, setup, simulation, engine).map_err(refused)?;
-        let channels = machine.channels();
-        let axes = channels.iter().filter(|channel| channel.is_axis());
-        let mut columns = table_columns(channels, self.truth);
-        columns.extend(axes.map(|axis| format!("{}_applied_nm", axis.name)));
-        let mut row = Row::empty(channels);
-        write_rows(output, &columns, |values| {
-            let more = simulation.next(&mut row);
-            take(&row, self.truth, values);
-            values.extend_from_slice(simulation.applied());
-            more.then_some(row.time_ns)
-        })
-    }
-
-    fn setup(&self, machine: &dyn Machine) -> Result<Setup, Failure> {
-        Ok(Setup {
-            days: self.days,
-            seed: self.seed,
-            schedule: self.schedule(machine)?,
-            individual: Individual {
-                spread: self.spread,
-                seed: self.machine_seed,
-            },
-        })
-    }
-
-    fn schedule(&self, machine: &dyn Machine) -> Result<Option<Schedule>, Failure> {
-        let Some(path) = &self.schedule else {
-            return Ok(None);
-        };
-        // What a shell has opened for this command, as `<(…)`, comes to an end.
-        let is_open = path.starts_with("/dev/fd");
-        if !(is_open || lasts(path)) {
-            let message = format!("--schedule {}: {NO_FILE}", path.display());
-            return Err(Failure::Request(message));
-        }
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            Failure::Outside(format!("cannot read {}: {error}", path.display()))
-        })?;
-        let schedule = Schedule::parse(&text, machine.set_points());
-        schedule.map(Some).map_err(|errors| {
-            let lines = errors
-                .iter()
-                .map(|error| format!("{}: {error}", path.display()));
-            Failure::Request(lines.collect::<Vec<_>>().join("\n  "))
+        let format = FileFormat::from_path(output);
+        let is_text = !matches!(format, Some(FileFormat::JsonLines | FileFormat::Typed));
+        written_aside(output, |output| {
+            if self.job.compensate.is_none() && is_text {
+                let recording = self.job.recording(machine)?;
+                return write_recording(&recording, machine, self.job.truth, output, host);
+            }
+            let columns = self.job.columns(machine);
+            let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
+            let mut rows = 0;
+            self.job.rows(machine, host, &mut |time_ns, values| {
+                rows += 1;
+                Ok(writer.write_row("", time_ns, values)?)
+            })?;
+            writer.finish()?;
+            Ok(rows)
         })
     }
 }
 
-/// Writes a simulated recording to a file or standard output, and gives the number of rows.
+/// Writes a simulated recording to a file or standard output as CSV, and gives the number of rows.
 ///
 /// # Errors
 /// When the simulation cannot start or the file cannot be written.
@@ -314,17 +146,7 @@ pub fn write_recording(
     output: &Path,
     host: &dyn Watch,
 ) -> Result<u64, Failure> {
-    let mut simulation = Watched::start(recording, host)?;
-    let channels = machine.channels();
-    let format = FileFormat::from_path(output);
-    if matches!(format, Some(FileFormat::JsonLines | FileFormat::Typed)) {
-        let mut row = Row::empty(channels);
-        return write_rows(output, &table_columns(channels, truth), |values| {
-            let more = simulation.next(&mut row);
-            take(&row, truth, values);
-            more.then_some(row.time_ns)
-        });
-    }
+    let mut simulation = started(recording, host)?;
     let failed = |error: io::Error| {
         if error.kind() == io::ErrorKind::BrokenPipe {
             // Whoever read our output has seen enough.
@@ -338,65 +160,10 @@ pub fn write_recording(
         Box::new(File::create(output).map_err(failed)?)
     };
     let mut out = BufWriter::with_capacity(1 << 16, out);
-    let rows = write_table(channels, &mut simulation, truth, &mut out).map_err(failed)?;
+    let rows =
+        write_table(machine.channels(), &mut *simulation, truth, &mut out).map_err(failed)?;
     out.flush().map_err(failed)?;
     Ok(rows)
-}
-
-/// Writes rows for as long as there is one, by its time in ns and its values, and gives their number.
-fn write_rows(
-    output: &Path,
-    columns: &[String],
-    mut next: impl FnMut(&mut Vec<f64>) -> Option<i64>,
-) -> Result<u64, Failure> {
-    let mut writer = Writer::create(output, "time_s", columns, Flush::Buffered)?;
-    let (mut values, mut rows) = (Vec::new(), 0);
-    while let Some(time_ns) = next(&mut values) {
-        writer.write_row("", time_ns, &values)?;
-        values.clear();
-        rows += 1;
-    }
-    writer.finish()?;
-    Ok(rows)
-}
-
-fn take(row: &Row, truth: bool, values: &mut Vec<f64>) {
-    values.extend_from_slice(&row.values);
-    values.extend(row.true_drift.iter().filter(|_| truth));
-}
-
-fn refused(error: impl ToString) -> Failure {
-    Failure::Request(error.to_string())
-}
-
-/// A simulation that shows its progress.
-struct Watched {
-    simulation: Box<dyn Simulation>,
-    progress: Box<dyn Progress>,
-}
-
-impl Watched {
-    fn start(recording: &Simulated, host: &dyn Watch) -> Result<Self, Failure> {
-        let simulation = recording.start().map_err(refused)?;
-        let days = recording.setup().days;
-        Ok(Self {
-            simulation,
-            // Days are counted in thousandths, since how many rows there will be is the machine's business.
-            progress: host.progress_to("simulating", (days * 1000.0) as u64),
-        })
-    }
-}
-
-impl Simulation for Watched {
-    fn next(&mut self, row: &mut Row) -> bool {
-        let more = self.simulation.next(row);
-        self.progress.set((row.time_ns as f64 / 86_400e6) as u64);
-        more
-    }
-
-    fn correct(&mut self, asked: &[f64], applied: &mut [f64]) {
-        self.simulation.correct(asked, applied);
-    }
 }
 
 fn list(terminal: &Terminal) {

@@ -12,7 +12,7 @@ pub fn warn(terminal: &Terminal, path: &Path, graph: &GraphFile) {
     let unread = graph.deployment.keys().filter(|key| *key != "model");
     let unread: Vec<_> = unread.map(|section| format!("`[{section}]`")).collect();
     if !unread.is_empty() {
-        let thins = match super::thinned::says(graph) {
+        let thins = match athermal_jobs::thinned::says(graph) {
             true => ", but for what is thinned",
             false => "",
         };

@@ -8,7 +8,7 @@ use athermal_files::OpenTable;
 
 use crate::file::{BATCH, batches};
 
-/// Batches of one schema as a table for [`athermal_files::with_tables`]. Before each few thousand rows `go_on` is asked whether to go
+/// Batches of one schema as a table of [`athermal_files::Tables`]. Before each few thousand rows `go_on` is asked whether to go
 /// on; its error ends the reading.
 #[must_use]
 pub fn table(

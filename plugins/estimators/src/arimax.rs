@@ -1,97 +1,56 @@
 //! The estimator whose noise has no level to return to.
 
 use athermal_core::node::InputPort;
-use athermal_core::time::Duration;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, Differences, PerInput, identified};
+use crate::identified::identified;
+use crate::keys::keys;
 use crate::order::Order;
 
-/// ARMAX whose noise may be integrated: it then has no level to return to, so that an offset that comes to stay is followed.
-///
-/// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section
-/// 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton
-/// steps, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit
-/// circle.
-///
-/// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is decided
-/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 choose the order), unless
-/// `differences` says so: without any it is ARMAX, and an offset that the rows of the fit did not have stays an error.
-///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
-/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
-/// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
-/// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
-/// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
-/// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
-/// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
-/// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that and
-/// the features had always been what they are, and so does, in the fit too, what comes after more steps without
-/// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
-/// port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that are missing.
-/// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Since the
-/// answer changes with time alone, the node runs at every tick.
-///
-/// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Arimax {
-    /// How many past values of the truth, 0 to 100.
-    #[serde(default = "crate::identified::one")]
-    #[schemars(range(min = 0, max = 100))]
-    pub na: usize,
-    /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "PerInput::one")]
-    pub nb: PerInput,
-    /// How many past innovations, 0 to 100.
-    #[serde(default = "crate::identified::one")]
-    #[schemars(range(min = 0, max = 100))]
-    pub nc: usize,
-    /// How many steps the newest value of each feature that counts lies before the run, 0 to 100: a number for all, or a list
-    /// with one for each.
-    #[serde(default = "PerInput::none")]
-    pub nk: PerInput,
-    /// How often the noise is integrated, 0 to 2; without it once or not at all, whichever the figure of `order` finds better.
-    #[serde(default)]
-    #[schemars(range(min = 0, max = 2))]
-    pub differences: Option<usize>,
-    /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
-    #[serde(default = "crate::identified::penalty")]
-    #[schemars(range(min = 0.0))]
-    pub penalty: f64,
-    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
-    #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub every: Option<Duration>,
-    /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given. They are compared
-    /// without the penalty, with which the chosen one is fitted.
-    #[serde(default)]
-    pub order: Option<Order>,
-}
-
-impl Arimax {
-    fn asked(&self) -> Asked {
-        Asked {
-            na: Some(self.na),
-            nb: Some(self.nb.clone()),
-            nc: Some(self.nc),
-            nk: Some(self.nk.clone()),
-            differences: self
-                .differences
-                .map_or(Differences::Chosen, Differences::Given),
-            penalty: self.penalty,
-            every: self.every,
-            order: self.order,
-            ..Asked::default()
-        }
+keys! {
+    /// ARMAX whose noise may be integrated: it then has no level to return to, so that an offset that comes to stay is followed.
+    ///
+    /// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section
+    /// 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton
+    /// steps, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit
+    /// circle.
+    ///
+    /// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is decided
+    /// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 choose the order), unless
+    /// `differences` says so: without any it is ARMAX, and an offset that the rows of the fit did not have stays an error.
+    ///
+    /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+    /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
+    /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
+    /// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
+    /// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
+    /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
+    /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
+    /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
+    /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that and
+    /// the features had always been what they are, and so does, in the fit too, what comes after more steps without
+    /// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
+    /// port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that are missing.
+    /// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Since the
+    /// answer changes with time alone, the node runs at every tick.
+    ///
+    /// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
+    pub struct Arimax {
+        na nb nc nk penalty every;
+        /// How often the noise is integrated, 0 to 2; without it once or not at all, whichever the figure of `order` finds better.
+        #[serde(default)]
+        #[schemars(range(min = 0, max = 2))]
+        pub differences: Option<usize>,
+        /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given. They are compared
+        /// without the penalty, with which the chosen one is fitted.
+        #[serde(default)]
+        pub order: Option<Order>,
     }
 }
 
 identified!(
     Arimax,
     "arimax",
+    [na, nb, nc, nk, differences, penalty, every, order],
     [
         InputPort::held("features", "what the prediction is made of beside the past").or_none(),
         InputPort::truth("what is predicted, and followed")
@@ -101,7 +60,7 @@ identified!(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identified::Identify;
+    use crate::identified::{Asked, Differences, Identify, PerInput};
     use athermal_core::node::TrainingReport;
     use athermal_core::prng::Prng;
     use athermal_numerics::Samples;

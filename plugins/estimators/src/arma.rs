@@ -1,70 +1,46 @@
 //! The estimator that tells the truth from its own past and from what was not foreseen of it.
 
 use athermal_core::node::InputPort;
-use athermal_core::time::Duration;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, identified};
+use crate::identified::identified;
+use crate::keys::keys;
 use crate::order::Order;
 
-/// Autoregressive moving average: what the truth does by itself, and what was not foreseen of it.
-///
-/// `A(q) (y − μ) = C(q) e`, with `A(q) = 1 + a₁q⁻¹ + …` and `C(q) = 1 + c₁q⁻¹ + …` (Box and Jenkins 1970; Ljung 1999,
-/// section 4.2). The sum of squared one-step prediction errors is made least by damped Gauss–Newton steps, starting where
-/// Hannan and Rissanen (1982) end; roots of `A` and `C` stay inside the unit circle.
-///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
-/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
-/// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
-/// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
-/// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
-/// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
-/// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
-/// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that had
-/// always been; with `learn = false` it stays at the level of the fit. The port `std_dev` is the standard deviation
-/// of the truth about its prediction, larger after truths that are missing. Where rows tell the level less well than
-/// one of them does by itself, it is taken to be their mean, which the fit reports. Since the answer changes with time alone,
-/// the node runs at every tick.
-///
-/// The limit of `learn.outliers` keeps spikes out, and with them the beginning of what really changes within a truth or two, by which
-/// there is nothing else to go: on the die tester's axis Z1, whose drift leaps by hundreds of nm/min when a die is loaded, the
-/// error is 62 nm/min instead of 55. Where truths are sound, say `learn = { outliers = inf }`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Arma {
-    /// How many past values of the truth, 0 to 100.
-    #[serde(default = "crate::identified::one")]
-    #[schemars(range(min = 0, max = 100))]
-    pub na: usize,
-    /// How many past innovations, 0 to 100.
-    #[serde(default = "crate::identified::one")]
-    #[schemars(range(min = 0, max = 100))]
-    pub nc: usize,
-    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
-    #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub every: Option<Duration>,
-    /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
-    #[serde(default)]
-    pub order: Option<Order>,
-}
-
-impl Arma {
-    fn asked(&self) -> Asked {
-        Asked {
-            na: Some(self.na),
-            nc: Some(self.nc),
-            every: self.every,
-            order: self.order,
-            ..Asked::default()
-        }
+keys! {
+    /// Autoregressive moving average: what the truth does by itself, and what was not foreseen of it.
+    ///
+    /// `A(q) (y − μ) = C(q) e`, with `A(q) = 1 + a₁q⁻¹ + …` and `C(q) = 1 + c₁q⁻¹ + …` (Box and Jenkins 1970; Ljung 1999,
+    /// section 4.2). The sum of squared one-step prediction errors is made least by damped Gauss–Newton steps, starting where
+    /// Hannan and Rissanen (1982) end; roots of `A` and `C` stay inside the unit circle.
+    ///
+    /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+    /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
+    /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
+    /// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
+    /// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
+    /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
+    /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
+    /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
+    /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that had
+    /// always been; with `learn = false` it stays at the level of the fit. The port `std_dev` is the standard deviation
+    /// of the truth about its prediction, larger after truths that are missing. Where rows tell the level less well than
+    /// one of them does by itself, it is taken to be their mean, which the fit reports. Since the answer changes with time alone,
+    /// the node runs at every tick.
+    ///
+    /// The limit of `learn.outliers` keeps spikes out, and with them the beginning of what really changes within a truth or two, by which
+    /// there is nothing else to go: on the die tester's axis Z1, whose drift leaps by hundreds of nm/min when a die is loaded, the
+    /// error is 62 nm/min instead of 55. Where truths are sound, say `learn = { outliers = inf }`.
+    pub struct Arma {
+        na nc every;
+        /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
+        #[serde(default)]
+        pub order: Option<Order>,
     }
 }
 
 identified!(
     Arma,
     "arma",
+    [na, nc, every, order],
     [InputPort::truth("what is predicted, and followed")]
 );

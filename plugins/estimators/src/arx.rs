@@ -1,49 +1,37 @@
 //! The estimator with both: drift from past drift and temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, PlannedRow, Regressors, Trainer, TrainingSetup,
-    TruthLags,
+    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
 };
-use athermal_core::time::Duration;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::features::too_many;
+use crate::keys::keys;
 use crate::lag_order::LagOrder;
-use crate::lags::{now, repeated};
+use crate::lags::repeated;
 use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
-use crate::solver::Solver;
+use crate::solver::by_solver;
 
-/// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
-///
-/// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
-/// candidates like the features. The answer changes with time alone, so the node runs at every tick.
-///
-/// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it, and so is `novelty`.
-/// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
-/// newest truth, in the numbers of `rls`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Arx {
-    /// The lags of the truth, such as `["0s", "5min", "10min"]`.
-    #[schemars(length(min = 1))]
-    pub lags: Vec<Duration>,
-    /// The lags at which each feature is read.
-    #[serde(default = "now")]
-    #[schemars(length(min = 1))]
-    pub feature_lags: Vec<Duration>,
-    /// How coefficients are found.
-    #[serde(default)]
-    pub solver: Solver,
-    /// How features and lags are chosen; without it, all are used.
-    #[serde(default)]
-    pub selection: Option<Selection>,
-    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it
-    /// all are. Orders are compared by ordinary least squares, whatever the solver; it fits the chosen one.
-    #[serde(default)]
-    pub order: Option<Order>,
+keys! {
+    /// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
+    ///
+    /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
+    /// candidates like the features. The answer changes with time alone, so the node runs at every tick.
+    ///
+    /// The port `std_dev` is the standard deviation of the truth about the prediction, as `linear` gives it, and so is `novelty`.
+    /// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
+    /// newest truth, in the numbers of `rls`.
+    pub struct Arx {
+        lags feature_lags solver;
+        /// How features and lags are chosen; without it, all are used.
+        #[serde(default)]
+        pub selection: Option<Selection>,
+        /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it
+        /// all are. Orders are compared by ordinary least squares, whatever the solver; it fits the chosen one.
+        #[serde(default)]
+        pub order: Option<Order>,
+    }
 }
 
 impl Arx {
@@ -86,25 +74,7 @@ impl Estimator for Arx {
         mistakes
     }
 
-    fn learns(&self) -> Learns {
-        self.solver.learns()
-    }
-
-    fn mistakes_of_row(&self, row: &PlannedRow<'_>) -> Vec<Mistake> {
-        self.solver.mistakes_of_row(row)
-    }
-
-    fn needs_constants(&self) -> bool {
-        self.solver.prior().is_some()
-    }
-
-    fn has_novelty(&self) -> bool {
-        true
-    }
-
-    fn has_std_dev(&self) -> bool {
-        self.solver.has_std_dev()
-    }
+    by_solver!();
 
     fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
         too_many(features, self.feature_lags.len())

@@ -15,6 +15,7 @@ mod folds;
 mod huber;
 mod identified;
 mod kalman;
+mod keys;
 mod lag_order;
 mod lags;
 mod lasso;

@@ -6,12 +6,12 @@ use athermal_core::node::{
     TruthLags,
 };
 use athermal_core::node::{number, numbers};
-use athermal_core::time::Duration;
 use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Novelty, Standardizer};
-use schemars::JsonSchema;
+
 use serde::{Deserialize, Serialize};
 
-use crate::lags::{now, repeated};
+use crate::keys::keys;
+use crate::lags::repeated;
 use crate::novelty::{novelty_mistakes, novelty_of_rows};
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::unsolved::unsolved;
@@ -19,40 +19,34 @@ use crate::unsolved::unsolved;
 /// More terms would take the memory of many rows.
 const MOST_TERMS: usize = 500;
 
-/// Nonlinear autoregression with exogenous inputs: a polynomial in features and the truth's own past.
-///
-/// `ŷ(t + ahead) = ȳ + Σ θ_k p_k(z)` with products `p_k` of up to `degree` of the variables `z`: the features and the past
-/// truths, each about its mean in the rows of the fit and in units of its deviation there (Chen and Billings 1989). The constant
-/// and all products, 499 at most, are candidates. Forward regression takes, one after the other, the one that explains most of
-/// what is left of the truth; its share of the truth's squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo
-/// 1989), which the fit prints and keeps for every term. Coefficients are least squares.
-///
-/// Outside the range of the fit powers grow without bound: there a variable counts in products as at the edge of the range,
-/// and alone as it is. The port `novelty` shows where that is: that of `linear`, of the terms as they are without an edge. A fit whose
-/// rows do not fit in memory has none. Like `arx` it takes the lags as they are stated, and predicts `ahead` directly; the answer changes with
-/// time alone, so the node runs at every tick.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Narx {
-    /// The lags of the truth, such as `["0s", "5min"]`.
-    #[schemars(length(min = 1))]
-    pub lags: Vec<Duration>,
-    /// The lags at which each feature is read.
-    #[serde(default = "now")]
-    #[schemars(length(min = 1))]
-    pub feature_lags: Vec<Duration>,
-    /// How many variables a product has at most, from 1 to 4.
-    #[serde(default = "two")]
-    #[schemars(range(min = 1, max = 4))]
-    pub degree: usize,
-    /// The least error-reduction ratio with which a term is taken, from 0 up to, but not including, 1.
-    #[serde(default = "thousandth")]
-    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1.0))]
-    pub tolerance: f64,
-    /// Take at most so many terms, 1 or more.
-    #[serde(default = "twenty")]
-    #[schemars(range(min = 1))]
-    pub most: usize,
+keys! {
+    /// Nonlinear autoregression with exogenous inputs: a polynomial in features and the truth's own past.
+    ///
+    /// `ŷ(t + ahead) = ȳ + Σ θ_k p_k(z)` with products `p_k` of up to `degree` of the variables `z`: the features and the past
+    /// truths, each about its mean in the rows of the fit and in units of its deviation there (Chen and Billings 1989). The constant
+    /// and all products, 499 at most, are candidates. Forward regression takes, one after the other, the one that explains most of
+    /// what is left of the truth; its share of the truth's squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo
+    /// 1989), which the fit prints and keeps for every term. Coefficients are least squares.
+    ///
+    /// Outside the range of the fit powers grow without bound: there a variable counts in products as at the edge of the range,
+    /// and alone as it is. The port `novelty` shows where that is: that of `linear`, of the terms as they are without an edge. A fit whose
+    /// rows do not fit in memory has none. Like `arx` it takes the lags as they are stated, and predicts `ahead` directly; the answer changes with
+    /// time alone, so the node runs at every tick.
+    pub struct Narx {
+        lags feature_lags;
+        /// How many variables a product has at most, from 1 to 4.
+        #[serde(default = "two")]
+        #[schemars(range(min = 1, max = 4))]
+        pub degree: usize,
+        /// The least error-reduction ratio with which a term is taken, from 0 up to, but not including, 1.
+        #[serde(default = "thousandth")]
+        #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1.0))]
+        pub tolerance: f64,
+        /// Take at most so many terms, 1 or more.
+        #[serde(default = "twenty")]
+        #[schemars(range(min = 1))]
+        pub most: usize,
+    }
 }
 
 fn two() -> usize {

@@ -1,83 +1,51 @@
 //! The estimator that tells the truth from features through filters of their own.
 
 use athermal_core::node::InputPort;
-use athermal_core::time::Duration;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, PerInput, identified};
+use crate::identified::identified;
+use crate::keys::keys;
 use crate::order::Order;
 
-/// Output error: what the features bring about through filters of their own, whatever the truth was before.
-///
-/// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + e` (Dugard and Landau 1980; Ljung 1999, section 4.2). The sum of squared errors
-/// of the simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz
-/// and McBride (1965) end; where a filter has more than one pole, from other starts too, among them the best models with
-/// fewer coefficients, and the best end is kept. Roots of each `F` stay inside the unit circle. Once it is known where the filters are, truths are not read: it is as good in a free run as beside a machine.
-///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
-/// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
-/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts
-/// as so many steps, rounded. Running, it goes on by the features alone.
-///
-/// Where truths are missing in the fit, or outside of its limits, the filters go on. After more steps without features
-/// than ten, or than the model reaches back where that is more, as in each segment, they start again: what they gave
-/// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
-/// and counts as found in criteria and errors. Running, a segment begins at rest, as if the features had always been what
-/// they are first, or where such features leave filters on average, and how unsure that is, is known from the fit. Truths
-/// then tell where the filters are, as in a Kalman filter of the model (Harvey 1989, section 3.2): the better that is
-/// known, the less a truth moves them, until they go by the features alone. So does what comes after as many steps without
-/// features; a free run takes as many truths as the filters have past values. With `learn = false` it stays at rest. The
-/// port `std_dev` is the standard deviation of the truth about its prediction, larger until it is known where the filters
-/// are. It goes by the errors that are left in the fit: where noise is coloured and pieces are short, what filters gave before takes
-/// slow noise up too, and the deviation is too small. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer
-/// changes with time alone, the node runs at every tick.
-///
-/// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Oe {
-    /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "PerInput::one")]
-    pub nb: PerInput,
-    /// How many past values of what each feature brings about, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "PerInput::one")]
-    pub nf: PerInput,
-    /// How many steps the newest value of each feature that counts lies before the run, 0 to 100: a number for all, or a list
-    /// with one for each.
-    #[serde(default = "PerInput::none")]
-    pub nk: PerInput,
-    /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
-    #[serde(default = "crate::identified::penalty")]
-    #[schemars(range(min = 0.0))]
-    pub penalty: f64,
-    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
-    #[serde(default)]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub every: Option<Duration>,
-    /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given. They are compared
-    /// without the penalty, with which the chosen one is fitted.
-    #[serde(default)]
-    pub order: Option<Order>,
-}
-
-impl Oe {
-    fn asked(&self) -> Asked {
-        Asked {
-            nb: Some(self.nb.clone()),
-            nf: Some(self.nf.clone()),
-            nk: Some(self.nk.clone()),
-            penalty: self.penalty,
-            every: self.every,
-            order: self.order,
-            ..Asked::default()
-        }
+keys! {
+    /// Output error: what the features bring about through filters of their own, whatever the truth was before.
+    ///
+    /// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + e` (Dugard and Landau 1980; Ljung 1999, section 4.2). The sum of squared errors
+    /// of the simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz
+    /// and McBride (1965) end; where a filter has more than one pole, from other starts too, among them the best models with
+    /// fewer coefficients, and the best end is kept. Roots of each `F` stay inside the unit circle. Once it is known where the filters are, truths are not read: it is as good in a free run as beside a machine.
+    ///
+    /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
+    /// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
+    /// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts
+    /// as so many steps, rounded. Running, it goes on by the features alone.
+    ///
+    /// Where truths are missing in the fit, or outside of its limits, the filters go on. After more steps without features
+    /// than ten, or than the model reaches back where that is more, as in each segment, they start again: what they gave
+    /// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
+    /// and counts as found in criteria and errors. Running, a segment begins at rest, as if the features had always been what
+    /// they are first, or where such features leave filters on average, and how unsure that is, is known from the fit. Truths
+    /// then tell where the filters are, as in a Kalman filter of the model (Harvey 1989, section 3.2): the better that is
+    /// known, the less a truth moves them, until they go by the features alone. So does what comes after as many steps without
+    /// features; a free run takes as many truths as the filters have past values. With `learn = false` it stays at rest. The
+    /// port `std_dev` is the standard deviation of the truth about its prediction, larger until it is known where the filters
+    /// are. It goes by the errors that are left in the fit: where noise is coloured and pieces are short, what filters gave before takes
+    /// slow noise up too, and the deviation is too small. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer
+    /// changes with time alone, the node runs at every tick.
+    ///
+    /// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
+    pub struct Oe {
+        nb nf nk penalty every;
+        /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given. They are compared
+        /// without the penalty, with which the chosen one is fitted.
+        #[serde(default)]
+        pub order: Option<Order>,
     }
 }
 
 identified!(
     Oe,
     "oe",
+    [nb, nf, nk, penalty, every, order],
     [
         InputPort::held("features", "what the prediction is made of"),
         InputPort::truth("what is predicted")

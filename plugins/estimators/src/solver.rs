@@ -186,3 +186,32 @@ impl Solver {
         }
     }
 }
+
+/// What an estimator whose coefficients a solver finds says of itself.
+macro_rules! by_solver {
+    () => {
+        fn learns(&self) -> athermal_core::node::Learns {
+            self.solver.learns()
+        }
+
+        fn mistakes_of_row(
+            &self,
+            row: &athermal_core::node::PlannedRow<'_>,
+        ) -> Vec<athermal_core::node::Mistake> {
+            self.solver.mistakes_of_row(row)
+        }
+
+        fn needs_constants(&self) -> bool {
+            self.solver.prior().is_some()
+        }
+
+        fn has_novelty(&self) -> bool {
+            true
+        }
+
+        fn has_std_dev(&self) -> bool {
+            self.solver.has_std_dev()
+        }
+    };
+}
+pub(crate) use by_solver;

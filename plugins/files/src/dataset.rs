@@ -13,7 +13,8 @@ use crate::merge::{self, Joint};
 use crate::recording::offset_of;
 use crate::stream::next_of;
 use crate::{
-    ChannelColumn, FileError, Format, Layout, Options, Report, Stretch, TimeColumn, TimeForm,
+    ChannelColumn, FileError, Format, Layout, Options, Report, Stretch, Tables, TimeColumn,
+    TimeForm,
 };
 
 /// How a sample number is carried where the graph gives no step.
@@ -133,6 +134,12 @@ impl Dataset {
     pub fn thinned(mut self, rules: Vec<ThinnedChannels>) -> Self {
         self.thinned = rules.into();
         self
+    }
+
+    /// What stands for files in memory.
+    #[must_use]
+    pub fn tables(&self) -> &Tables {
+        &self.options.tables
     }
 
     /// The files.

@@ -1,6 +1,6 @@
 //! Tables in memory that are read by a name, as files are by their paths. Not what is in them.
 
-use std::cell::RefCell;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,48 +9,34 @@ use crate::typed::TypedFile;
 /// Opens a table in memory, as often as it is asked for; the error says why it cannot be read.
 pub type OpenTable = Arc<dyn Fn() -> Result<Box<dyn TypedFile>, String> + Send + Sync>;
 
-thread_local! {
-    static LENT: RefCell<Vec<(PathBuf, OpenTable)>> = const { RefCell::new(Vec::new()) };
-}
+/// Tables in memory by name: they are read wherever a file of that name is asked for, also where there is one.
+#[derive(Clone, Default)]
+pub struct Tables(Arc<[(PathBuf, OpenTable)]>);
 
-/// Takes tables back, also after a panic.
-struct Return {
-    left: usize,
-}
+impl Tables {
+    /// Whether there is a table of that name.
+    #[must_use]
+    pub fn has(&self, path: &Path) -> bool {
+        self.0.iter().any(|(name, _)| name == path)
+    }
 
-impl Drop for Return {
-    fn drop(&mut self) {
-        LENT.with_borrow_mut(|lent| lent.truncate(self.left));
+    /// Opens the table of a name, where there is one.
+    pub(crate) fn open(&self, path: &Path) -> Option<Result<Box<dyn TypedFile>, String>> {
+        let found = self.0.iter().find(|(name, _)| name == path);
+        found.map(|(_, open)| open())
     }
 }
 
-/// Does some work in which this thread reads tables in memory wherever a file of their name is asked for, also where there is one.
-pub fn with_tables<R>(tables: Vec<(PathBuf, OpenTable)>, work: impl FnOnce() -> R) -> R {
-    let left = LENT.with_borrow_mut(|lent| {
-        let left = lent.len();
-        lent.extend(tables);
-        left
-    });
-    let _return = Return { left };
-    work()
+impl FromIterator<(PathBuf, OpenTable)> for Tables {
+    fn from_iter<I: IntoIterator<Item = (PathBuf, OpenTable)>>(all: I) -> Self {
+        Self(all.into_iter().collect())
+    }
 }
 
-/// The table of a name, where there is one.
-fn lent(path: &Path) -> Option<OpenTable> {
-    LENT.with_borrow(|lent| {
-        let mut newest_first = lent.iter().rev();
-        let found = newest_first.find(|(name, _)| name == path);
-        found.map(|(_, open)| Arc::clone(open))
-    })
-}
-
-/// Whether this thread reads a table in memory by that name.
-#[must_use]
-pub fn is_in_memory(path: &Path) -> bool {
-    lent(path).is_some()
-}
-
-/// Opens the table of a name, where there is one.
-pub(crate) fn open(path: &Path) -> Option<Result<Box<dyn TypedFile>, String>> {
-    lent(path).map(|open| open())
+impl fmt::Debug for Tables {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set()
+            .entries(self.0.iter().map(|of| &of.0))
+            .finish()
+    }
 }

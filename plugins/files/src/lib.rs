@@ -63,7 +63,7 @@ pub use error::{Again, CellFault, FileError, MissingColumn, Place};
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
-pub use lent::{OpenTable, is_in_memory, with_tables};
+pub use lent::{OpenTable, Tables};
 pub use lines::STANDARD_INPUT;
 pub use machines::MachineFault;
 pub use merge::{Joint, MergeError};

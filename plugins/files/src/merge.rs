@@ -209,7 +209,12 @@ impl Joint {
 /// The same with the times of those files that have another than the layout says.
 fn with_times(paths: &[PathBuf], layout: &Layout, mut options: Options) -> Options {
     let of_several = paths.iter().filter(|_| paths.len() > 1);
-    let times = of_several.filter_map(|path| Some((path.clone(), other_time(path, &layout.time)?)));
+    let times = of_several.filter_map(|path| {
+        Some((
+            path.clone(),
+            other_time(path, &layout.time, &options.tables)?,
+        ))
+    });
     options.times = times.collect();
     options
 }

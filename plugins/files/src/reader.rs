@@ -18,12 +18,12 @@ use crate::long::Long;
 use crate::machines::Machines;
 use crate::recording::offset_of;
 use crate::typed::{self, TypedCells, TypedFile};
-use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, Stretch, TimeColumn};
+use crate::{ChannelColumn, Event, FileError, Format, Layout, Report, Stretch, Tables, TimeColumn};
 use commas::Commas;
 use reading::Reading;
 
 /// How a recording is to be read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 pub struct Options {
     /// The format; by default what the name of the file says, else its first byte.
     pub format: Option<Format>,
@@ -47,6 +47,8 @@ pub struct Options {
     pub stretch: Stretch,
     /// The time of files that have another than the layout says.
     pub times: Vec<(PathBuf, TimeColumn)>,
+    /// What stands for files in memory.
+    pub tables: Tables,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.
@@ -119,12 +121,12 @@ impl Reader {
         let is_whole = !options.goes_on && path.is_file();
         let table = layout.table_of(path).clone();
         let is_of_several = table.machine.is_some() && table.only.is_none();
-        let again = (is_of_several && (is_whole || crate::is_in_memory(path))).then(|| {
+        let again = (is_of_several && (is_whole || options.tables.has(path))).then(|| {
             let (path, layout, options) = (path.to_owned(), layout.clone(), options.clone());
             let again = move || Ok(Self::open(&path, layout.clone(), options.clone())?.rows);
             Box::new(again) as Again
         });
-        if let Some(file) = typed::opened(path) {
+        if let Some(file) = typed::opened(path, &options.tables) {
             let reader = Self::from_typed(path, file?, layout, options)?;
             return Ok(reader.reading_again(again));
         }

@@ -10,7 +10,7 @@ use athermal_core::registry::{Registered, Sort, all, find};
 use crate::cells::{Cells, Numbers};
 use crate::columns::{self, Columns};
 use crate::ledger::Ledger;
-use crate::lent;
+use crate::lent::Tables;
 use crate::{FileError, Layout, Place, TimeForm};
 
 /// A kind of file that is no text, made known with [`register_file_kind!`](crate::register_file_kind).
@@ -146,9 +146,12 @@ fn kind_of(path: &Path) -> Option<&'static Registered<FileKind>> {
 }
 
 /// Opens what stands at a path, or goes by it in memory, where it is no text.
-pub(crate) fn opened(path: &Path) -> Option<Result<Box<dyn TypedFile>, FileError>> {
+pub(crate) fn opened(
+    path: &Path,
+    tables: &Tables,
+) -> Option<Result<Box<dyn TypedFile>, FileError>> {
     let unreadable = |reason| failed(path.display().to_string().into(), 0, reason);
-    if let Some(table) = lent::open(path) {
+    if let Some(table) = tables.open(path) {
         return Some(table.map_err(unreadable));
     }
     let kind = kind_of(path)?;

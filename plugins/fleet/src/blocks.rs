@@ -4,52 +4,12 @@ use std::path::PathBuf;
 
 use athermal_analysis::diagnosis::watch::{ChannelFaults, FaultWatch, Purpose};
 use athermal_blocks::KeptBlocks;
-use athermal_core::failure::Failure;
 use athermal_files::{Dataset, Options};
 use athermal_run::fit::{Block, FitError, FitOptions, blocks_of, check_blocks, fit_from_blocks};
 use athermal_run::model::Model;
-use clap::{Args, ValueEnum};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::machine::{MachineError, MachineFit};
-use crate::rows::RowsId;
-
-/// How rows are cut into blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Cut {
-    /// At the ends of UTC days
-    Day,
-}
-
-/// A fit on sums in place of rows.
-#[derive(Debug, Clone, Default, Args, Serialize, Deserialize, JsonSchema)]
-pub struct BlockOptions {
-    /// Fit on the sums of days in place of rows: folds end with UTC days, and windows at the beginning of a day know the day before.
-    /// For estimators that are fitted by least squares
-    #[arg(long, value_name = "CUT")]
-    pub blocks: Option<Cut>,
-    /// Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of the data only
-    /// what is new or changed
-    #[arg(long, value_name = "FOLDER", requires = "blocks", conflicts_with_all = ["from", "to"])]
-    pub keep_blocks: Option<PathBuf>,
-}
-
-impl BlockOptions {
-    /// Refuses what does not go together; a command line has refused it before.
-    ///
-    /// # Errors
-    /// When blocks are kept without there being any, or of a stretch of time.
-    pub fn check(&self, is_a_stretch: bool) -> Result<(), Failure> {
-        let words = match self.keep_blocks {
-            Some(_) if self.blocks.is_none() => "--keep-blocks needs `--blocks`",
-            Some(_) if is_a_stretch => "--keep-blocks goes with neither --from nor --to",
-            _ => return Ok(()),
-        };
-        Err(Failure::Request(words.to_owned()))
-    }
-}
+use athermal_jobs::RowsId;
 
 /// A machine that was fitted on blocks, or the rows where they are those that are known.
 pub(crate) enum Outcome {

@@ -3,73 +3,13 @@
 use std::path::PathBuf;
 
 use athermal_core::quantity::Quantity;
-use athermal_files::{Bound, Stretch};
+use athermal_jobs::RowsId;
+use athermal_jobs::blocks::BlockOptions;
+use athermal_jobs::data::Reading;
 use athermal_run::model::Model;
-use clap::Args;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::blocks::BlockOptions;
 use crate::figure::Figure;
-use crate::rows::RowsId;
-
-/// How the files of a machine are read.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Args, Serialize, Deserialize)]
-pub struct Reading {
-    /// Take cells and rows that cannot be read as missing
-    #[arg(long)]
-    pub lenient: bool,
-    /// Take each file as a segment of its own, also where its times go on
-    #[arg(long)]
-    pub segments: bool,
-    /// Merge files of different columns by time although their times are no dates
-    #[arg(long, conflicts_with = "segments")]
-    pub merge: bool,
-    /// Which rows of them are taken.
-    #[command(flatten)]
-    #[serde(flatten)]
-    pub times: Times,
-}
-
-/// Which rows of data are taken, by their times.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Args, Serialize, Deserialize, JsonSchema)]
-pub struct Times {
-    /// Read rows from this time on alone: an instant (`2026-03-01T06:00:00Z`), a date, or what stands in the log's column of time, such as
-    /// seconds. Without an offset from UTC it goes by the `zone` of `[time]`
-    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub from: Option<String>,
-    /// Read rows before this time alone
-    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub to: Option<String>,
-}
-
-impl Times {
-    /// The same for the reader.
-    #[must_use]
-    pub fn stretch(&self) -> Stretch {
-        let bound = |text: &Option<String>| text.clone().map(Bound::Text);
-        Stretch {
-            from: bound(&self.from),
-            to: bound(&self.to),
-        }
-    }
-}
-
-impl Reading {
-    /// The same for the reader.
-    #[must_use]
-    pub fn options(&self) -> athermal_files::Options {
-        athermal_files::Options {
-            lenient: self.lenient,
-            segments: self.segments,
-            merge: self.merge,
-            stretch: self.times.stretch(),
-            ..athermal_files::Options::default()
-        }
-    }
-}
 
 /// The first line: what all jobs of a worker have in common.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]

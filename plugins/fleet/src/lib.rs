@@ -28,12 +28,11 @@ pub mod manifest;
 mod once;
 pub mod page;
 pub mod pool;
-mod rows;
 pub mod unlike;
 mod worker;
 
+pub use athermal_jobs::RowsId;
 pub use machine::{MachineError, MachineFit, fit_machine};
 #[cfg(feature = "arrow")]
 pub use once::Once;
-pub use rows::RowsId;
 pub use worker::fitted;

@@ -6,7 +6,7 @@ use athermal_run::model::{Card, Model};
 use athermal_run::recording::Recording;
 use thiserror::Error;
 
-use crate::rows::{RowsId, Summed};
+use athermal_jobs::{RowsId, Summed};
 
 /// Why a machine has no model.
 #[derive(Debug, Error)]

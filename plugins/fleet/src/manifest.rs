@@ -10,10 +10,11 @@ use athermal_run::live::store::write_whole;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::blocks::Cut;
 use crate::figure::Figure;
-use crate::job::{Doubt, Reading, Unfitted};
-use crate::rows::RowsId;
+use crate::job::{Doubt, Unfitted};
+use athermal_jobs::RowsId;
+use athermal_jobs::blocks::Cut;
+use athermal_jobs::data::Reading;
 
 /// The file in a folder of models.
 const NAME: &str = "_fleet.json";

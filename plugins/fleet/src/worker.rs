@@ -16,7 +16,7 @@ use crate::blocks::{self, OnBlocks};
 use crate::figure::Figure;
 use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
 use crate::machine::{MachineError, MachineFit, fit_machine};
-use crate::rows::{RowsId, Summed};
+use athermal_jobs::{RowsId, Summed};
 
 /// Works until the input ends.
 ///
@@ -77,14 +77,14 @@ fn load_graph(setup: &Setup) -> Result<Model, String> {
 }
 
 fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String> {
-    let dataset = Dataset::new(job.files.clone(), setup.reading.options());
+    let dataset = Dataset::new(job.files.clone(), setup.reading.options(&job.files));
     match (&job.task, graph) {
         (Task::Fit { created, known }, Some(graph)) if setup.blocks.blocks.is_some() => {
             let kept = setup.blocks.keep_blocks.as_ref();
             let on_blocks = OnBlocks {
                 graph,
                 files: &job.files,
-                reading: &setup.reading.options(),
+                reading: &setup.reading.options(&job.files),
                 kept: kept.map(|folder| folder.join(&job.machine)),
             };
             let fit = on_blocks.fit(known.as_ref(), &options(setup.memory), created.clone());

@@ -533,7 +533,7 @@ mod tests {
 
     #[derive(serde::Deserialize)]
     struct Line {
-        messages: Vec<crate::message::Messages>,
+        messages: Vec<athermal_messages::message::Messages>,
     }
 
     proptest::proptest! {

@@ -4,31 +4,22 @@
 //! |---|---|
 //! | `broker` | where a broker is, and how one logs in |
 //! | `client` | one connection, of either version; no other module knows the crate that speaks the protocol |
-//! | `message`, `topic` | which topics give which channels |
-//! | `payload` | what a message says, whatever it is |
 //! | `subscriptions` | what is asked of a broker, until it has answered |
-//! | `acknowledgements` | which messages the broker may forget: those that the journal has |
-//! | `gap` | what others dropped |
 //! | `source`, `session` | all of it at work |
 //! | `sink`, `publisher`, `outgoing` | outputs as messages, stored and sent again |
 //!
-//! How ticks are made of samples, and when rows leave, is decided in `athermal-serve`. The runtime of tokio is a matter of this crate:
+//! What a message says, and what is missing of a topic, is decided in `athermal-messages`. How ticks are made of samples, and when rows leave, is decided in `athermal-serve`. The runtime of tokio is a matter of this crate:
 //! one thread for each source and sink, which waits for nobody else.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod acknowledgements;
 mod broker;
 #[cfg(feature = "cli")]
 mod browse;
 mod client;
-mod gap;
-mod left_out;
 mod listen;
 mod look;
-mod message;
 mod outgoing;
-mod payload;
 mod publisher;
 mod session;
 mod sink;
@@ -36,4 +27,3 @@ mod source;
 mod subscriptions;
 #[cfg(feature = "tls")]
 mod tls;
-mod topic;

@@ -7,9 +7,9 @@ use athermal_serve::connector::{Seen, WiredChannel};
 
 use crate::client::Settings;
 use crate::listen::{Heard, listen};
-use crate::payload::Values;
 use crate::session::{arrival, shown};
 use crate::source::Route;
+use athermal_messages::payload::Values;
 
 /// What came of each channel.
 ///

@@ -13,11 +13,11 @@ use athermal_serve::connector::{Outflow, Stop};
 use tokio::sync::Notify;
 use tokio::time::{sleep, timeout};
 
-use crate::acknowledgements::Acknowledgements;
 use crate::client::{Connection, Ended, Event, Message, Sender};
-use crate::gap::Gap;
-use crate::payload::{Reading, Reason};
 use crate::source::{Ack, MqttInlet, Retained};
+use athermal_messages::acknowledgements::Acknowledgements;
+use athermal_messages::gap::Gap;
+use athermal_messages::payload::{Reading, Reason};
 
 /// How often is looked whether the engine has room where it had none.
 const LOOK: Wait = Wait::from_millis(2);

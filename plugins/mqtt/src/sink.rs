@@ -15,7 +15,7 @@ use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive}
 use crate::client::{Connection, Settings};
 use crate::outgoing::{Form, Outgoing};
 use crate::publisher::{Manner, Publisher};
-use crate::topic;
+use athermal_messages::topic;
 
 /// Outputs as messages of an MQTT broker: one for each output, or one for each tick.
 ///

@@ -17,14 +17,14 @@ use tokio::runtime::Builder;
 
 use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive};
 use crate::client::{Ended, Settings};
-use crate::gap::GapWatch;
-use crate::left_out::LeftOutCounts;
 use crate::look::look;
-use crate::message::{Messages, TimeForm};
-use crate::payload::{Form, Time, Values};
 use crate::session::Session;
 use crate::subscriptions::Subscriptions;
-use crate::topic::Topic;
+use athermal_messages::gap::GapWatch;
+use athermal_messages::left_out::LeftOutCounts;
+use athermal_messages::message::{Messages, TimeForm};
+use athermal_messages::payload::{Form, Time, Values};
+use athermal_messages::topic::Topic;
 
 /// Messages of an MQTT broker. Each is acknowledged once its values are in the journal, so that none is lost that a publisher with QoS 1
 /// has sent, whatever ends in between.

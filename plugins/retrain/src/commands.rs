@@ -98,7 +98,7 @@ impl Command for Retrain {
         };
         let now = jiff::Timestamp::now();
         let created = now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string();
-        let proposed = propose(&running, &journal, &terms, Some(created));
+        let proposed = propose(&running, &journal, &terms, Some(created), terminal);
         let proposal = match proposed {
             Ok(proposal) => proposal,
             Err(NotProposed::Unreadable(error)) => return Err(Failure::Outside(error.to_string())),

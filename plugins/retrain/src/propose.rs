@@ -7,7 +7,9 @@ use std::sync::Arc;
 use athermal_core::compile::Plan;
 use athermal_core::engine::{Engine, EngineError, Fitted};
 use athermal_core::time::{Duration, Instant};
-use athermal_run::fit::{FitError, FitOptions, fit};
+use athermal_core::watch::Watch;
+use athermal_jobs::fit::FitOutcome;
+use athermal_run::fit::{FitError, FitOptions};
 use athermal_run::model::{Card, DataCard, Model};
 use athermal_run::recording::{Event, Recording, SourceError, Table, pass};
 use athermal_run::score::{PairedPrediction, link};
@@ -64,7 +66,7 @@ pub enum NotProposed {
     },
 }
 
-/// Fits the graph of what runs anew on the end of a recording.
+/// Fits the graph of what runs anew on the end of a recording, and reports what may be wrong with it as every fit does.
 ///
 /// # Errors
 /// When that is not worth proposing, and why.
@@ -73,6 +75,7 @@ pub fn propose(
     recording: &dyn Recording,
     terms: &Terms,
     created: Option<String>,
+    host: &dyn Watch,
 ) -> Result<Proposal, NotProposed> {
     let plan = &running.plan;
     let data = Table::read(recording, plan).map_err(NotProposed::Unreadable)?;
@@ -97,23 +100,24 @@ pub fn propose(
         ..FitOptions::default()
     };
     let fitted_on =
-        |data: &Table| fit(plan, data, &options, &mut |_| {}).map_err(NotProposed::Unfit);
-    let (judged, _) = fitted_on(&between(&data, oldest, cut))?;
-    let new = errors(plan, &judged, &data, cut)?;
+        |data: &Table| FitOutcome::of(plan, data, &options, host).map_err(NotProposed::Unfit);
+    let judged = fitted_on(&between(&data, oldest, cut))?;
+    let new = errors(plan, &judged.fitted, &data, cut)?;
     let old = errors(plan, &running.fitted, &data, cut)?;
     let ratio = ratio(&old, &new).ok_or(NotProposed::NothingToCompare)?;
     if ratio.is_nan() || ratio > 1.0 + terms.margin {
         return Err(NotProposed::Worse { ratio });
     }
-    let (all, report) = fitted_on(&data)?;
+    let all = fitted_on(&data)?;
+    all.warn(plan, host);
     let mut model = running.clone();
-    model.fitted = all;
+    model.fitted = all.fitted;
     let of = DataCard {
         path: "journal".to_owned(),
         rows,
         ..DataCard::default()
     };
-    model.card = Some(Card::of(&report, vec![of], created));
+    model.card = Some(Card::of(&all.report, vec![of], created));
     Ok(Proposal { model, ratio })
 }
 

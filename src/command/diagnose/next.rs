@@ -6,9 +6,9 @@ use athermal::diagnosis::text::is_of;
 use athermal::diagnosis::{Main, is_called};
 
 use super::Diagnose;
-use super::tables::Tables;
-use crate::invocation::{command, program, quoted};
+use crate::invocation::{command, program, quoted, words_with};
 use athermal_analysis::figures::paragraph;
+use athermal_jobs::diagnose::tables::Tables;
 
 impl Diagnose {
     /// What to try next, each with its reason; none where nothing follows. `drifts`: whether any truth is a slope.
@@ -23,7 +23,7 @@ impl Diagnose {
     }
 
     fn diagnose(&self, more: &[&str]) -> String {
-        let mut words = self.data.words_with("diagnose", &self.model);
+        let mut words = words_with(&self.job.data, "diagnose", &self.model);
         words.extend(more.iter().map(|&word| word.to_owned()));
         command(&words)
     }
@@ -34,9 +34,9 @@ impl Diagnose {
         let seen = model
             .card
             .as_ref()
-            .and_then(|card| self.data.of_fit(&card.data));
-        let data = seen.as_ref().unwrap_or(&self.data);
-        let mut words = data.words_with("fit", &self.model);
+            .and_then(|card| self.job.data.of_fit(&card.data));
+        let data = seen.as_ref().unwrap_or(&self.job.data);
+        let mut words = words_with(data, "fit", &self.model);
         words.extend(more.iter().map(|&word| word.to_owned()));
         command(&words)
     }
@@ -49,7 +49,7 @@ impl Diagnose {
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
         let own = users.iter().find(|user| is_of(&main.prediction, user));
         let (what, look) = if let Some(own) = own.filter(|own| !has_coefficients(model, own)) {
-            if self.of.iter().any(|asked| is_called(own, asked)) {
+            if self.job.of.iter().any(|asked| is_called(own, asked)) {
                 return None;
             }
             let look = self.diagnose(&["--of", &quoted(own), "--no-fit"]);
@@ -90,12 +90,12 @@ impl Diagnose {
 
     /// Where what is left is white, a truth over another window may be predicted better.
     fn wider_windows(&self, tables: &Tables) -> Option<String> {
-        let of = self.of.iter().map(|name| quoted(name));
+        let of = self.job.of.iter().map(|name| quoted(name));
         let of = of.flat_map(|name| ["--of".to_owned(), name]);
         let more: Vec<String> = of.chain(["--window --no-fit".to_owned()]).collect();
         let more: Vec<&str> = more.iter().map(String::as_str).collect();
         let look = self.diagnose(&more);
-        let wanted = !self.window && tables.all_white();
+        let wanted = !self.job.window && tables.all_white();
         wanted
             .then(|| format!("What is left is white; signal to noise over other windows:\n{look}"))
     }

@@ -23,12 +23,13 @@ use clap::Args;
 use serde_json::json;
 
 use crate::command::aside::check_apart;
-use crate::command::faults::{self, ChannelWatch, Purpose};
-use crate::command::model::{self, check_fitted, warn_unfitted, warn_without_novelty};
-use crate::command::{beyond, data, refused, thinned, unread};
+use crate::command::unread;
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use athermal_analysis::figures::{counted, instant, seconds};
+use athermal_jobs::faults::{self, ChannelWatch, Purpose};
+use athermal_jobs::model::{self, check_fitted, warn_unfitted, warn_without_novelty};
+use athermal_jobs::{beyond, path, refused, remarks, thinned};
 use reports::Reports;
 
 /// Run a model: rows in, predictions out
@@ -42,13 +43,13 @@ use reports::Reports;
 )]
 pub struct Run {
     /// The model, or a graph that names one or in which nothing needs fitting
-    #[arg(value_parser = crate::meant::graph_or_model())]
+    #[arg(value_parser = athermal_jobs::path::graph_or_model())]
     model: PathBuf,
     /// CSV or JSON lines; `-` is standard input
-    #[arg(long, short, value_name = "FILE", value_parser = crate::meant::recording())]
+    #[arg(long, short, value_name = "FILE", value_parser = athermal_jobs::path::recording())]
     input: PathBuf,
     /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV, or JSON lines with `--format json`
-    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = crate::meant::written())]
+    #[arg(long, short, value_name = "FILE", default_value = "-", value_parser = athermal_jobs::path::written())]
     output: PathBuf,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
@@ -97,7 +98,7 @@ impl Run {
             let replacement = options.replacement.as_ref();
             swap::not_read(failure, replacement.and_then(|of| of.watched.as_ref()))
         })?;
-        let thinned = thinned::of(&self.model, &model.graph)?;
+        let thinned = thinned::of(Some(&self.model), &model)?;
         let time = TimeColumn::from(&read.time);
         let mut columns = options.columns(&model);
         let is_replaceable = options.replacement.is_some();
@@ -151,7 +152,7 @@ impl Run {
             false => self.input.display().to_string(),
         };
         let files = [(input, reader.report().clone())];
-        data::warn(&terminal, &plan, &files, refused, &rejected);
+        remarks::warn(&terminal, &plan, &files, refused, &rejected);
         if ends {
             beyond::warn(&terminal, &beyond::beyond(&usual, &ranges));
         }
@@ -174,7 +175,7 @@ impl Run {
 
     /// Refuses an output or a state that is another file of the run.
     fn check_files(&self) -> Result<(), Failure> {
-        data::check_ending(&self.output)?;
+        path::check_ending(&self.output)?;
         let read = [&*self.model, &*self.input];
         let swapped = self.swap.paths();
         check_apart("--output", &self.output, read.into_iter().chain(swapped))?;

@@ -13,12 +13,12 @@ use athermal::serve::service::{Ended, Service, ServiceError, ServiceOptions, usu
 use clap::Args;
 use serde_json::json;
 
-use super::model::check_fitted;
 use super::run::stop;
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Terminal};
 use athermal_analysis::figures::counted;
 use athermal_command::findings;
+use athermal_jobs::model::check_fitted;
 
 /// Run a machine file as a service: sources in, corrections out, nothing lost
 ///
@@ -98,8 +98,8 @@ impl Serve {
         };
         terminal.doubts(&doubts, &sources);
         check_fitted(&model, &self.machine)?;
-        super::model::warn_unfitted(terminal, &model, &self.machine);
-        super::model::warn_without_novelty(terminal, &model, &self.machine);
+        athermal_jobs::model::warn_unfitted(terminal, &model, &self.machine);
+        athermal_jobs::model::warn_without_novelty(terminal, &model, &self.machine);
         Ok((model, deployment))
     }
 }

@@ -14,9 +14,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde::Serialize;
 use serde_json::json;
 
-use super::model::{self, load_fitted};
 use crate::terminal::{Answer, Failure, Terminal, print};
 use athermal_analysis::drawing::{Diagram, diagram, dot, mermaid, plan, svg};
+use athermal_jobs::model::{self, load_fitted};
 
 /// Show a graph: its plan, or a picture of it; show a model by its coefficients
 ///
@@ -37,7 +37,7 @@ use athermal_analysis::drawing::{Diagram, diagram, dot, mermaid, plan, svg};
   athermal show model.json --expand --format dot | dot -Tpdf -o graph.pdf")]
 pub struct Show {
     /// The graph, or a model
-    #[arg(value_parser = crate::meant::graph_or_model())]
+    #[arg(value_parser = athermal_jobs::path::graph_or_model())]
     graph: PathBuf,
     /// What to print
     #[arg(id = "format", long, value_name = "FORMAT", value_parser = formats(), default_value = "plan")]

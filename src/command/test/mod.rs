@@ -11,9 +11,9 @@ use std::time::Instant;
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};
-use super::threads::Threads;
 use crate::output::offer;
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use athermal_jobs::Threads;
 use report::Summary;
 use suite::Suite;
 use work::Status;
@@ -30,7 +30,7 @@ use work::Status;
                         athermal test machine.toml --filter \"dead sensor\" --format json")]
 pub struct Test {
     /// Graph files
-    #[arg(required = true, value_name = "GRAPH", value_parser = crate::meant::graph_or_model())]
+    #[arg(required = true, value_name = "GRAPH", value_parser = athermal_jobs::path::graph_or_model())]
     graphs: Vec<PathBuf>,
     /// Only tests whose name contains this text, in upper or lower case
     #[arg(long, value_name = "TEXT")]

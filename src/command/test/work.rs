@@ -14,8 +14,8 @@ use athermal::run::recording::Recording;
 use athermal::trial::{self, DataSet, Finding, On};
 
 use super::suite::Suite;
-use crate::command::data::of_files;
 use crate::terminal::Failure;
+use athermal_jobs::remarks::of_files;
 
 /// What came of a test.
 pub(super) struct Ran {

@@ -8,6 +8,8 @@ use std::path::Path;
 use athermal::core::prng::Prng;
 use athermal::core::time::{TimeFormat, Zone};
 use athermal::files::{Dataset, Options};
+use athermal::jobs::asked::{Asked, done};
+use athermal::jobs::init::Init;
 use athermal::run::recording::{Event, Recording, Samples};
 use athermal::{Instant, Model};
 
@@ -177,9 +179,11 @@ fn is_read(seed: u64, scratch: &Scratch) -> Result<(), Miss> {
     let (text, form) = written(random, &truth);
     let log = scratch.file("log.csv", &text);
     let head = text.lines().take(6).collect::<Vec<_>>().join("\n");
-    let asked = serde_json::json!({ "data": log });
-    let asked = asked.as_object().cloned().unwrap_or_default();
-    let starter = athermal::calls::init(&asked, &Kept::default());
+    let mut asked = Asked::default();
+    asked
+        .options
+        .insert("data".to_owned(), serde_json::json!(log));
+    let starter = done(&asked, &Kept::default(), |job: &Init, _| job.find());
     let starter = starter.map_err(|why| Miss::Refused(format!("{form}: {why:?}\n{head}")))?;
     let found = read(&starter.text, &log);
     let is_minutes = !form.contains("%S");

@@ -22,6 +22,18 @@ pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 
 /// Makes a kind known as an estimator that is what it has [`Asked`] for: its type, its name and its inputs beside `freeze`.
 macro_rules! identified {
+    ($kind:ty, $name:literal, [$($key:ident),+], [$($input:expr),+ $(,)?]) => {
+        impl $kind {
+            fn asked(&self) -> crate::identified::Asked {
+                crate::identified::Asked {
+                    $($key: self.$key.clone().into(),)+
+                    ..Default::default()
+                }
+            }
+        }
+
+        identified!($kind, $name, [$($input),+]);
+    };
     ($kind:ty, $name:literal, [$($input:expr),+ $(,)?]) => {
         impl athermal_core::node::Estimator for $kind {
             fn inputs() -> &'static [athermal_core::node::InputPort] {
@@ -87,6 +99,12 @@ pub(crate) enum Differences {
     Given(usize),
     /// Once or not at all, whichever is worth more.
     Chosen,
+}
+
+impl From<Option<usize>> for Differences {
+    fn from(given: Option<usize>) -> Self {
+        given.map_or(Self::Chosen, Self::Given)
+    }
 }
 
 impl Differences {

@@ -18,7 +18,7 @@ use crate::typed::{self, TypedCells};
 
 use super::header::is_value;
 use super::{Format, LongFormat, begins_json_array, units};
-use crate::{FileError, TypedFile};
+use crate::{FileError, Tables, TypedFile};
 
 /// The columns of a file and the texts of its first rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,10 +41,10 @@ impl Description {
     /// # Errors
     /// The file cannot be opened or read, is empty or not text, or has a column twice.
     pub fn of(path: impl AsRef<Path>, rows: usize) -> Result<Self, FileError> {
-        Self::laid_out(path, rows, &TableFormat::default())
+        Self::laid_out(path, rows, &TableFormat::default(), &Tables::default())
     }
 
-    /// The same of a table whose layout is declared in part.
+    /// The same of a table whose layout is declared in part, or that is in memory.
     ///
     /// # Errors
     /// As for [`Description::of`], and where the file is not as declared.
@@ -52,9 +52,10 @@ impl Description {
         path: impl AsRef<Path>,
         rows: usize,
         table: &TableFormat,
+        tables: &Tables,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
-        if let Some(file) = typed::opened(path) {
+        if let Some(file) = typed::opened(path, tables) {
             return of_typed(path, file?, rows);
         }
         let lines = Lines::open(path, table.encoding)?;

@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use athermal_core::document::TableFormat;
 use athermal_core::time::TimeColumns;
 
 use super::{Description, NumberForm};
 use crate::recording::is_dated;
-use crate::{TimeColumn, TimeForm, with_decimal_point};
+use crate::{Tables, TimeColumn, TimeForm, with_decimal_point};
 
 /// So many rows are looked at.
 const ROWS: usize = 50;
@@ -15,8 +16,8 @@ const ROWS: usize = 50;
 /// The one column of dates that rise, in the declared form, in that of RFC 3339, or in numbers of the unit that its name says. None of
 /// a file that has the declared time, or several such columns.
 #[must_use]
-pub fn other_time(path: &Path, declared: &TimeColumn) -> Option<TimeColumn> {
-    let described = Description::of(path, ROWS).ok()?;
+pub fn other_time(path: &Path, declared: &TimeColumn, tables: &Tables) -> Option<TimeColumn> {
+    let described = Description::laid_out(path, ROWS, &TableFormat::default(), tables).ok()?;
     let cells = |at: usize| {
         let cells = described.rows.iter().filter_map(move |row| row.get(at));
         let cells = cells.map(|cell| with_decimal_point(cell.trim()));
@@ -108,7 +109,8 @@ mod tests {
             ("", None),
         ] {
             std::fs::write(&path, text).unwrap();
-            let found = other_time(&path, &declared).map(|of| of.columns.to_string());
+            let found =
+                other_time(&path, &declared, &Tables::default()).map(|of| of.columns.to_string());
             assert_eq!(found.as_deref(), column, "{text}");
         }
         std::fs::remove_file(&path).unwrap();

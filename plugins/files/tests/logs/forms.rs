@@ -253,7 +253,7 @@ proptest! {
             write(&path, &text, changed);
             let described = Description::of(&path, 20).into_iter();
             let described: Vec<_> = described.map(|of| (name.to_string(), of.columns)).collect();
-            let _ = (apart(&described, &[]), other_time(&path, &form.layout.time));
+            let _ = (apart(&described, &[]), other_time(&path, &form.layout.time, &athermal_files::Tables::default()));
             paths.push(path);
         }
         let options = Options { lenient: true, ..Options::default() };

@@ -18,12 +18,12 @@ use serde_json::json;
 use super::pooled::Pooled;
 use super::table::{self, remark};
 use super::{Files, PoolFailure, Workers, few, largest_first, model_of, warn_died, warn_failed};
-use crate::blocks::BlockOptions;
 use crate::figure::{Figure, standings};
 use crate::found::Machines;
 use crate::job::{Job, Reply, Setup, Task, graph_hash};
 use crate::manifest::{Entry, Maker, Manifest, Outcome, Stamp, Writing};
 use crate::pool::{Event, run};
+use athermal_jobs::blocks::BlockOptions;
 
 /// Fit a graph on each machine of a fleet
 ///

@@ -16,9 +16,9 @@ use athermal_run::model::Model;
 use clap::{Args, Subcommand};
 
 use crate::found::{Machines, machines_of};
-use crate::job::Reading;
 use crate::pool::Event;
 use crate::worker::{words, work};
+use athermal_jobs::data::Reading;
 
 /// Fit, score and compare the machines of a fleet
 ///

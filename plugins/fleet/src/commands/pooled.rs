@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::{few, warn_failed};
 use crate::found::Machines;
-use crate::job::Reading;
+use athermal_jobs::data::Reading;
 
 /// What is pooled, and from where to where.
 pub(super) struct Pooled<'a> {
@@ -64,7 +64,7 @@ impl Pooled<'_> {
                     self.graph.display()
                 )));
             };
-            let dataset = Dataset::new(files.clone(), self.reading.options());
+            let dataset = Dataset::new(files.clone(), self.reading.options(files));
             match fit(&watch.plan, &dataset, &options, &mut |_| {}) {
                 Ok(_) => pooling.add(machine, watch),
                 Err(error) => _ = failed.insert(machine.clone(), error.to_string()),

@@ -4,6 +4,7 @@ use athermal_core::compile::Plan;
 use athermal_core::engine::SampleRange;
 use athermal_core::prng::Prng;
 use athermal_core::time::{Duration, Instant};
+use athermal_core::watch::Kept;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_run::fit::{FitOptions, fit};
@@ -133,7 +134,13 @@ fn of_a_machine_that_ages_a_better_fit_is_proposed_within_a_day_and_the_shadow_t
         let data = machine(seed, 9);
         // Fitted on its first day, and run for a week.
         let old = fitted(&graph, &part(&data, 0, DAY));
-        let proposed = propose(&old, &part(&data, 0, 8 * DAY), &terms(1), None);
+        let proposed = propose(
+            &old,
+            &part(&data, 0, 8 * DAY),
+            &terms(1),
+            None,
+            &Kept::default(),
+        );
         let proposal = proposed.unwrap_or_else(|reason| panic!("seed {seed}: {reason}"));
         println!("seed {seed}: {:.3} times the error", proposal.ratio);
         assert!(proposal.ratio < 0.95, "seed {seed}: {}", proposal.ratio);
@@ -161,7 +168,7 @@ fn a_fit_that_is_worse_on_what_it_has_not_seen_is_not_proposed() {
             z += 60.0 * (prng.uniform() - 0.5);
             row[2] = z;
         }
-        let refused = propose(&running, &wrong, &terms(14), None);
+        let refused = propose(&running, &wrong, &terms(14), None, &Kept::default());
         assert!(
             matches!(refused, Err(NotProposed::Worse { ratio }) if ratio > 1.0),
             "seed {seed}"
@@ -187,7 +194,7 @@ fn a_broken_sensor_in_the_data_is_refused_with_the_reason() {
         for (nth, (_, row)) in data.events_mut().iter_mut().enumerate() {
             change(nth, row);
         }
-        match propose(&running, &data, &terms(14), None) {
+        match propose(&running, &data, &terms(14), None, &Kept::default()) {
             Err(NotProposed::Broken(all)) => all,
             other => panic!("{other:?}"),
         }
@@ -227,6 +234,7 @@ fn a_broken_sensor_in_the_data_is_refused_with_the_reason() {
         &part(&data, DAY, DAY + 400),
         &terms(14),
         None,
+        &Kept::default(),
     );
     assert!(matches!(few, Err(NotProposed::FewRows { .. })), "{few:?}");
 }
