@@ -1,7 +1,7 @@
-//! The page on the architecture names files that are there, and what it says of the core is so: no kind is named in it, and it knows no
-//! plugin.
+//! The page on the architecture names files that are there, and what it says is so: no kind is named in the core, no crate uses one that
+//! stands behind it, and no job knows a terminal.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -78,22 +78,71 @@ fn no_text_in_the_core_names_a_kind_of_node_source_sink_or_machine() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// The folders, in the order of who may know whom: each knows itself and those before it.
+const FOLDERS: [&str; 6] = [
+    "core",
+    "plugins/nodes",
+    "plugins/io",
+    "plugins/work",
+    "plugins/beside",
+    "plugins/apps",
+];
+
 #[test]
-fn no_crate_of_the_core_uses_a_plugin() {
+fn a_crate_uses_only_crates_of_its_folder_and_of_those_before_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = |of: &str| fs::read_dir(root.join(of)).unwrap();
-    let plugins: Vec<String> = folders("plugins")
-        .map(|of| format!("athermal-{}", of.unwrap().file_name().to_str().unwrap()))
-        .collect();
-    assert!(plugins.len() > 10, "{plugins:?}");
-    for folder in folders("core") {
-        let manifest = folder.unwrap().path().join("Cargo.toml");
-        let text = fs::read_to_string(&manifest).unwrap();
-        let manifest_of: toml::Table = toml::from_str(&text).unwrap();
-        let used = manifest_of["dependencies"].as_table().unwrap().keys();
-        let up: Vec<_> = used.filter(|of| plugins.contains(of)).collect();
-        assert!(up.is_empty(), "{} uses {up:?}", manifest.display());
+    let crates = FOLDERS.iter().enumerate().flat_map(|(rank, folder)| {
+        let all = fs::read_dir(root.join(folder)).unwrap();
+        all.map(move |of| (rank, of.unwrap().path().join("Cargo.toml")))
+    });
+    let read = |(rank, path): (usize, PathBuf)| {
+        let manifest: toml::Table = toml::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        let name = manifest["package"]["name"].as_str().unwrap().to_owned();
+        let uses = manifest.get("dependencies").and_then(toml::Value::as_table);
+        let uses: Vec<String> = uses
+            .into_iter()
+            .flatten()
+            .map(|(key, _)| key.clone())
+            .collect();
+        (name, (rank, uses))
+    };
+    let crates: BTreeMap<String, (usize, Vec<String>)> = crates.map(read).collect();
+    assert!(crates.len() > 25, "{crates:?}");
+    for (name, (rank, uses)) in &crates {
+        let is_up = |of: &&String| crates.get(*of).is_some_and(|(other, _)| other > rank);
+        let up: Vec<_> = uses.iter().filter(is_up).collect();
+        assert!(up.is_empty(), "{name} uses {up:?}");
     }
+}
+
+#[test]
+fn no_job_knows_a_terminal_or_keeps_anything_outside_of_its_options() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let words = [
+        "erminal",
+        "thread_local",
+        "static ",
+        "println!",
+        "print!",
+        "env::args",
+    ];
+    let mut found = Vec::new();
+    for path in files(&root.join("plugins/work")) {
+        let text = fs::read_to_string(&path).unwrap_or_default();
+        let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+        let lines = code
+            .lines()
+            .filter(|line| !line.trim_start().starts_with("//"));
+        let known = lines.filter(|line| {
+            words.iter().any(|word| {
+                line.replace("'static ", "")
+                    .replace("static FORMATS: LazyLock<", "")
+                    .contains(word)
+            })
+        });
+        found.extend(known.map(|line| format!("{}: {line}", path.display())));
+    }
+    assert!(found.is_empty(), "{found:#?}");
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod fit_json;
 mod fleet;
 mod forms_of_logs;
 mod graph_file_page;
+mod hosts;
 mod idle;
 mod init_refuses;
 mod init_warnings;

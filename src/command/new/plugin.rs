@@ -65,7 +65,7 @@ impl Plugin {
             ("VERSION", VERSION.to_owned()),
             ("CORE", of("core/framework")),
             ("SERVE", of("core/serve")),
-            ("INTERFACE", of("plugins/http")),
+            ("INTERFACE", of("plugins/beside/http")),
             ("COMMAND", of("core/command")),
             ("TRIAL", of("core/trial")),
             ("TESTKIT", of("core/testkit")),
