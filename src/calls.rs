@@ -15,7 +15,7 @@ use athermal_core::watch::Watch;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::command::asked::{IN_MEMORY, done};
+use crate::command::asked::{IN_MEMORY, done, schema_of};
 use crate::command::beyond::beyond;
 use crate::command::compare::Compare;
 use crate::command::data::Data;
@@ -185,6 +185,24 @@ pub fn simulate(
     done(asked, host, |command: &Simulate, host| {
         command.rows(host, put)
     })
+}
+
+/// The options of every job as JSON Schema, by its name: for programs that show them to their users.
+#[must_use]
+pub fn options() -> Asked {
+    let all = [
+        ("fit", schema_of::<Fit>()),
+        ("predict", schema_of::<Predict>()),
+        ("evaluate", schema_of::<Evaluate>()),
+        ("diagnose", schema_of::<Diagnose>()),
+        ("report", schema_of::<Report>()),
+        ("compare", schema_of::<Compare>()),
+        ("init", schema_of::<Init>()),
+        ("simulate", schema_of::<Simulate>()),
+    ];
+    all.map(|(job, schema)| (job.to_owned(), schema))
+        .into_iter()
+        .collect()
 }
 
 /// `athermal show --format svg`: a picture of a graph.

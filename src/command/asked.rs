@@ -25,7 +25,8 @@ pub fn in_memory() -> PathBuf {
     PathBuf::from(IN_MEMORY)
 }
 
-fn schema_of<T: JsonSchema>() -> Value {
+/// The options of a job as JSON Schema.
+pub fn schema_of<T: JsonSchema>() -> Value {
     schemars::schema_for!(T).into()
 }
 
