@@ -57,6 +57,16 @@ class RequestError(Error, ValueError):
     """Data or arguments are not what the model or the function takes."""
 
 
+class NoColumnError(RequestError, KeyError):
+    """A frame has no such column."""
+
+    __str__ = Exception.__str__
+
+
+class NoRowError(RequestError, IndexError):
+    """A frame has no such row."""
+
+
 class FitError(Error, ValueError):
     """Nothing could be fitted; `reasons` has why, of each node."""
 

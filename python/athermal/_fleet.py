@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from athermal import Graph, RequestError, _athermal
+from athermal import Graph, RequestError, _athermal, _nodes
 
 RESULT = ["model", "error", "rows", "rows_hash", "scores", "unfitted", "constant", "doubts"]
 """The columns of an answer, behind that of the machine."""
@@ -21,6 +21,7 @@ class Job(NamedTuple):
     graph: str
     created: str
     memory: int
+    nodes: _nodes.Carried | None = None
 
     def fit(self, machine: Any, rows: Any) -> dict[str, Any]:
         """Fits one machine on its rows, a stream of Arrow in the order of time. Why it cannot be fitted stands in the answer."""
@@ -28,7 +29,7 @@ class Job(NamedTuple):
         if machine is None:
             return row | {"error": "these rows are of no machine: its name is null"}
         try:
-            fit = _athermal.fit_machine(_compiled(self.graph)._graph, str(machine), rows, self.created, self.memory)
+            fit = _athermal.fit_machine(_compiled(self.graph, self.nodes)._graph, str(machine), rows, self.created, self.memory)
         except RequestError as error:
             return row | {"error": str(error)}
         summed = fit.pop("rows")
@@ -37,7 +38,8 @@ class Job(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _compiled(tree: str) -> Graph:
+def _compiled(tree: str, nodes: _nodes.Carried | None) -> Graph:
+    _nodes.adopt(nodes)
     return Graph._of(_athermal.Graph.of_json("graph", tree))
 
 
@@ -45,7 +47,11 @@ def job(graph: Graph | str | os.PathLike[str], date: str | None, memory: int) ->
     """The graph, and what workers are asked. `memory` is in megabytes."""
     if not isinstance(graph, Graph):
         graph = Graph(graph)
-    return graph, Job(graph._graph.to_json(), date or _now(), memory << 20)
+    tree = graph._graph.to_json()
+    nodes = _nodes.carried(tree)
+    if nodes is None and _nodes.names_nodes(tree):
+        raise RequestError("the graph has nodes of Python, which go to workers by cloudpickle: install it")
+    return graph, Job(tree, date or _now(), memory << 20, nodes)
 
 
 def _now() -> str:

@@ -6,6 +6,7 @@ import importlib
 import inspect
 import json
 import math
+import pickle
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -118,6 +119,66 @@ def find(python: str, role: str | None = None) -> Any:
     return node
 
 
+Carried = tuple[tuple[str, ...], bytes]
+"""Nodes by value: their names, and they as cloudpickle writes them."""
+
+
+def carried(tree: str) -> Carried | None:
+    """The nodes of Python that a graph names, for a process that cannot import them; `None` where there are none, or no cloudpickle."""
+
+    def named(of: Any) -> set[str]:
+        if isinstance(of, dict):
+            own = {of["python"]} if str(of.get("type", "")).startswith("python_") and isinstance(of.get("python"), str) else set()
+            return own.union(*map(named, of.values()))
+        return set().union(*map(named, of)) if isinstance(of, list) else set()
+
+    names = tuple(sorted(named(json.loads(tree)))) if '"python_' in tree else ()
+    pickler = _cloudpickle() if names else None
+    if pickler is None:
+        return None
+    nodes = {name: find(name) for name in names}
+    # Classes of a module go by its name, which another process may not know.
+    known = pickler.list_registry_pickle_by_value()
+    modules = {sys.modules[node.__module__] for node in nodes.values() if node.__module__ in sys.modules}
+    added = [module for module in modules if module.__name__ not in {"__main__", *known}]
+    try:
+        for module in added:
+            pickler.register_pickle_by_value(module)
+        return names, pickler.dumps(nodes)
+    finally:
+        for module in added:
+            pickler.unregister_pickle_by_value(module)
+
+
+def _cloudpickle() -> Any:
+    for name in ("cloudpickle", "pyspark.cloudpickle"):
+        try:
+            return importlib.import_module(f"{name}.cloudpickle")
+        except ImportError:
+            continue
+    return None
+
+
+def names_nodes(tree: str) -> bool:
+    """Whether a graph names nodes of Python."""
+    return '"python_feature"' in tree or '"python_estimator"' in tree
+
+
+def adopt(nodes: Carried | None) -> None:
+    """Takes the nodes that this process cannot find by their names."""
+    missing = [name for name in nodes[0] if not _is_there(name)] if nodes else []
+    if nodes and missing:
+        of = pickle.loads(nodes[1])
+        _DECORATED.update({name: of[name] for name in missing})
+
+
+def _is_there(name: str) -> bool:
+    try:
+        return find(name) is not None
+    except Exception:
+        return False
+
+
 def facts(python: str, role: str | None) -> Facts:
     found: Facts = getattr(find(python, role), _FACTS)
     return found
@@ -126,17 +187,19 @@ def facts(python: str, role: str | None) -> Facts:
 class Feature:
     """A class or function at work."""
 
-    def __init__(self, python: str, parameters: dict[str, Any], channels: list[Channel]) -> None:
+    def __init__(self, python: str, parameters: str, channels: list[Channel]) -> None:
         node: Any = find(python, "feature")
         self._facts: Facts = getattr(node, _FACTS)
         self._is_function = not inspect.isclass(node)
         self._made: Any = None
         if self._is_function:
-            inspect.signature(node).bind([], **parameters)
-            self.step: Callable[[int, list[float | None]], Any] = lambda now, values: node(values, **parameters)
+            named = json.loads(parameters)
+            inspect.signature(node).bind([], **named)
+            self.step: Callable[[int, list[float | None]], Any] = lambda now, values: node(values, **named)
         else:
-            self._make: Callable[[], Any] = lambda: node(channels, **parameters)
-            self._kept_out = set(inspect.signature(node).parameters)
+            # Each time of their own, since an object may change what it was given.
+            self._make: Callable[[], Any] = lambda: node(list(channels), **json.loads(parameters))
+            self._arguments = _arguments(node, channels, parameters)
         self.segment()
         self.outputs = [(of.name, of.unit) for of in self._outputs(channels)]
 
@@ -153,10 +216,11 @@ class Feature:
     def segment(self) -> None:
         if not self._is_function:
             self._made = self._make()
+            self._begun = _texts_of(self._made, self._arguments)
             self.step = self._made.step
 
     def snapshot(self) -> str | None:
-        return None if self._is_function else _written(self._made, self._kept_out)
+        return None if self._is_function else _written(self._made, self._arguments, self._begun)
 
     def restore(self, text: str) -> None:
         self.segment()
@@ -164,7 +228,7 @@ class Feature:
 
 
 def feature_at_work(python: str, parameters: str, channels: list[tuple[str, str]]) -> Feature:
-    return Feature(python, json.loads(parameters), [Channel(*of) for of in channels])
+    return Feature(python, parameters, [Channel(*of) for of in channels])
 
 
 def check(python: str, parameters: str) -> None:
@@ -179,10 +243,12 @@ def check(python: str, parameters: str) -> None:
 def fit(python: str, parameters: str, regressors: list[str], rows: list[list[float]], truths: list[float]) -> tuple[str, float]:
     """What an estimator learns from rows, as JSON, and its root mean square error on them."""
     node = find(python, "estimator")
-    made = node(regressors, **json.loads(parameters))
+    arguments = _arguments(node, regressors, parameters)
+    made = node(list(regressors), **json.loads(parameters))
+    begun = _texts_of(made, arguments)
     made.fit(rows, truths)
     errors = [made.predict(row) - truth for row, truth in zip(rows, truths)]
-    return _written(made, set(inspect.signature(node).parameters)), math.sqrt(math.fsum(of * of for of in errors) / len(errors))
+    return _written(made, arguments, begun), math.sqrt(math.fsum(of * of for of in errors) / len(errors))
 
 
 def fitted(python: str, parameters: str, regressors: list[str], state: str) -> Any:
@@ -192,23 +258,42 @@ def fitted(python: str, parameters: str, regressors: list[str], state: str) -> A
     return made
 
 
-def _written(made: Any, kept_out: set[str]) -> str:
-    """What an object knows, as JSON: what its `snapshot` gives, or its attributes without the arguments that it was made with."""
+def _arguments(node: Any, first: Any, parameters: str) -> dict[str, str]:
+    """The arguments that an object is made with, those that are not given included, each as a text."""
+    bound = inspect.signature(node).bind(list(first), **json.loads(parameters))
+    bound.apply_defaults()
+    return {name: repr(value) for name, value in bound.arguments.items()}
+
+
+def _texts_of(made: Any, arguments: dict[str, str]) -> dict[str, str]:
+    """The attributes of an object that are called as arguments are, each as a text."""
+    return {name: repr(value) for name, value in getattr(made, "__dict__", {}).items() if name in arguments}
+
+
+def _is_plain(value: Any) -> bool:
+    try:
+        return repr(json.loads(json.dumps(value))) == repr(value)
+    except (TypeError, ValueError):
+        return False
+
+
+def _written(made: Any, arguments: dict[str, str], begun: dict[str, str]) -> str:
+    """What an object knows, as JSON: what its `snapshot` gives, or its attributes without those that are the arguments that it was made
+    with, or were made of them in a form that is no JSON and are still as they were when it was made."""
     if hasattr(made, "snapshot"):
         state = made.snapshot()
     else:
-        state = {name: value for name, value in vars(made).items() if name not in kept_out}
-    try:
-        text = json.dumps(state)
-        same = repr(json.loads(text)) == repr(state)
-    except (TypeError, ValueError):
-        same = False
-    if not same:
+        state = {
+            name: value
+            for name, value in vars(made).items()
+            if name not in arguments or repr(value) not in (arguments[name], None if _is_plain(value) else begun.get(name))
+        }
+    if not _is_plain(state):
         raise TypeError(
             f"what `{type(made).__qualname__}` knows is not made of dicts, lists, texts, numbers and None: keep only these in its "
             "attributes, or define `snapshot` and `restore`"
         )
-    return text
+    return json.dumps(state)
 
 
 def _restore(made: Any, text: str) -> None:

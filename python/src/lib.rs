@@ -32,6 +32,14 @@ fn main(py: Python<'_>, words: Vec<OsString>, itself: Vec<OsString>) -> u8 {
     py.detach(|| athermal::command_line_of(words))
 }
 
+/// The options of every job as JSON Schema, by its name, as JSON.
+#[pyfunction]
+fn options() -> String {
+    let schemas = athermal::jobs::asked::schemas().into_iter();
+    let all = schemas.map(|(job, schema)| (job.to_owned(), schema));
+    serde_json::Value::Object(all.collect()).to_string()
+}
+
 /// Functions and classes; `athermal` wraps each.
 #[pymodule]
 fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -41,6 +49,7 @@ fn _athermal(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()?;
     module.add_class::<Engine>()?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(options, module)?)?;
     module.add_function(wrap_pyfunction!(conformance::broken_rules, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::check_columns, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fit_machine, module)?)?;

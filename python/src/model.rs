@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::engine::Engine;
-use crate::failure::{guarded, of_model};
+use crate::failure::{guarded, of_model, request};
 use crate::graph::Graph;
 use crate::json::to_python;
 use crate::predictions::Predictions;
@@ -103,6 +103,7 @@ impl Model {
 
     /// An engine that runs it, cold.
     fn engine(&self, py: Python<'_>) -> PyResult<Engine> {
+        self.check_fitted(py)?;
         let engine = guarded(py, || self.inner.engine())?;
         engine
             .map(|engine| Engine::new(py, engine))
@@ -111,11 +112,13 @@ impl Model {
 
     /// What it puts out, with the options of `athermal run`. `time` is the name of the column of the time.
     fn predict(&self, py: Python<'_>, call: Call, time: String) -> PyResult<Table> {
+        self.check_fitted(py)?;
         let outputs = self.inner.plan.outputs.iter();
         let outputs = outputs.map(|of| of.name.clone()).collect();
         let like = self.time_type(&call);
-        let mut sink = Predictions::new(time, like.as_ref(), outputs);
+        let sink = Predictions::new(time, like.as_ref(), outputs);
         let sink = work(py, &call, move |job: &Predict, host| {
+            let mut sink = sink.followed(host.progress("predicting"));
             job.run(&self.inner, &mut sink, host)?;
             Ok(sink)
         })?;
@@ -125,6 +128,7 @@ impl Model {
 
     /// Scores, with the options of `athermal evaluate`.
     fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
+        self.check_fitted(py)?;
         found(
             py,
             &work(py, &call, |job: &Evaluate, host| {
@@ -135,6 +139,7 @@ impl Model {
 
     /// A diagnosis, with the options of `athermal diagnose`.
     fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
+        self.check_fitted(py)?;
         found(
             py,
             &work(py, &call, |job: &Diagnose, host| {
@@ -149,6 +154,7 @@ impl Model {
         py: Python<'py>,
         call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
+        self.check_fitted(py)?;
         let (of, page) = work(py, &call, |job: &Report, host| {
             let (found, facts) = job.find(&for_scores(&self.inner)?, host)?;
             Ok((found, page(&facts)))
@@ -159,6 +165,17 @@ impl Model {
 }
 
 impl Model {
+    /// Refuses a graph that needs a fit.
+    fn check_fitted(&self, py: Python<'_>) -> PyResult<()> {
+        let nodes = self.inner.unfitted();
+        if self.inner.card.is_some() || nodes.is_empty() {
+            return Ok(());
+        }
+        let nodes = nodes.join(", ");
+        let text = format!("the graph needs a fit of {nodes}: `Graph.fit(data)` gives its model");
+        Err(request(py, &text))
+    }
+
     /// The type of the one column of the time in tables.
     fn time_type(&self, call: &Call) -> Option<DataType> {
         let (times, _) = columns(&self.inner.plan);

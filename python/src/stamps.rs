@@ -81,6 +81,16 @@ fn ns_in(unit: TimeUnit) -> i64 {
     }
 }
 
+/// What a unit is called.
+pub fn called(unit: TimeUnit) -> &'static str {
+    match unit {
+        TimeUnit::Second => "s",
+        TimeUnit::Millisecond => "ms",
+        TimeUnit::Microsecond => "us",
+        TimeUnit::Nanosecond => "ns",
+    }
+}
+
 /// What a clock showed, as if it were that of UTC.
 fn civil_ns(text: &str) -> Option<i64> {
     let civil: jiff::civil::DateTime = text.parse().ok()?;

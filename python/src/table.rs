@@ -7,17 +7,21 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::ffi_stream::RecordBatchStreamReader;
-use arrow_array::types::{Float64Type, Int64Type};
-use arrow_array::{
-    ArrayRef, BooleanArray, Float64Array, Int64Array, PrimitiveArray, RecordBatch,
-    RecordBatchIterator, RecordBatchOptions, RecordBatchReader as _, StringArray,
-    TimestampNanosecondArray,
+use arrow_array::types::{
+    ArrowPrimitiveType, ArrowTimestampType, Float64Type, Int64Type, TimestampMicrosecondType,
+    TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType,
 };
+use arrow_array::{
+    ArrayRef, BooleanArray, PrimitiveArray, RecordBatch, RecordBatchIterator, RecordBatchOptions,
+    RecordBatchReader as _, StringArray, make_array,
+};
+use arrow_ipc::reader::StreamReader;
+use arrow_ipc::writer::StreamWriter;
 use arrow_pyarrow::FromPyArrow;
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyList};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList};
 
 use crate::stamps;
 
@@ -49,6 +53,12 @@ impl Table {
             schema,
             batches: Arc::new([batch]),
         })
+    }
+
+    fn type_of(&self, name: &str) -> PyResult<&DataType> {
+        let field = self.schema.field_with_name(name);
+        let field = field.map_err(|_| PyKeyError::new_err(name.to_owned()))?;
+        Ok(field.data_type())
     }
 
     fn with_schema(&self, schema: Schema) -> Result<Self, ArrowError> {
@@ -94,46 +104,114 @@ impl Table {
         )))
     }
 
-    /// A table of columns: each a name, what it has (`float`, `int`, `ns` of instants, `bool` or `text`), and it: the bytes of all
-    /// numbers of 64 bits, or a list with `None` where there is nothing.
+    /// A table of columns: each a name, what it has, and it. What it has is `float`, `int`, `bool`, `text`, the unit of instants with
+    /// their zone behind it (`us Europe/Berlin`), or `arrow`, which is an array of it. Numbers and instants may be the bytes of all, of
+    /// 64 bits each, or these with a byte for each that says whether it is absent; else it is a list with `None` where there is nothing.
     #[staticmethod]
     fn from_columns(columns: Vec<(String, String, Bound<'_, PyAny>)>) -> PyResult<Self> {
-        fn numbers<T>(of: &Bound<'_, PyAny>) -> PyResult<Option<PrimitiveArray<T>>>
-        where
-            T: arrow_array::ArrowPrimitiveType,
-            T::Native: From8,
-        {
-            let Ok(bytes) = of.extract::<&[u8]>() else {
-                return Ok(None);
-            };
-            let (words, _) = bytes.as_chunks::<8>();
-            let values = words.iter().map(|word| T::Native::from_8(*word));
-            Ok(Some(PrimitiveArray::from_iter_values(values)))
-        }
         let columns = columns.into_iter().map(|(name, has, of)| {
             let array: ArrayRef = match &*has {
-                "float" => match numbers::<Float64Type>(&of)? {
-                    Some(array) => Arc::new(array),
-                    None => Arc::new(Float64Array::from(of.extract::<Vec<Option<f64>>>()?)),
-                },
-                "int" => match numbers::<Int64Type>(&of)? {
-                    Some(array) => Arc::new(array),
-                    None => Arc::new(Int64Array::from(of.extract::<Vec<Option<i64>>>()?)),
-                },
-                "ns" => {
-                    let instants = of.extract::<Vec<Option<i64>>>()?;
-                    Arc::new(TimestampNanosecondArray::from(instants))
-                }
-                "utc" => {
-                    let instants = of.extract::<Vec<Option<i64>>>()?;
-                    Arc::new(TimestampNanosecondArray::from(instants).with_timezone("UTC"))
-                }
+                "float" => Arc::new(numbers::<Float64Type>(&of, |_| false)?),
+                "int" => Arc::new(numbers::<Int64Type>(&of, |_| false)?),
                 "bool" => Arc::new(BooleanArray::from(of.extract::<Vec<Option<bool>>>()?)),
-                _ => Arc::new(StringArray::from(of.extract::<Vec<Option<String>>>()?)),
+                "text" => Arc::new(StringArray::from(of.extract::<Vec<Option<String>>>()?)),
+                "arrow" => make_array(FromPyArrow::from_pyarrow_bound(&of)?),
+                clock => instants(clock, &of)?,
             };
             Ok((name, array))
         });
         Self::of(columns.collect::<PyResult<_>>()?).map_err(|error| unfit(&error))
+    }
+
+    /// Tables with the same columns, one after the other.
+    #[staticmethod]
+    fn joined(tables: Vec<Py<Self>>) -> PyResult<Self> {
+        let schema = tables.first().map(|of| Arc::clone(&of.get().schema));
+        let schema = schema.ok_or_else(|| PyValueError::new_err("there are no pieces"))?;
+        let kinds = |of: &Schema| -> Vec<(String, DataType)> {
+            let fields = of.fields().iter();
+            let kinds = fields.map(|of| (of.name().clone(), of.data_type().clone()));
+            kinds.collect()
+        };
+        let expected = kinds(&schema);
+        let mut batches = Vec::new();
+        for (nth, table) in tables.iter().enumerate() {
+            let (table, found) = (table.get(), kinds(&table.get().schema));
+            if found != expected {
+                let differs = |of: &&(String, DataType)| !expected.contains(of);
+                let other = found.iter().find(differs).map_or_else(
+                    || "it lacks columns".to_owned(),
+                    |(name, of)| format!("`{name}` is of type {of} there"),
+                );
+                return Err(PyValueError::new_err(format!(
+                    "piece {} differs from the first: {other}",
+                    nth + 1
+                )));
+            }
+            let all = table.with_schema(schema.as_ref().clone());
+            batches.extend_from_slice(&all.map_err(|error| unfit(&error))?.batches);
+        }
+        let batches = batches.into();
+        Ok(Self { schema, batches })
+    }
+
+    /// The rows from one to another, which are not copied.
+    #[pyo3(signature = (from, to, /))]
+    fn rows(&self, from: usize, to: usize) -> Self {
+        let mut before = 0;
+        let slices = self.batches.iter().filter_map(|batch| {
+            let (begin, rows) = (before, batch.num_rows());
+            before += rows;
+            let (from, to) = (from.max(begin), to.min(before));
+            (from < to).then(|| batch.slice(from - begin, to - from))
+        });
+        Self {
+            batches: slices.collect(),
+            schema: Arc::clone(&self.schema),
+        }
+    }
+
+    /// Some columns, in this order.
+    fn only(&self, names: Vec<String>) -> PyResult<Self> {
+        let places = names.iter().map(|name| {
+            let place = self.schema.index_of(name);
+            place.map_err(|_| PyKeyError::new_err(name.clone()))
+        });
+        let places = places.collect::<PyResult<Vec<_>>>()?;
+        let schema = self.schema.project(&places);
+        let batches = self.batches.iter().map(|of| of.project(&places));
+        let made = schema.and_then(|schema| {
+            Ok(Self {
+                batches: batches.collect::<Result<Vec<_>, _>>()?.into(),
+                schema: Arc::new(schema),
+            })
+        });
+        made.map_err(|error| unfit(&error))
+    }
+
+    /// The table as bytes, a stream of Arrow's format between processes.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let written = || -> Result<Vec<u8>, ArrowError> {
+            let mut writer = StreamWriter::try_new(Vec::new(), &self.schema)?;
+            for batch in &*self.batches {
+                writer.write(batch)?;
+            }
+            writer.into_inner()
+        };
+        let bytes = written().map_err(|error| unfit(&error))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// The table of such bytes.
+    #[staticmethod]
+    fn of_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let read = || -> Result<Self, ArrowError> {
+            let reader = StreamReader::try_new(bytes, None)?;
+            let schema = reader.schema();
+            let batches = reader.collect::<Result<Vec<_>, _>>()?.into();
+            Ok(Self { schema, batches })
+        };
+        read().map_err(|error| unfit(&error))
     }
 
     /// The same table with other names for some columns. A column that has one of these names already has another then.
@@ -152,17 +230,24 @@ impl Table {
         renamed.map_err(|error| unfit(&error))
     }
 
-    /// What a column has: `float`, `int`, `ns` or `utc` of instants, `bool` or `text`.
+    /// What a column has: `float`, `int`, `instants`, `bool` or `text`.
     fn has(&self, name: &str) -> PyResult<&'static str> {
-        let field = self.schema.field_with_name(name);
-        let field = field.map_err(|_| PyKeyError::new_err(name.to_owned()))?;
-        Ok(match field.data_type() {
-            DataType::Timestamp(_, None) => "ns",
-            DataType::Timestamp(..) => "utc",
+        Ok(match self.type_of(name)? {
+            DataType::Timestamp(..) => "instants",
             DataType::Boolean => "bool",
             of if of.is_integer() => "int",
             of if of.is_numeric() => "float",
             _ => "text",
+        })
+    }
+
+    /// The unit of instants and their zone; `None` of what has none.
+    fn clock(&self, name: &str) -> PyResult<Option<(&'static str, Option<String>)>> {
+        Ok(match self.type_of(name)? {
+            DataType::Timestamp(unit, zone) => {
+                Some((stamps::called(*unit), zone.as_deref().map(str::to_owned)))
+            }
+            _ => None,
         })
     }
 
@@ -213,6 +298,59 @@ impl Table {
     }
 }
 
+/// Numbers of 64 bits: of bytes, of bytes and a byte for each that is absent, or of a list. `is_absent` knows those that stand for none.
+fn numbers<T>(
+    of: &Bound<'_, PyAny>,
+    is_absent: fn(T::Native) -> bool,
+) -> PyResult<PrimitiveArray<T>>
+where
+    T: ArrowPrimitiveType,
+    T::Native: From8 + for<'a, 'py> FromPyObject<'a, 'py>,
+{
+    let (bytes, mask) = match of.extract::<(Bound<'_, PyAny>, Vec<u8>)>() {
+        Ok((bytes, mask)) => (bytes, Some(mask)),
+        Err(_) => (of.clone(), None),
+    };
+    let Ok(bytes) = bytes.extract::<&[u8]>() else {
+        return Ok(of
+            .extract::<Vec<Option<T::Native>>>()?
+            .into_iter()
+            .collect());
+    };
+    let (words, _) = bytes.as_chunks::<8>();
+    let values = words.iter().map(|word| T::Native::from_8(*word));
+    if mask.is_none() && !values.clone().any(is_absent) {
+        return Ok(PrimitiveArray::from_iter_values(values));
+    }
+    let mask = mask.unwrap_or_default().into_iter();
+    let there = values.zip(mask.chain(std::iter::repeat(0)));
+    let there = there.map(|(of, absent)| (absent == 0 && !is_absent(of)).then_some(of));
+    Ok(there.collect())
+}
+
+/// Instants by a clock: its unit, and the zone behind it.
+fn instants(clock: &str, of: &Bound<'_, PyAny>) -> PyResult<ArrayRef> {
+    fn with<T: ArrowTimestampType>(
+        of: &Bound<'_, PyAny>,
+        zone: Option<&str>,
+    ) -> PyResult<ArrayRef> {
+        // As numpy has it.
+        let instants = numbers::<T>(of, |at| at == i64::MIN)?;
+        Ok(Arc::new(instants.with_timezone_opt(zone)))
+    }
+    let (unit, zone) = match clock.split_once(' ') {
+        Some((unit, zone)) => (unit, Some(zone)),
+        None => (clock, None),
+    };
+    match unit {
+        "s" => with::<TimestampSecondType>(of, zone),
+        "ms" => with::<TimestampMillisecondType>(of, zone),
+        "us" => with::<TimestampMicrosecondType>(of, zone),
+        "ns" => with::<TimestampNanosecondType>(of, zone),
+        other => Err(PyValueError::new_err(format!("no column has `{other}`"))),
+    }
+}
+
 /// A number of 64 bits from its bytes, as this machine has them.
 trait From8 {
     fn from_8(bytes: [u8; 8]) -> Self;
@@ -239,6 +377,10 @@ fn append(array: &ArrayRef, all: &Bound<'_, PyList>) -> PyResult<()> {
             .try_for_each(|value| all.append(value)),
         DataType::Int64 => array
             .as_primitive::<Int64Type>()
+            .iter()
+            .try_for_each(|value| all.append(value)),
+        DataType::Boolean => array
+            .as_boolean()
             .iter()
             .try_for_each(|value| all.append(value)),
         DataType::Utf8 => array

@@ -1,8 +1,12 @@
-//! Work of the library on behalf of Python: without its lock, with its signals, progress and warnings.
+//! Work of the library on behalf of Python: on a thread of its own, while the one that called sees to signals and progress.
 
+use std::io;
+use std::panic::resume_unwind;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use athermal::core::watch::{Kept, ProgressListener, Remark, Watch};
 use athermal::files::OpenTable;
@@ -14,11 +18,14 @@ use pyo3::prelude::*;
 use crate::failure::{guarded, of_failure, request};
 use crate::table::Table;
 
-/// So often Python is asked whether it was interrupted.
-const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
+/// So often Python is asked whether it was interrupted, and shown how far the work is.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(25);
 
-/// What a warning is raised from: a function of the package, which a user called.
-const USER: i32 = 3;
+/// What the thread that works has for its stack: as much as one that Python begins with.
+const STACK: usize = 8 << 20;
+
+/// What a warning is raised from: a function of the package, which a user called, and which calls this by another.
+const USER: i32 = 4;
 
 /// What Python asks for, beside the function.
 #[derive(FromPyObject)]
@@ -31,58 +38,56 @@ pub struct Call {
     progress: Option<Py<PyAny>>,
 }
 
-/// What ended the work from the side of Python.
-#[derive(Clone, Default)]
-struct Stop(Arc<Mutex<Option<PyErr>>>);
+/// How far some work is: what is done, how much of it, and of how much where that is known.
+type Event = (String, u64, Option<u64>);
 
-impl Stop {
-    fn set(&self, error: PyErr) {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert(error);
+/// What the thread that called and those that work tell each other.
+#[derive(Default)]
+struct Between {
+    /// What ended the work from the side of Python.
+    stop: Mutex<Option<PyErr>>,
+    /// What is not shown yet.
+    events: Mutex<Vec<Event>>,
+}
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Between {
+    fn go_on(&self) -> Result<(), String> {
+        match *locked(&self.stop) {
+            Some(_) => Err("stopped".to_owned()),
+            None => Ok(()),
+        }
     }
 
-    fn take(&self) -> Option<PyErr> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    /// Takes progress, and ends work that is to stop. What is newer of the same takes the place of what was not shown yet.
+    fn take(&self, what: &str, done: u64, total: Option<u64>) {
+        if self.go_on().is_err() {
+            resume_unwind(Box::new("stopped"));
+        }
+        let mut events = locked(&self.events);
+        match events.last_mut() {
+            Some(last) if last.0 == what && last.2 == total => last.1 = done,
+            _ => events.push((what.to_owned(), done, total)),
+        }
     }
 
-    fn is_set(&self) -> bool {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .is_some()
-    }
-
-    /// Asks Python now and then whether to go on.
-    fn check(self) -> Arc<dyn Fn() -> Result<(), String> + Send + Sync> {
-        let asked = Mutex::new(Instant::now());
-        Arc::new(move || {
-            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
-            if asked.elapsed() >= BETWEEN_SIGNALS {
-                *asked = Instant::now();
-                if let Err(error) = Python::attach(|py| py.check_signals()) {
-                    self.set(error);
-                }
-            }
-            match self.is_set() {
-                true => Err("stopped".to_owned()),
-                false => Ok(()),
-            }
-        })
-    }
-
-    /// Hands progress to a Python function; what that raises ends the work.
-    fn progress(self, listener: Py<PyAny>) -> ProgressListener {
-        Arc::new(move |what, done, total| {
-            if self.is_set() {
-                return;
-            }
-            let called = Python::attach(|py| listener.call1(py, (what, done, total)).map(drop));
-            if let Err(error) = called {
-                self.set(error);
-            }
-        })
+    /// Asks Python whether to go on, and shows it how far the work is.
+    fn look(&self, listener: Option<&Py<PyAny>>) {
+        let events = std::mem::take(&mut *locked(&self.events));
+        let looked = Python::attach(|py| {
+            py.check_signals()?;
+            let Some(listener) = listener else {
+                return Ok(());
+            };
+            let mut events = events.into_iter();
+            events.try_for_each(|event| listener.call1(py, event).map(drop))
+        });
+        if let Err(error) = looked {
+            locked(&self.stop).get_or_insert(error);
+        }
     }
 }
 
@@ -92,8 +97,9 @@ pub fn work<J: Job, R: Send>(
     call: &Call,
     work: impl FnOnce(&J, &dyn Watch) -> Result<R, Failure> + Send,
 ) -> PyResult<R> {
-    let stop = Stop::default();
-    let go_on = stop.clone().check();
+    let between = Arc::new(Between::default());
+    let asks = Arc::clone(&between);
+    let go_on: Arc<dyn Fn() -> Result<(), String> + Send + Sync> = Arc::new(move || asks.go_on());
     let open = |(name, table): &(PathBuf, Py<Table>)| {
         let table = table.get();
         let (schema, batches) = (Arc::clone(&table.schema), Arc::clone(&table.batches));
@@ -101,19 +107,47 @@ pub fn work<J: Job, R: Send>(
         (name.clone(), open)
     };
     let tables = call.tables.iter().map(open).collect();
-    let progress = call.progress.as_ref().map(|of| of.clone_ref(py));
-    let progress = progress.map(|listener| stop.clone().progress(listener));
     let options =
         serde_json::from_str(&call.options).map_err(|error| request(py, &error.to_string()))?;
     let asked = Asked { options, tables };
-    let host = Kept::with(progress);
-    let done = guarded(py, || py.detach(|| done(&asked, &host, work)));
-    if let Some(error) = stop.take() {
+    let takes = Arc::clone(&between);
+    let takes: ProgressListener = Arc::new(move |what, done, total| takes.take(what, done, total));
+    let host = Kept::with(Some(takes));
+    let job = || done(&asked, &host, work);
+    let listener = call.progress.as_ref();
+    let done = guarded(py, || {
+        py.detach(|| {
+            thread::scope(|scope| {
+                let (ended, end) = channel::<()>();
+                let worker =
+                    thread::Builder::new()
+                        .stack_size(STACK)
+                        .spawn_scoped(scope, move || {
+                            // Dropped when it is done, however it is.
+                            let _ended = ended;
+                            job()
+                        })?;
+                while end.recv_timeout(BETWEEN_LOOKS) == Err(RecvTimeoutError::Timeout) {
+                    between.look(listener);
+                }
+                let done = worker.join();
+                between.look(listener);
+                Ok::<_, io::Error>(match (done, between.go_on()) {
+                    (Ok(done), _) => Some(done),
+                    (Err(_), Err(_)) => None,
+                    (Err(panic), Ok(())) => resume_unwind(panic),
+                })
+            })
+        })
+    })??;
+    if let Some(error) = locked(&between.stop).take() {
         return Err(error);
     }
-    let result = done?;
     warn(py, &host.remarks())?;
-    result.map_err(|failure| of_failure(py, &failure))
+    match done {
+        Some(result) => result.map_err(|failure| of_failure(py, &failure)),
+        None => Err(request(py, "stopped")),
+    }
 }
 
 /// Raises warnings, and the note that times have no zone.

@@ -31,6 +31,14 @@ def graph_of(node, signal="temperature", **parameters):
     return athermal.Graph(tree)
 
 
+def alone(node, **parameters):
+    """A model with nothing that needs a fit."""
+    tree = graph_of(node, **parameters).to_dict()
+    del tree["signals"]["position"]
+    tree["nodes"], tree["outputs"] = {"mine": tree["nodes"]["mine"]}, {"mine": "mine"}
+    return athermal.Graph(tree).model()
+
+
 def rows(frame, *names):
     return list(zip(*(frame[name] for name in names)))
 
@@ -97,7 +105,7 @@ def test_what_a_node_raises_is_raised_with_its_name(week):
     assert any("nodes_of_a_user" in str(line.path) for line in error.traceback) or error.value.__cause__.__traceback__
     engine = graph_of(nodes.twice).fit(week).engine()
     engine.step(1, {"temperature.room": 20.0})
-    failing = graph_of(nodes.Failing).model().engine()
+    failing = alone(nodes.Failing).engine()
     with pytest.raises(athermal.NodeError, match="slip"):
         for nth in range(50):
             failing.step(nth, {"temperature.room": 20.0})
@@ -155,10 +163,68 @@ def test_a_state_that_is_no_json_is_refused_in_words():
         def step(self, now, values):
             return values
 
-    engine = graph_of(Pair).model().engine()
+    engine = alone(Pair).engine()
     engine.step(1, {"temperature.room": 20.0})
     with pytest.raises(athermal.NodeError, match="define `snapshot` and `restore`"):
         engine.snapshot()
+
+
+def test_what_is_called_as_an_argument_and_changed_is_in_a_snapshot():
+    @athermal.feature
+    class Smoothed:
+        """The mean of what came, which begins at a level; and all that came."""
+
+        def __init__(self, channels, level=20.0, seen=()):
+            self.channels = tuple(channels)
+            self.level = level
+            self.seen = seen
+
+        def step(self, now, values):
+            for value in values:
+                if value is not None:
+                    self.level += (value - self.level) / 4
+                    self.seen.append(value)
+            return [self.level + len(self.seen)] * len(values)
+
+    model = alone(Smoothed, seen=[1.0])
+    engine = model.engine()
+    for nth in range(5):
+        engine.step(nth, {"temperature.room": 21.0 + nth})
+    again = model.engine()
+    again.restore(engine.snapshot())
+    expected = engine.step(9, {"temperature.room": 25.0})
+    assert again.step(9, {"temperature.room": 25.0}) == expected and expected["mine.room"] > 29
+    # What an object did to a list that it was given is nothing that the next one is given.
+    engine.segment()
+    assert engine.step(10, {"temperature.room": 20.0})["mine.room"] == 22
+
+
+def test_an_estimator_keeps_the_start_value_that_it_changed(week):
+    @athermal.estimator
+    class Mean:
+        """The mean of the truth, which begins at a value."""
+
+        def __init__(self, regressors, mean=0.0):
+            self.regressors = regressors
+            self.mean = mean
+
+        def fit(self, rows, truths):
+            self.mean += math.fsum(truths) / len(truths)
+
+        def predict(self, row):
+            return self.mean
+
+    tree = athermal.Graph(GRAPH).to_dict()
+    tree["nodes"]["thermal"].update(type="python_estimator", python=Mean, parameters={"mean": 1.0})
+    predicted = [of for of in athermal.Graph(tree).fit(week).predict(week)["predicted.Z1"] if of is not None]
+    assert len(set(predicted)) == 1 and predicted[0] != 1.0
+
+
+def test_an_engine_of_a_graph_that_needs_a_fit_is_refused(week):
+    graph = athermal.Graph(GRAPH)
+    for asked in (graph.model().engine, lambda: graph.model().predict(week), lambda: athermal.evaluate(graph.model(), week)):
+        with pytest.raises(athermal.RequestError, match=r"needs a fit of thermal.Z1, thermal.Z2: `Graph.fit\(data\)`"):
+            asked()
 
 
 def test_nodes_that_keep_the_rules_conform(athermal_conforms):

@@ -115,7 +115,7 @@ def test_options_are_those_of_the_command_line(model, files, week):
     assert athermal.evaluate(model, week, abs_truth_below="9 nm/min", frozen=True).scores == said["scores"]
     with pytest.raises(athermal.RequestError, match="k-step.*`steps=3`"):
         athermal.evaluate(model, week, mode="k-step")
-    with pytest.raises(athermal.RequestError, match="nonsense"):
+    with pytest.raises(TypeError, match="nonsense"):
         athermal.evaluate(model, week, nonsense=1)
 
 

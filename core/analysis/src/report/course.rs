@@ -106,6 +106,9 @@ pub struct Voter {
     pub kind: &'static str,
     /// Its value for each truth.
     pub value: Vec<f64>,
+    /// Both ends of the interval about each, where it has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<Vec<[f64; 2]>>,
 }
 
 /// As model cards have it.
@@ -242,6 +245,7 @@ fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
                 called: called.clone(),
                 kind: node.kind.name,
                 value: of.values.clone(),
+                interval: of.ends.clone(),
             }
         };
         let axis = Axis {

@@ -58,6 +58,8 @@ pub struct PredictionTrace {
     pub ahead: Duration,
     /// Its value for each truth; NaN where there was none.
     pub values: Vec<f64>,
+    /// Both ends of the interval about each, where it has any.
+    pub ends: Option<Vec<[f64; 2]>>,
 }
 
 /// Steps a plan over a recording, cold, and writes down every truth with its predictions. `look` sees each tick and each
@@ -121,6 +123,7 @@ pub fn trace_as(
                 node: prediction.node,
                 ahead: prediction.ahead,
                 values: prediction.values,
+                ends: prediction.intervals.map(|_| prediction.ends),
             })
             .collect(),
         persistence: truth
