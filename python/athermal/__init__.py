@@ -616,8 +616,8 @@ def compare(
         steps: How many steps ahead `mode="k-step"` predicts.
     """
     options = _given(locals())
-    if isinstance(graphs, Graph):
-        graphs = [graphs]
+    if isinstance(graphs, (Graph, str, os.PathLike)):
+        graphs = [graphs]  # type: ignore[list-item]
     if not isinstance(graphs, Mapping):
         graphs = {f"graph {nth}": of for nth, of in enumerate(graphs, 1)}
     for name, of in graphs.items():

@@ -118,8 +118,9 @@ impl Graph {
 
     /// Fits it, with the options of `athermal fit`. Gives the model, and how the fit went in words.
     fn fit(&self, py: Python<'_>, call: Call) -> PyResult<(Model, String)> {
-        let fitted = work(py, &call, |asked, host| {
-            calls::fit(&self.inner, asked, host)
+        let graph = self.inner.clone();
+        let fitted = work(py, &call, move |asked, host| {
+            calls::fit(&graph, asked, host)
         })?;
         match fitted.model {
             Some(inner) => Ok((Model { inner }, fitted.text)),

@@ -111,9 +111,10 @@ impl Model {
         let outputs = outputs.map(|of| of.name.clone()).collect();
         let like = self.time_type(&call);
         let sink = Predictions::new(time, like.as_ref(), outputs);
+        let model = self.inner.clone();
         let sink = work(py, &call, move |asked, host| {
             let mut sink = sink.followed(host.progress("predicting"));
-            calls::predict(&self.inner, asked, &mut sink, host)?;
+            calls::predict(&model, asked, &mut sink, host)?;
             Ok(sink)
         })?;
         sink.table()
@@ -123,23 +124,21 @@ impl Model {
     /// Scores, with the options of `athermal evaluate`.
     fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         self.check_fitted(py)?;
-        found(
-            py,
-            &work(py, &call, |asked, host| {
-                calls::evaluate(&self.inner, asked, host)
-            })?,
-        )
+        let model = self.inner.clone();
+        let of = work(py, &call, move |asked, host| {
+            calls::evaluate(&model, asked, host)
+        })?;
+        found(py, &of)
     }
 
     /// A diagnosis, with the options of `athermal diagnose`.
     fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         self.check_fitted(py)?;
-        found(
-            py,
-            &work(py, &call, |asked, host| {
-                calls::diagnose(&self.inner, asked, host)
-            })?,
-        )
+        let model = self.inner.clone();
+        let of = work(py, &call, move |asked, host| {
+            calls::diagnose(&model, asked, host)
+        })?;
+        found(py, &of)
     }
 
     /// A report, with the options of `athermal report`; the last part is the page.
@@ -149,8 +148,9 @@ impl Model {
         call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
         self.check_fitted(py)?;
-        let (of, page) = work(py, &call, |asked, host| {
-            calls::report(&self.inner, asked, host)
+        let model = self.inner.clone();
+        let (of, page) = work(py, &call, move |asked, host| {
+            calls::report(&model, asked, host)
         })?;
         let (text, facts) = found(py, &of)?;
         Ok((text, facts, page))
