@@ -617,7 +617,7 @@ def compare(
     """
     options = _given(locals())
     if isinstance(graphs, (Graph, str, os.PathLike)):
-        graphs = [graphs]  # type: ignore[list-item]
+        graphs = [graphs]
     if not isinstance(graphs, Mapping):
         graphs = {f"graph {nth}": of for nth, of in enumerate(graphs, 1)}
     for name, of in graphs.items():

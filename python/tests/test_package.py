@@ -367,3 +367,10 @@ def test_the_command_line_comes_with_the_package(tmp_path):
     assert run(tmp_path, "--version").split()[:2] == ["athermal", athermal.__version__]
     wrong = subprocess.run([sys.executable, "-m", "athermal", "fit"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2
+
+
+def test_the_script_of_a_user_runs(tmp_path):
+    from script_of_a_user import main
+
+    assert 0 < main(tmp_path) < 1
+    assert (tmp_path / "model.json").exists()
