@@ -355,7 +355,7 @@ def _plain(value: Any) -> Any:
         if value.dtype.kind == "M":
             at = value.astype("M8[us]").item()
             return at if at is None or isinstance(at, datetime) else datetime(at.year, at.month, at.day)
-        value = value.item() if value.dtype.kind in "biuf" else value
+        value = value.item() if value.dtype.kind in "biuf" else None if str(value) == "NaT" else value
     # A Decimal that is no number may not be compared.
     is_nan = getattr(value, "is_nan", None)
     return None if (is_nan() if callable(is_nan) else isinstance(value, float) and value != value) else value
