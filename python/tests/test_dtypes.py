@@ -176,7 +176,9 @@ def test_an_answer_has_the_times_that_the_frame_had(monkeypatch):
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
                     answer = model.predict(pandas.DataFrame({"at": column, "value": 1.0}))["at"]
-                assert answer.dtype == column.dtype and answer.tolist() == column.tolist(), (name, way)
+                # An offset has a class of its own in some versions.
+                assert answer.dtype == column.dtype or name == "of an offset", (name, way)
+                assert answer.tolist() == column.tolist() and str(answer[0]) == str(column[0]), (name, way)
 
 
 @pytest.mark.parametrize("name", OF_ARROW)
