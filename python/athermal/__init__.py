@@ -616,7 +616,7 @@ def compare(
         steps: How many steps ahead `mode="k-step"` predicts.
     """
     options = _given(locals())
-    if isinstance(graphs, Graph):
+    if isinstance(graphs, (Graph, str, os.PathLike)):
         graphs = [graphs]
     if not isinstance(graphs, Mapping):
         graphs = {f"graph {nth}": of for nth, of in enumerate(graphs, 1)}

@@ -146,7 +146,7 @@ def _cell(value: Any, clock: tuple[str, str | None] | None) -> str:
         if zone is None:
             return at.isoformat(" ")
         return at.replace(tzinfo=timezone.utc).astimezone(_frames.zone_of(zone)).isoformat(" ")
-    return f"{value:.6g}" if isinstance(value, float) and abs(value) < 1e5 else str(value)
+    return f"{value:.{6 if abs(value) < 1e5 else 12}g}" if isinstance(value, float) else str(value)
 
 
 def _frame_of(table: bytes) -> Frame:

@@ -209,7 +209,7 @@ def _of_connection(connection: Any, wanted: Iterable[str] | None) -> Table:
     """The result that a connection of DuckDB has: of `connection.execute("select …")`."""
     names = [of[0] for of in connection.description or []]
     try:
-        found = connection.fetchnumpy() if names and not _can_import("pyarrow") else names and connection.fetch_record_batch()
+        found = connection.fetchnumpy() if names and not _can_import("pyarrow") else names and _reader(connection)()
     except Exception as error:
         raise RequestError(f"the connection has no rows to give: {error}") from error
     if not names:
@@ -217,6 +217,13 @@ def _of_connection(connection: Any, wanted: Iterable[str] | None) -> Table:
     if isinstance(found, Mapping):
         return _of_columns((of, found[of]) for of in _there(names, wanted))
     return Table.from_arrow(found).only(_there(names, wanted))
+
+
+def _reader(connection: Any) -> Callable[[], Any]:
+    """What gives its result by pyarrow, whichever name this version of DuckDB has for it."""
+    names = ("to_arrow_reader", "fetch_record_batch", "arrow")
+    found: Callable[[], Any] = next(getattr(connection, name) for name in names if hasattr(connection, name))
+    return found
 
 
 def _there(columns: Sequence[Any], wanted: Iterable[str] | None) -> list[Any]:
@@ -348,7 +355,7 @@ def _plain(value: Any) -> Any:
         if value.dtype.kind == "M":
             at = value.astype("M8[us]").item()
             return at if at is None or isinstance(at, datetime) else datetime(at.year, at.month, at.day)
-        value = value.item() if value.dtype.kind in "biuf" else value
+        value = value.item() if value.dtype.kind in "biuf" else None if str(value) == "NaT" else value
     # A Decimal that is no number may not be compared.
     is_nan = getattr(value, "is_nan", None)
     return None if (is_nan() if callable(is_nan) else isinstance(value, float) and value != value) else value

@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, overload
 
+from athermal._errors import RequestError
+
 _FACTS = "__athermal__"
 _N = TypeVar("_N", bound=Callable[..., Any])
 _DECORATED: dict[str, Any] = {}
@@ -89,6 +91,8 @@ def estimator(node: _N) -> _N:
 
 
 def _decorated(node: _N, facts: Facts) -> _N:
+    if not hasattr(node, "__qualname__") or not callable(node):
+        raise RequestError(f"{node!r} is no class or function: arguments of `@athermal.{facts.role}` go by their names")
     setattr(node, _FACTS, facts)
     _DECORATED[node.__qualname__] = _DECORATED[reference(node)] = node
     return node

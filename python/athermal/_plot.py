@@ -54,7 +54,7 @@ def draw(course: dict[str, Any], of: str | Sequence[str] | None, axes: Any) -> A
             if row.get_legend_handles_labels()[0]:
                 row.legend(loc="upper right", fontsize="small")
             if nth == 0:
-                row.set_ylabel(f"{name} {row.get_ylabel()}".strip())
+                row.set_ylabel(" in ".join(filter(None, [name, row.get_ylabel()])))
         axes[-1, nth].set_xlabel("time" if is_dated else "time in h")
     return axes
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from athermal import Graph, _athermal, _fleet, _frames
+from athermal import Graph, RequestError, _athermal, _fleet, _frames
 from athermal._fleet import Job
 
 __all__ = ["fit", "save"]
@@ -34,6 +34,8 @@ def fit(
     """
     import pandas
 
+    if not hasattr(df, "map_partitions"):
+        raise RequestError(f"{type(df).__qualname__} is no frame of Dask: `dask.dataframe.from_pandas` makes one, and `Graph.fit` takes all others")
     graph, job = _fleet.job(graph, date, memory)
     known_as = _fleet.wanted(graph, by, time, df.columns)
     rows = df[list(known_as)].rename(columns=known_as)

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-from athermal import Graph, _athermal, _fleet
+from athermal import Graph, RequestError, _athermal, _fleet
 from athermal._fleet import Job
 
 __all__ = ["fit", "save"]
@@ -43,6 +43,8 @@ def fit(
     import pyarrow
     from pyspark.sql import functions
 
+    if not hasattr(df, "sparkSession"):
+        raise RequestError(f"{type(df).__qualname__} is no frame of Spark: `createDataFrame` makes one, and `Graph.fit` takes all others")
     graph, job = _fleet.job(graph, date, memory)
     known_as = _fleet.wanted(graph, by, time, df.columns)
     rows = df.select(*(functions.col(_quoted(of)).alias(name) for of, name in known_as.items()))

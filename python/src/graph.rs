@@ -120,8 +120,9 @@ impl Graph {
 
     /// Fits it, with the options of `athermal fit`. Gives the model, and how the fit went in words.
     fn fit(&self, py: Python<'_>, call: Call) -> PyResult<(Model, String)> {
-        let (inner, outcome) = work(py, &call, |job: &Fit, host| {
-            let mut model = self.inner.clone();
+        let graph = self.inner.clone();
+        let (inner, outcome) = work(py, &call, move |job: &Fit, host| {
+            let mut model = graph;
             let outcome = job.fit(&mut model, host)?;
             Ok((model, outcome))
         })?;

@@ -117,9 +117,10 @@ impl Model {
         let outputs = outputs.map(|of| of.name.clone()).collect();
         let like = self.time_type(&call);
         let sink = Predictions::new(time, like.as_ref(), outputs);
+        let model = self.inner.clone();
         let sink = work(py, &call, move |job: &Predict, host| {
             let mut sink = sink.followed(host.progress("predicting"));
-            job.run(&self.inner, &mut sink, host)?;
+            job.run(&model, &mut sink, host)?;
             Ok(sink)
         })?;
         sink.table()
@@ -129,23 +130,21 @@ impl Model {
     /// Scores, with the options of `athermal evaluate`.
     fn evaluate<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         self.check_fitted(py)?;
-        found(
-            py,
-            &work(py, &call, |job: &Evaluate, host| {
-                job.find(&for_scores(&self.inner)?, host)
-            })?,
-        )
+        let model = self.inner.clone();
+        let of = work(py, &call, move |job: &Evaluate, host| {
+            job.find(&for_scores(&model)?, host)
+        })?;
+        found(py, &of)
     }
 
     /// A diagnosis, with the options of `athermal diagnose`.
     fn diagnose<'py>(&self, py: Python<'py>, call: Call) -> PyResult<(String, Bound<'py, PyAny>)> {
         self.check_fitted(py)?;
-        found(
-            py,
-            &work(py, &call, |job: &Diagnose, host| {
-                Ok(job.find(&self.inner, false, host)?.0)
-            })?,
-        )
+        let model = self.inner.clone();
+        let of = work(py, &call, move |job: &Diagnose, host| {
+            Ok(job.find(&model, false, host)?.0)
+        })?;
+        found(py, &of)
     }
 
     /// A report, with the options of `athermal report`; the last part is the page.
@@ -155,8 +154,9 @@ impl Model {
         call: Call,
     ) -> PyResult<(String, Bound<'py, PyAny>, String)> {
         self.check_fitted(py)?;
-        let (of, page) = work(py, &call, |job: &Report, host| {
-            let (found, facts) = job.find(&for_scores(&self.inner)?, host)?;
+        let model = self.inner.clone();
+        let (of, page) = work(py, &call, move |job: &Report, host| {
+            let (found, facts) = job.find(&for_scores(&model)?, host)?;
             Ok((found, page(&facts)))
         })?;
         let (text, facts) = found(py, &of)?;

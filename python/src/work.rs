@@ -1,7 +1,6 @@
 //! Work of the library on behalf of Python: on a thread of its own, while the one that called sees to signals and progress.
 
-use std::io;
-use std::panic::resume_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,6 +19,9 @@ use crate::table::Table;
 
 /// So often Python is asked whether it was interrupted, and shown how far the work is.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(25);
+
+/// So many more times after it was interrupted.
+const LAST_LOOKS: u32 = 12;
 
 /// What the thread that works has for its stack: as much as one that Python begins with.
 const STACK: usize = 8 << 20;
@@ -91,11 +93,12 @@ impl Between {
     }
 }
 
-/// Does a job with the options of a call. Its warnings are raised as Python's.
-pub fn work<J: Job, R: Send>(
+/// Does a job with the options of a call. Its warnings are raised as Python's. Work that is to stop and does not in time is left behind: it
+/// ends where it next asks whether to go on.
+pub fn work<J: Job, R: Send + 'static>(
     py: Python<'_>,
     call: &Call,
-    work: impl FnOnce(&J, &dyn Watch) -> Result<R, Failure> + Send,
+    work: impl FnOnce(&J, &dyn Watch) -> Result<R, Failure> + Send + 'static,
 ) -> PyResult<R> {
     let between = Arc::new(Between::default());
     let asks = Arc::clone(&between);
@@ -112,42 +115,37 @@ pub fn work<J: Job, R: Send>(
     let asked = Asked { options, tables };
     let takes = Arc::clone(&between);
     let takes: ProgressListener = Arc::new(move |what, done, total| takes.take(what, done, total));
-    let host = Kept::with(Some(takes));
-    let job = || done(&asked, &host, work);
-    let listener = call.progress.as_ref();
-    let done = guarded(py, || {
-        py.detach(|| {
-            thread::scope(|scope| {
-                let (ended, end) = channel::<()>();
-                let worker =
-                    thread::Builder::new()
-                        .stack_size(STACK)
-                        .spawn_scoped(scope, move || {
-                            // Dropped when it is done, however it is.
-                            let _ended = ended;
-                            job()
-                        })?;
-                while end.recv_timeout(BETWEEN_LOOKS) == Err(RecvTimeoutError::Timeout) {
-                    between.look(listener);
-                }
-                let done = worker.join();
-                between.look(listener);
-                Ok::<_, io::Error>(match (done, between.go_on()) {
-                    (Ok(done), _) => Some(done),
-                    (Err(_), Err(_)) => None,
-                    (Err(panic), Ok(())) => resume_unwind(panic),
-                })
-            })
-        })
-    })??;
+    let job = move || {
+        let host = Kept::with(Some(takes));
+        let ended = done(&asked, &host, work);
+        (ended, host.remarks())
+    };
+    let (gives, given) = channel();
+    let begun = thread::Builder::new().stack_size(STACK).spawn(move || {
+        // Nobody takes it where nobody waits any more.
+        let _ = gives.send(catch_unwind(AssertUnwindSafe(job)));
+    });
+    begun?;
+    let (listener, looks) = (call.progress.as_ref(), Arc::clone(&between));
+    let done = py.detach(move || {
+        let mut looks_left = LAST_LOOKS;
+        loop {
+            let done = given.recv_timeout(BETWEEN_LOOKS);
+            looks.look(listener);
+            looks_left -= u32::from(looks.go_on().is_err());
+            match done {
+                Err(RecvTimeoutError::Timeout) if looks_left > 0 => {}
+                done => return done.ok(),
+            }
+        }
+    });
     if let Some(error) = locked(&between.stop).take() {
         return Err(error);
     }
-    warn(py, &host.remarks())?;
-    match done {
-        Some(result) => result.map_err(|failure| of_failure(py, &failure)),
-        None => Err(request(py, "stopped")),
-    }
+    let done = done.ok_or_else(|| request(py, "the work ended without a result"))?;
+    let (done, remarks) = guarded(py, || done.unwrap_or_else(|panic| resume_unwind(panic)))?;
+    warn(py, &remarks)?;
+    done.map_err(|failure| of_failure(py, &failure))
 }
 
 /// Raises warnings, and the note that times have no zone.

@@ -131,6 +131,16 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def with_a_node(fleet: Path) -> dict[str, object]:
+    """The graph of the fleet with a feature that is written in Python, in a module that is on no path of workers."""
+    import nodes_of_a_user as nodes
+
+    tree = athermal.Graph(fleet / "graph.toml").to_dict()
+    tree["nodes"]["mine"] = {"type": "python_feature", "python": nodes.Difference, "inputs": {"signal": "gradients"}, "parameters": {"factor": 0.5}}
+    tree["nodes"]["thermal"]["inputs"]["features"] = "mine"
+    return tree
+
+
 def check_fleet(fleet: Path, rows: list[dict[str, object]]) -> None:
     """The rows of a fitted fleet have the models of the command line, to the byte, and say why a machine has none."""
     assert sorted(row["machine"] for row in rows) == MACHINES

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DATE, check_fleet, run_blocks
+from conftest import DATE, check_fleet, parts, run_blocks, with_a_node
 
 import athermal
 import athermal._fleet
@@ -64,6 +64,19 @@ def test_the_models_are_those_of_the_command_line_although_a_worker_is_killed(fl
     assert Path(os.environ["KILLED_ONCE"]).exists(), "no worker was killed"
     check_fleet(fleet, found)
     assert list(athermal.dask.save(fitted, tmp_path / "models")) == ["m4"]
+
+
+def test_nodes_of_python_go_to_workers_that_cannot_import_them(fleet, client):
+    tree = with_a_node(fleet)
+    rows = dask.dataframe.read_parquet(str(fleet / "logs" / "machine=m1")).assign(machine="m1")
+    [fitted] = athermal.dask.fit(rows, athermal.Graph(tree), date=DATE).compute().to_dict("records")
+    assert fitted["error"] is None
+    assert parts(fitted["model"].decode()) == parts(athermal.Graph(tree).fit(fleet / "logs" / "machine=m1" / "log.parquet"))
+    # A graph, a model and an engine go there by themselves, too.
+    model = athermal.Model.from_json(fitted["model"].decode())
+    row = {"temperature.room": 20.0}
+    there = client.submit(lambda graph, model, engine: (graph.outputs, model.revision, engine.step(2, row)), model.graph, model, model.engine())
+    assert there.result() == (model.graph.outputs, model.revision, model.engine().step(2, row))
 
 
 def test_rows_without_a_machine_and_other_names_are_taken(fleet, client):

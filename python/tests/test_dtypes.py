@@ -66,6 +66,9 @@ VALUES = {
     "category of texts": (lambda pd: pd.Series(["1.5", None, "0", "1.5"]).astype("category"), [1.5, None, 0, 1.5]),
     "category of whole numbers": (lambda pd: pd.Series([1, None, 0, 1], dtype="Int64").astype("category"), [1, None, 0, 1]),
     "category of numbers": (lambda pd: pd.Series([1.5, None, 0, 1.5]).astype("category"), [1.5, None, 0, 1.5]),
+    # What is no number is unreadable, which is absent here; it is no figure in any unit.
+    "timedelta64": (lambda pd: pd.Series(pd.to_timedelta([1, None, 0, 3], unit="s")), [None] * 4),
+    "complex": (lambda pd: pd.Series([1 + 2j, 0, 0, 3]), [None] * 4),
     "sparse": (lambda pd: pd.Series([0.0, None, 0.0, 3.0], dtype=pd.SparseDtype("float64", 0.0)), [0, None, 0, 3]),
 }
 BERLIN = "Europe/Berlin"
@@ -173,7 +176,9 @@ def test_an_answer_has_the_times_that_the_frame_had(monkeypatch):
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
                     answer = model.predict(pandas.DataFrame({"at": column, "value": 1.0}))["at"]
-                assert answer.dtype == column.dtype and answer.tolist() == column.tolist(), (name, way)
+                # An offset has a class of its own in some versions.
+                assert answer.dtype == column.dtype or name == "of an offset", (name, way)
+                assert answer.tolist() == column.tolist() and str(answer[0]) == str(column[0]), (name, way)
 
 
 @pytest.mark.parametrize("name", OF_ARROW)

@@ -97,6 +97,22 @@ def test_another_process_reads_a_model_by_the_module_that_it_names(week, tmp_pat
     assert refused.returncode == 1 and "No module named 'nodes_of_a_user'" in refused.stderr
 
 
+def test_graphs_models_and_engines_are_pickled_with_their_nodes(week, tmp_path):
+    pytest.importorskip("cloudpickle")
+    model = graph_of(nodes.Difference, factor=0.5).fit(week)
+    engine = model.engine()
+    engine.step(1, {"temperature.room": 20.0})
+    (tmp_path / "all").write_bytes(pickle.dumps((model.graph, model, engine)))
+    program = (
+        "import pickle; graph, model, engine = pickle.load(open('all', 'rb'));"
+        "print(graph.outputs[-1], model.revision, engine.step(2, {'temperature.room': 22.0})['mine.room'])"
+    )
+    # The module of the node is not on the path.
+    path = str(Path(athermal.__file__).parents[1])
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, env={"PYTHONPATH": path, "PATH": ""}, capture_output=True, text=True)
+    assert done.stdout.split() == ["mine.room", model.revision, "1.0"], done.stderr
+
+
 def test_what_a_node_raises_is_raised_with_its_name(week):
     graph = graph_of(nodes.Failing)
     with pytest.raises(athermal.NodeError, match=r"node `mine` failed at .*: ZeroDivisionError: as a slip would") as error:

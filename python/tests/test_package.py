@@ -207,29 +207,153 @@ def test_other_threads_run_while_a_model_is_fitted(graph):
     assert longest < 0.5 * took, (longest, took)
 
 
+JOBS = {
+    "fit": "graph.fit([data] * 200)",
+    "predict": "model.predict([data] * 200)",
+    "evaluate": "athermal.evaluate(model, [data] * 200)",
+    "diagnose": "athermal.diagnose(model, [data] * 20)",
+    "report": "athermal.report(model, [data] * 40)",
+    "compare": "athermal.compare(graph, [data] * 200, data)",
+    "simulate": "athermal.simulate('die-tester', days=3000)",
+}
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_an_interrupt_ends_a_fit(tmp_path):
+def test_an_interrupt_ends_every_job_within_a_second(tmp_path):
     program = tmp_path / "long.py"
     program.write_text(
-        "import athermal, signal\n"
+        "import athermal, os, signal, sys, warnings\n"
+        "warnings.simplefilter('ignore')\n"
         # A shell that starts tests in the background has it ignored.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"graph = athermal.Graph({GRAPH!r})\n"
-        "data = athermal.simulate('die-tester', days=2)\n"
-        "print('ready', flush=True)\n"
-        "try:\n"
-        "    graph.fit([data] * 200)\n"
-        "except KeyboardInterrupt:\n"
-        "    print('interrupted', flush=True)\n"
+        "data = athermal.simulate('die-tester', days=1)\n"
+        "model = graph.fit(data)\n"
+        f"for job in {list(JOBS.values())!r}:\n"
+        "    print('ready', flush=True)\n"
+        "    try:\n"
+        "        eval(job)\n"
+        "        print('done', flush=True)\n"
+        "    except KeyboardInterrupt:\n"
+        "        print('interrupted', flush=True)\n"
+        # What was left behind is not waited for.
+        "os._exit(0)\n"
     )
     running = subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE, text=True)
-    assert running.stdout.readline() == "ready\n"
-    time.sleep(0.3)
-    running.send_signal(signal.SIGINT)
-    began = time.monotonic()
-    rest, _ = running.communicate(timeout=60)
-    assert rest == "interrupted\n" and running.returncode == 0
-    assert time.monotonic() - began < 10
+    for job in JOBS:
+        assert running.stdout.readline() == "ready\n"
+        time.sleep(0.3)
+        running.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        assert running.stdout.readline() == "interrupted\n", job
+        assert time.monotonic() - began < 1, job
+    assert running.wait(timeout=60) == 0
+
+
+def test_progress_comes_to_an_end_in_every_job(graph, model, week, capsys):
+    def jobs(progress):
+        yield lambda: graph.fit(week, progress=progress)
+        yield lambda: model.predict(week, progress=progress)
+        yield lambda: athermal.evaluate(model, week, progress=progress)
+        yield lambda: athermal.compare(graph, week, week, progress=progress)
+        yield lambda: athermal.simulate("die-tester", days=0.3, progress=progress)
+
+    seen = []
+    for job in jobs(lambda *event: seen.append(event)):
+        seen.clear()
+        job()
+        what, done, total = seen[-1]
+        assert what and done == total > 0, seen
+    for job in jobs(True):
+        job()
+        shown = capsys.readouterr().err
+        assert shown.startswith("\r") and shown.endswith("\n") and " of " not in shown.rpartition("\r")[2], shown
+
+    with pytest.raises(athermal.RequestError):
+        graph.fit([week] + [{**week.to_dict(), "room_degC": ["broken"] * len(week)}], progress=True)
+    shown = capsys.readouterr().err
+    assert not shown or shown.endswith("\n"), shown
+
+
+def test_what_is_no_model_graph_or_frame_is_refused_in_words(graph, model, week, tmp_path):
+    (tmp_path / "model.json").write_text(model.to_json())
+    path = str(tmp_path / "model.json")
+    refused = {
+        "athermal.Model.load": [
+            lambda: athermal.evaluate(path, week),
+            lambda: athermal.diagnose(None, week),
+            lambda: athermal.report(7, week),
+            lambda: athermal.plot(path, week),
+            lambda: athermal.Engine(path),
+        ],
+        "graph.fit": [lambda: athermal.evaluate(graph, week), lambda: athermal.report(graph, week), lambda: athermal.Engine(graph)],
+        "which is no graph": [
+            lambda: athermal.compare("graph.toml", week, week),
+            lambda: athermal.compare([graph, path], week, week),
+            lambda: athermal.compare({"a": model}, week, week),
+        ],
+        "no class or function": [lambda: athermal.feature("spread"), lambda: athermal.estimator(7)],
+        "there is no row": [lambda: week[10**6]],
+        "found": [lambda: model.predict({}), lambda: graph.fit({"a": [1.0]})],
+    }
+    for words, calls in refused.items():
+        for call in calls:
+            with pytest.raises(athermal.RequestError, match=words):
+                call()
+    empty = week[:0]
+    assert len(model.predict(empty)) == 0
+    pyarrow = pytest.importorskip("pyarrow")
+    batch = pyarrow.RecordBatch.from_arrays([pyarrow.array([], "f8") for _ in graph.columns], graph.columns)
+    answer = model.predict(batch)
+    assert isinstance(answer, pyarrow.RecordBatch) and answer.num_rows == 0
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("dask.dataframe")
+    for module, kind in [(athermal.dask, "Dask"), (athermal.spark, "Spark")]:
+        if kind == "Spark":
+            pytest.importorskip("pyspark")
+        for what in (None, pandas.DataFrame()):
+            with pytest.raises(athermal.RequestError, match=f"is no frame of {kind}"):
+                module.fit(what, graph)
+
+
+def test_options_are_named_arguments_with_types_and_words(graph, model):
+    import inspect
+
+    jobs = {
+        "fit": graph.fit,
+        "predict": model.predict,
+        "evaluate": athermal.evaluate,
+        "diagnose": athermal.diagnose,
+        "report": athermal.report,
+        "compare": athermal.compare,
+        "init": athermal.init,
+        "simulate": athermal.simulate,
+    }
+    for name, options in json.loads(athermal._athermal.options()).items():
+        signature = inspect.signature(jobs[name])
+        assert all(of.kind is not inspect.Parameter.VAR_KEYWORD and of.annotation for of in signature.parameters.values())
+        for option in set(options["properties"]) - {"data", "fault", "from"}:
+            assert option in signature.parameters, (name, option)
+            assert f"{option}:" in jobs[name].__doc__ or option in ("on", "time", "machine", "days", "seed"), (name, option)
+    assert "from_" in inspect.signature(graph.fit).parameters
+    # They do something.
+    some = athermal.simulate("die-tester", days=0.2)
+    assert len(model.predict(some, from_="3600", to="7200")) == 360
+
+
+def test_an_engine_is_pickled_as_its_snapshot(model, columns):
+    def row(nth):
+        return {name: of[nth] for name, of in columns.items() if name in model.graph.columns and name != "time_s"}
+
+    engine = model.engine()
+    for nth in range(200):
+        engine.step(nth * 10**10, row(nth))
+    again = pickle.loads(pickle.dumps(engine))
+    assert again.last_ns == engine.last_ns and again.outputs == engine.outputs
+    for nth in range(200, 260):
+        expected = engine.step(nth * 10**10, row(nth))
+        assert again.step(nth * 10**10, row(nth)) == expected
+    assert any(value is not None for value in expected.values())
 
 
 def test_what_cannot_be_fitted_says_why(graph):
@@ -243,3 +367,10 @@ def test_the_command_line_comes_with_the_package(tmp_path):
     assert run(tmp_path, "--version").split()[:2] == ["athermal", athermal.__version__]
     wrong = subprocess.run([sys.executable, "-m", "athermal", "fit"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2
+
+
+def test_the_script_of_a_user_runs(tmp_path):
+    from script_of_a_user import main
+
+    assert 0 < main(tmp_path) < 1
+    assert (tmp_path / "model.json").exists()

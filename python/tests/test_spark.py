@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DATE, MACHINES, check_fleet, run_blocks
+from conftest import DATE, MACHINES, check_fleet, parts, run_blocks, with_a_node
 
 import athermal
 import athermal._fleet
@@ -100,6 +100,14 @@ def test_the_models_are_those_of_the_command_line_although_an_executor_is_killed
     assert sorted(path.stem for path in models.iterdir()) == MACHINES[:3]
     command = [sys.executable, "-m", "athermal", "fleet", "report", str(models), "-o", str(tmp_path / "fleet.html")]
     subprocess.run(command, check=True, cwd=tmp_path)
+
+
+def test_nodes_of_python_go_to_executors_that_cannot_import_them(fleet, spark):
+    tree = with_a_node(fleet)
+    rows = spark.read.parquet(str(fleet / "logs" / "machine=m1")).withColumn("machine", functions.lit("m1"))
+    [row] = athermal.spark.fit(rows, athermal.Graph(tree), date=DATE, partitions=1).collect()
+    assert row.error is None
+    assert parts(bytes(row.model).decode()) == parts(athermal.Graph(tree).fit(fleet / "logs" / "machine=m1" / "log.parquet"))
 
 
 def test_a_time_of_another_name_and_type_and_a_machine_that_is_a_number_are_taken(fleet, spark):
