@@ -52,7 +52,8 @@ pub struct Engine {
     revision: OnceLock<Arc<str>>,
     slots: Slots,
     gathered: Vec<Gathered>,
-    histories: Vec<Option<History>>,
+    /// Few channels have one, so each stands by itself.
+    histories: Vec<Option<Box<History>>>,
     /// The slots that have a history of what they held.
     recorded: Vec<usize>,
     /// The planned channels, each with what it held before the tick.
@@ -105,7 +106,7 @@ impl Engine {
             histories: plan
                 .channels
                 .iter()
-                .map(|channel| channel.history.map(History::new))
+                .map(|channel| channel.history.map(|depth| Box::new(History::new(depth))))
                 .collect(),
             row: vec![
                 0.0;
@@ -299,7 +300,10 @@ impl Engine {
         });
         self.slots.clear();
         self.gathered.iter_mut().for_each(Gathered::clear);
-        self.histories.iter_mut().flatten().for_each(History::clear);
+        self.histories
+            .iter_mut()
+            .flatten()
+            .for_each(|of| of.clear());
         self.before_break = Some(self.last);
         self.last = Instant::MIN;
     }

@@ -128,7 +128,7 @@ impl Begin {
 
     /// Before the first file.
     pub(crate) fn nothing() -> Self {
-        let timeline = Timeline::new(0, 0, 0);
+        let timeline = Timeline::new(0, 0);
         Self::new(
             FeedNames::default(),
             String::new(),

@@ -41,7 +41,7 @@ fn waits() -> u64 {
 
 fn work(rows: usize) -> Work {
     let (model, folder) = (model(), Folder::new());
-    let timeline = Timeline::new(3, 1, 0);
+    let timeline = Timeline::new(3, 1);
     let begin = Begin::new(feed(&model), String::new(), (0, 0), false, &timeline);
     let options = JournalOptions {
         queue: 8 * rows,

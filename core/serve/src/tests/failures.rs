@@ -46,7 +46,7 @@ fn check_around_the_gap(line: Line, model: &Model, folder: &Path) {
         replay.timeline().last(),
         replay.timeline().stamps().to_vec(),
     );
-    let mut whole = Timeline::new(3, 1, 0);
+    let mut whole = Timeline::new(3, 1);
     records.iter().for_each(|record| record.apply(&mut whole));
     assert_eq!(last, (whole.last(), whole.stamps().to_vec()));
     assert!(replay.timeline().pending().eq(whole.pending()));
@@ -169,7 +169,7 @@ fn a_folder_that_cannot_be_written_is_reported_at_the_start() {
     let folder = Folder::new();
     let file = folder.0.join("file");
     fs::write(&file, "").unwrap();
-    let timeline = Timeline::new(3, 1, 0);
+    let timeline = Timeline::new(3, 1);
     let begin = Begin::new(feed(&model()), String::new(), (0, 0), false, &timeline);
     let error = Recorder::start(&file.join("journal"), begin, small()).unwrap_err();
     assert!(error.to_string().starts_with("cannot write "), "{error}");

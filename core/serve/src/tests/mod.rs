@@ -114,7 +114,7 @@ pub(crate) struct Line {
 
 impl Line {
     pub(crate) fn begin(model: &Model, folder: &Path, options: JournalOptions) -> Self {
-        let timeline = Timeline::new(3, 1, 0);
+        let timeline = Timeline::new(3, 1);
         let begin = Begin::new(feed(model), String::new(), (0, 0), false, &timeline);
         let mut sequencer = Sequencer::new(rules(), Moment::START);
         sequencer.connected(0, Moment::START);

@@ -109,7 +109,7 @@ impl Engine {
             extremes: sources().zip(self.extremes.iter().copied()).collect(),
             slots: channels().zip(slots).collect(),
             histories: histories
-                .filter_map(|(name, history)| Some((name, history?)))
+                .filter_map(|(name, history)| Some((name, *history?)))
                 .collect(),
             nodes: self.node_states(),
             blending: outputs

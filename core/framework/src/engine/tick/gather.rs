@@ -147,7 +147,7 @@ impl Gathered {
 
     /// Reads the slots as they stand now.
     #[inline]
-    pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
+    pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<Box<History>>], now: Instant) {
         match self.origin {
             Origin::SideBySide(first) => self.read_side_by_side(slots, first, now),
             Origin::Apart(_) => self.read_apart(slots, now),
@@ -238,7 +238,7 @@ impl Gathered {
     }
 
     #[inline(never)]
-    fn read_past(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
+    fn read_past(&mut self, slots: &Slots, histories: &[Option<Box<History>>], now: Instant) {
         let Origin::Past(past) = &mut self.origin else {
             return;
         };
@@ -351,7 +351,7 @@ impl AllPast {
         &mut self,
         values: &mut [f64],
         stamps: &mut [Instant],
-        histories: &[Option<History>],
+        histories: &[Option<Box<History>>],
         now: Instant,
         changed: bool,
     ) {

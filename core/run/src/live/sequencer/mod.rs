@@ -82,7 +82,7 @@ impl Sequencer {
     /// One that begins now.
     #[must_use]
     pub fn new(rules: Rules, now: Moment) -> Self {
-        let timeline = Timeline::new(rules.channels.len(), rules.sources.len(), rules.most);
+        let timeline = Timeline::new(rules.channels.len(), rules.sources.len());
         Self::resume(rules, timeline, now)
     }
 
@@ -100,7 +100,7 @@ impl Sequencer {
             clock
         };
         let last = timeline.last();
-        let mut arrivals = VecDeque::with_capacity(rules.most);
+        let mut arrivals = VecDeque::new();
         arrivals.extend(timeline.pending().map(|of| (now, of.stamp)));
         let stamps = timeline.stamps().iter().zip(&rules.channels);
         let newest = stamps.max_by_key(|(stamp, _)| **stamp);

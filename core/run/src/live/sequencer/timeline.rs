@@ -27,11 +27,11 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// That of so many channels and sources before the first sample, with room for so many samples.
+    /// That of so many channels and sources before the first sample.
     #[must_use]
-    pub fn new(channels: usize, sources: usize, room: usize) -> Self {
+    pub fn new(channels: usize, sources: usize) -> Self {
         Self {
-            pending: VecDeque::with_capacity(room),
+            pending: VecDeque::new(),
             stamps: vec![Instant::MIN; channels],
             last: Instant::MIN,
             offsets: vec![None; sources],

@@ -26,7 +26,7 @@ use std::array::from_fn;
 use pulp::Simd;
 use serde::{Deserialize, Serialize};
 
-use blocks::Blocks;
+use blocks::{Blocks, EACH};
 use lanes::{LANES, Lanes};
 use parts::{ABREAST, Least, Line, Weights};
 use rows::Rows;
@@ -193,7 +193,9 @@ impl RollingSlope {
         }
         let begun = self.rows.append(t_ns, y, LIMIT, oldest);
         self.maybe_cold |= begun;
-        self.blocks.add_newest(&self.rows, begun);
+        if self.blocks.add_newest(&self.rows, begun) {
+            self.windows.iter_mut().for_each(Window::seek);
+        }
         self.advance(t_ns);
         true
     }
@@ -225,6 +227,13 @@ impl RollingSlope {
                 let weights = &mut self.weights[index / ABREAST];
                 window.find_parts(index, rows, blocks, weights);
             }
+            if window.begins_closed {
+                if window.head >= window.summed_until {
+                    window.summed_until = blocks.sum_heads(rows, index, window.head, window.block);
+                }
+                let before = (window.summed_until - 1 - window.head) as usize;
+                window.parts.places[0] = index * EACH as usize + before;
+            }
         }
         let rows = &self.rows;
         let head_of = |index: usize| self.windows.get(index).map_or(0, |window| window.head);
@@ -251,11 +260,11 @@ impl RollingSlope {
         let (abreast, others) = windows.as_chunks::<ABREAST>();
         for (windows, weights) in abreast.iter().zip(&mut self.weights) {
             let heads = from_fn(|i| windows[i].parts.places[0]);
-            weights.weigh(heads, blocks.tails(), blocks.now(0));
+            weights.weigh(heads, blocks.heads(), blocks.now(0));
         }
         if let Some(weights) = self.weights.get_mut(abreast.len()) {
             let heads = from_fn(|i| others.get(i).map_or(0, |window| window.parts.places[0]));
-            weights.weigh(heads, blocks.tails(), blocks.now(0));
+            weights.weigh(heads, blocks.heads(), blocks.now(0));
         }
         let newest = windows.get(self.shortest);
         if newest.is_some_and(|window| window.head > blocks.current_start()) {

@@ -104,7 +104,7 @@ proptest! {
         rules.channels[3].late = ms(late);
         (rules.heartbeat, rules.most) = (Some(ms(beat)), most);
         let (ticks, log) = run(rules, &arrivals(&samples));
-        let mut timeline = Timeline::new(CHANNELS, 2, 0);
+        let mut timeline = Timeline::new(CHANNELS, 2);
         let mut again = Vec::new();
         let mut last = Instant::MIN;
         for decided in log {

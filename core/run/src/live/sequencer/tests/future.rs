@@ -287,7 +287,7 @@ fn what_waits_is_in_the_log_and_is_decided_on_after_a_restart() {
     world.comes(0, HOUR, 1_000);
     world.comes(0, HOUR + 1_000, 2_000);
     // As a log has it.
-    let mut timeline = Timeline::new(1, 1, 0);
+    let mut timeline = Timeline::new(1, 1);
     for decided in &world.decided {
         match decided {
             Decided::Sample(Admission::Accepted(sample)) => drop(timeline.accept(*sample)),

@@ -17,6 +17,9 @@ const REBASE_TIMES: u64 = 4;
 /// Rows from a channel's first sample on at which its origin is chosen each time, so that it is soon a good one.
 const SETTLING_ROWS: u64 = 5;
 
+/// Of a closed block the sums from each row on are kept so many rows apart; those between are added anew, which are fewer.
+pub(super) const EACH: u64 = 8;
+
 /// Sums over rows cut into blocks, the last of which is the current one.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
@@ -27,9 +30,14 @@ pub(super) struct Blocks {
     /// Rows until these are chosen anew when a block closes, and rows still to come at which they are chosen anew at once.
     until_rebase: u64,
     settling: u64,
-    /// By slot of a row of a closed block: the rows from it to the end of its block, about the time of the last.
-    /// Beyond the slots of rows there is an empty one.
+    /// Of closed blocks each eighth row from the end, at [`Blocks::place`]: the rows from it to the end of its block, about the time of
+    /// the last.
     tails: Table,
+    /// By closed block: all of its rows, about the time of the last.
+    wholes: Table,
+    /// By window, for as many rows as lie between two of [`tails`](Self::tails): the rows from it to the end of its closed block, about the
+    /// time of the last, the newest first; then an empty run.
+    heads: Table,
     /// By block: the closed blocks from it on, about the time of the first row of the current one. That of the current one is empty.
     rest: Table,
     /// The current block, about the time of its first row; then the window with number `i` as a whole, at `i + 1`, where it
@@ -47,6 +55,8 @@ impl Blocks {
             until_rebase: 0,
             settling: 0,
             tails: Table::new(channels, squares, 0),
+            wholes: Table::new(channels, squares, 1),
+            heads: Table::new(channels, squares, windows * EACH as usize + 1),
             rest: Table::new(channels, squares, 1),
             now: Table::new(channels, squares, 1 + windows),
             gaps: false,
@@ -118,6 +128,7 @@ impl Blocks {
     #[inline(always)]
     pub(super) fn close(&mut self, rows: &Rows, t_ns: i64, forgotten: usize) {
         self.starts.drain(..forgotten);
+        self.wholes.forget(forgotten);
         self.gaps &= rows.complete_from() > self.oldest();
         self.keep_times();
         if self.until_rebase == 0 {
@@ -128,20 +139,27 @@ impl Blocks {
             if let Some(closed) = self.starts.len().checked_sub(2) {
                 self.sum_tails(rows, closed);
             }
-            self.sum_rest(rows, t_ns);
+            self.sum_rest(t_ns);
         }
     }
 
     fn keep_times(&mut self) {
-        let tables = [&mut self.tails, &mut self.rest, &mut self.now];
+        let tables = [
+            &mut self.tails,
+            &mut self.wholes,
+            &mut self.heads,
+            &mut self.rest,
+            &mut self.now,
+        ];
         for table in tables {
             table.keep_times(self.gaps);
         }
     }
 
-    /// Adds the row that was just appended to the current block; `begun` if it holds a channel's first sample.
+    /// Adds the row that was just appended to the current block; `begun` if it holds a channel's first sample. Says whether all sums were
+    /// computed anew.
     #[inline(always)]
-    pub(super) fn add_newest(&mut self, rows: &Rows, begun: bool) {
+    pub(super) fn add_newest(&mut self, rows: &Rows, begun: bool) -> bool {
         let row = rows.next() - 1;
         self.until_rebase = self.until_rebase.saturating_sub(1);
         if begun {
@@ -160,13 +178,33 @@ impl Blocks {
         }
         if settles || first_gap {
             self.rebuild(rows, 0);
-        } else {
-            if row == self.current_start() {
-                self.now.clear(0, rows.time(row));
-            }
-            let (t_ns, samples) = (rows.time(row), rows.samples(row));
-            self.now.add_row(0, t_ns, samples, &self.origins);
+            return true;
         }
+        if row == self.current_start() {
+            self.now.clear(0, rows.time(row));
+        }
+        self.now.add(0, rows, row..row + 1, &self.origins);
+        false
+    }
+
+    /// Sums the rows of a closed block from each on that a window may soon begin with, `head` the first of them; says which one ends them,
+    /// where sums are kept. A row that lies `n` before it has its sums at `n − 1` behind the first slot of the window.
+    #[inline(always)]
+    pub(super) fn sum_heads(&mut self, rows: &Rows, window: usize, head: u64, block: usize) -> u64 {
+        let end = self.starts[block + 1];
+        let kept = end - (end - head - 1) / EACH * EACH;
+        let place = self.place(kept);
+        let before = (kept < end).then_some((&self.tails, place));
+        let slot = window * EACH as usize;
+        let about = (rows.time(end - 1), &*self.origins);
+        self.heads.sum_each(slot, before, rows, head..kept, about);
+        kept
+    }
+
+    /// Where the sums from a row on are, which is an eighth one of its block.
+    #[inline]
+    fn place(&self, row: u64) -> usize {
+        (row / EACH) as usize & (self.tails.slots() - 1)
     }
 
     /// Sums all rows of a window that begins within the current block: at most [`FEWEST_ROWS`]. Says where the sums are.
@@ -178,26 +216,26 @@ impl Blocks {
     fn sum_now(&mut self, rows: &Rows, slot: usize, first: u64) {
         self.now.clear(slot, rows.time(first));
         for row in first..rows.next() {
-            let (t_ns, samples) = (rows.time(row), rows.samples(row));
-            self.now.add_row(slot, t_ns, samples, &self.origins);
+            self.now.add(slot, rows, row..row + 1, &self.origins);
         }
     }
 
     /// Computes all sums anew, with the same bits; `t_ns` is the time of the next row, if the current block is still empty.
     pub(super) fn rebuild(&mut self, rows: &Rows, t_ns: i64) {
-        if self.tails.slots() != rows.capacity() + 1 {
-            self.tails.resize(rows.capacity() + 1);
+        let slots = (rows.capacity() / EACH as usize + 1).next_power_of_two();
+        if self.tails.slots() != slots {
+            self.tails.resize(slots);
         }
-        self.tails.clear(rows.capacity(), 0);
+        self.heads.clear(self.heads.slots() - 1, 0);
         for block in 0..self.starts.len() - 1 {
             self.sum_tails(rows, block);
         }
         let start = self.current_start();
         if start < rows.next() {
-            self.sum_rest(rows, rows.time(start));
+            self.sum_rest(rows.time(start));
             self.sum_now(rows, 0, start);
         } else {
-            self.sum_rest(rows, t_ns);
+            self.sum_rest(t_ns);
         }
     }
 
@@ -212,8 +250,9 @@ impl Blocks {
         self.starts.extend_from_slice(starts);
         // Whoever appends from here on must not have to make room.
         self.starts.reserve(self.starts.len() + SPARE_BLOCKS);
-        self.rest
-            .resize((2 * self.starts.len() + SPARE_BLOCKS).next_power_of_two());
+        for table in [&mut self.rest, &mut self.wholes] {
+            table.resize(self.starts.len() + SPARE_BLOCKS);
+        }
         self.origins.as_flattened_mut()[..origins.len()].copy_from_slice(origins);
         self.gaps = rows.complete_from() > self.oldest();
         self.keep_times();
@@ -224,18 +263,34 @@ impl Blocks {
     /// Newest row first: whatever an older row of the block holds is not in the sums of the later ones.
     #[inline(always)]
     fn sum_tails(&mut self, rows: &Rows, block: usize) {
-        let numbers = self.starts[block]..self.starts[block + 1];
-        self.tails.sum_tails(rows, numbers, &self.origins);
+        if block >= self.wholes.slots() {
+            self.wholes.resize(block + block / 4 + 1);
+        }
+        let (start, mut end) = (self.starts[block], self.starts[block + 1]);
+        let mut last = None;
+        while end - start >= EACH {
+            let (row, place) = (end - EACH, self.place(end - EACH));
+            match last {
+                None => self.tails.clear(place, rows.time(end - 1)),
+                Some(last) => self.tails.repeat(place, last),
+            }
+            self.tails.add(place, rows, row..end, &self.origins);
+            (end, last) = (row, Some(place));
+        }
+        match last {
+            None => self.wholes.clear(block, rows.time(end - 1)),
+            Some(last) => self.wholes.set(block, &self.tails, last),
+        }
+        self.wholes.add(block, rows, start..end, &self.origins);
     }
 
     #[inline(always)]
-    fn sum_rest(&mut self, rows: &Rows, origin: i64) {
+    fn sum_rest(&mut self, origin: i64) {
         let current = self.starts.len() - 1;
         if current >= self.rest.slots() {
-            self.rest.resize((current + 1).next_power_of_two());
+            self.rest.resize(current + current / 4 + 1);
         }
-        let firsts = self.starts[..current].iter().map(|start| rows.slot(*start));
-        self.rest.sum_from_end(origin, &self.tails, firsts);
+        self.rest.sum_from_end(origin, &self.wholes, current);
     }
 
     /// The origin of a channel is the median of its newest samples, up to five in the last block's worth of rows, so that it is near them and
@@ -262,26 +317,24 @@ impl Blocks {
         }
     }
 
-    /// Of a window that begins with row `head` of block `block`: where the sums over the closed blocks after that one are, what all
+    /// Of a window that begins in block `block`: where the sums over the closed blocks after that one are, what all
     /// channels have in common of them, and [`by`](super::parts::Parts::by).
-    pub(super) fn rest_of(&self, rows: &Rows, head: u64, block: usize) -> (usize, &Common, f64) {
+    pub(super) fn rest_of(&self, block: usize) -> (usize, &Common, f64) {
         let current = self.starts.len() - 1;
         let place = current.min(block + 1);
         let rest = &self.rest.common[place];
         let by = match block < current {
-            true => self.tails.common[rows.slot(head)]
-                .origin
-                .wrapping_sub(rest.origin),
+            true => self.wholes.common[block].origin.wrapping_sub(rest.origin),
             false => 0,
         };
         // Both lie within a window.
         (place, rest, by as f64)
     }
 
-    /// By slot of a row, what all channels have in common of it and the later ones of its block, which is closed.
+    /// What all channels have in common of the rows with which windows begin.
     #[inline]
-    pub(super) fn tails(&self) -> &[Common] {
-        &self.tails.common
+    pub(super) fn heads(&self) -> &[Common] {
+        &self.heads.common
     }
 
     /// What all channels have in common of the current block, or of a window within it.
@@ -293,6 +346,6 @@ impl Blocks {
     /// The sums of a group of channels within closed blocks, over them and of the current one.
     #[inline]
     pub(super) fn groups(&self, group: usize) -> [&Group; 3] {
-        [&self.tails, &self.rest, &self.now].map(|table| &table.groups[group])
+        [&self.heads, &self.rest, &self.now].map(|table| &table.groups[group])
     }
 }

@@ -47,10 +47,10 @@ impl Weights {
         self.rest.set(i, &rest.rows);
     }
 
-    /// Finds the weights of windows that end with the current block and whose first parts lie at these places of `tails`.
+    /// Finds the weights of windows that end with the current block and whose first parts lie at these places of `heads`.
     #[inline(always)]
-    pub(super) fn weigh(&mut self, places: [usize; ABREAST], tails: &[Common], now: &Common) {
-        let heads = places.map(|place| &tails[place].rows);
+    pub(super) fn weigh(&mut self, places: [usize; ABREAST], heads: &[Common], now: &Common) {
+        let heads = places.map(|place| &heads[place].rows);
         let head = Times {
             n: heads.map(|head| head.n[0]),
             t: heads.map(|head| head.t[0]),

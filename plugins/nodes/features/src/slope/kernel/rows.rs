@@ -3,15 +3,18 @@
 
 use super::lanes::{LANES, Lanes, group_count};
 
-/// Rows in a ring whose length is a power of two, counted from the last reset.
+/// Rows in a ring, counted from the last reset.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     channels: usize,
     groups: usize,
     time: Vec<i64>,
     samples: Vec<Lanes>,
-    /// Nanoseconds from each row to the channel's next sample, 0 where it has one, infinite where none has come yet.
+    /// Nanoseconds from each row to the channel's next sample, 0 where it has one, infinite where none has come yet. Has room from the first
+    /// gap on.
     wait: Vec<Lanes>,
+    /// The row in slot 0, the first or the newest that was there, and the number of the next one.
+    base: u64,
     next: u64,
     /// Time of the last row.
     last: Option<i64>,
@@ -27,7 +30,12 @@ pub(super) struct Rows {
     latest_first: Option<i64>,
 }
 
+/// Rows that there is room for from the beginning, and pieces in which there becomes more of it.
 const INITIAL_CAPACITY: usize = 64;
+const PIECE: usize = 32;
+
+/// Who has not waited.
+const AT_ONCE: &Lanes = &[0.0; LANES];
 
 impl Rows {
     pub(super) fn new(channels: usize, wide_ns: i64) -> Rows {
@@ -37,7 +45,8 @@ impl Rows {
             groups,
             time: vec![0; INITIAL_CAPACITY],
             samples: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
-            wait: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
+            wait: Vec::new(),
+            base: 0,
             next: 0,
             last: None,
             complete_from: 0,
@@ -50,7 +59,7 @@ impl Rows {
     }
 
     pub(super) fn reset(&mut self) {
-        self.next = 0;
+        (self.base, self.next) = (0, 0);
         self.last = None;
         self.complete_from = 0;
         self.even_from = 0;
@@ -71,7 +80,11 @@ impl Rows {
 
     #[inline]
     pub(super) fn slot(&self, row: u64) -> usize {
-        row as usize & (self.time.len() - 1)
+        let beyond = row.wrapping_sub(self.base);
+        let behind = row
+            .wrapping_add(self.time.len() as u64)
+            .wrapping_sub(self.base);
+        (if row >= self.base { beyond } else { behind }) as usize
     }
 
     #[inline]
@@ -112,7 +125,8 @@ impl Rows {
     /// Nanoseconds from a row to the next sample of each channel of a group.
     #[inline]
     pub(super) fn wait(&self, row: u64, group: usize) -> &Lanes {
-        &self.wait[self.slot(row) * self.groups + group]
+        let place = self.slot(row) * self.groups + group;
+        self.wait.get(place).unwrap_or(AT_ONCE)
     }
 
     /// Nanoseconds since each channel's newest sample.
@@ -159,26 +173,27 @@ impl Rows {
         true
     }
 
-    /// Makes room for twice the rows that there are, so that whoever appends to restored rows need not.
-    pub(super) fn make_room(&mut self) {
-        while (self.time.len() as u64) < 2 * self.next {
+    /// Makes room for a quarter more rows than there are, and some more, so that whoever appends to restored rows need not.
+    pub(super) fn make_room(&mut self, more: u64) {
+        while (self.time.len() as u64) < self.next + self.next / 4 + more {
             self.grow(0);
         }
     }
 
+    /// By an eighth, and at least a piece: windows hold about as many rows at all times.
     fn grow(&mut self, oldest: u64) {
-        let old = self.time.len();
-        let width = self.groups;
-        self.time.resize(2 * old, 0);
-        self.samples.resize(2 * old * width, [0.0; LANES]);
-        self.wait.resize(2 * old * width, [0.0; LANES]);
-        for row in oldest..self.next {
-            let (from, to) = (row as usize & (old - 1), self.slot(row));
-            self.time[to] = self.time[from];
-            let groups = from * width..(from + 1) * width;
-            self.samples.copy_within(groups.clone(), to * width);
-            self.wait.copy_within(groups, to * width);
+        let first = self.slot(oldest);
+        let slots = self.time.len() + (self.time.len() / 8).next_multiple_of(PIECE);
+        let places = slots * self.groups;
+        self.time.rotate_left(first);
+        self.time.resize(slots, 0);
+        self.samples.rotate_left(first * self.groups);
+        self.samples.resize(places, [0.0; LANES]);
+        if !self.wait.is_empty() {
+            self.wait.rotate_left(first * self.groups);
+            self.wait.resize(places, [0.0; LANES]);
         }
+        self.base = oldest;
     }
 
     /// Appends a row where room has been made; `y` is one sample per channel, absent where it ends early or is `limit` or more.
@@ -188,6 +203,9 @@ impl Rows {
         let passed = self.last_time().map_or(0, |last| t_ns.saturating_sub(last));
         if passed > self.wide_ns {
             self.even_from = self.next;
+        }
+        if self.next - self.base == self.time.len() as u64 {
+            self.base = self.next;
         }
         let slot = self.slot(self.next);
         self.time[slot] = t_ns;
@@ -208,7 +226,11 @@ impl Rows {
             absent |= kept.is_nan();
         }
         missing.fill(f64::NAN);
-        self.wait[places].fill([0.0; LANES]);
+        if !self.wait.is_empty() {
+            self.wait[places].fill([0.0; LANES]);
+        } else if absent {
+            self.wait.resize(self.samples.len(), [0.0; LANES]);
+        }
         // Where this row and the last are complete nobody is silent or awaited.
         let begun = (absent || self.complete_from == self.next) && {
             self.follow_silence(passed as f64);
@@ -237,21 +259,25 @@ impl Rows {
         let mut begun = false;
         let width = LANES * self.groups;
         let (slot, t_ns) = (self.slot(self.next), self.time(self.next));
-        let mask = self.time.len() - 1;
-        let wait = self.wait.as_flattened_mut();
-        for (channel, first) in self.first.iter_mut().enumerate() {
+        for channel in 0..self.channels {
             let place = slot * width + channel;
             if self.samples.as_flattened()[place].is_nan() {
-                wait[place] = f64::INFINITY;
+                self.wait.as_flattened_mut()[place] = f64::INFINITY;
                 continue;
             }
-            if first.is_none() {
-                *first = Some(t_ns);
+            if self.first[channel].is_none() {
+                self.first[channel] = Some(t_ns);
                 begun = true;
             }
             for row in (oldest..self.next).rev() {
-                let earlier = row as usize & mask;
-                let wait = &mut wait[earlier * width + channel];
+                let earlier = self.slot(row);
+                let Some(wait) = self
+                    .wait
+                    .as_flattened_mut()
+                    .get_mut(earlier * width + channel)
+                else {
+                    break;
+                };
                 if *wait != f64::INFINITY {
                     break;
                 }

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, LIMIT, NoValue, RollingSlope};
+use super::{Coverage, LIMIT, MOST_ROWS, NoValue, RollingSlope};
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -105,7 +105,7 @@ impl TryFrom<Saved> for RollingSlope {
             kernel.rows.reserve(0);
             kernel.rows.append(t_ns, &samples, LIMIT, 0);
         }
-        kernel.rows.make_room();
+        kernel.rows.make_room(MOST_ROWS);
         let rows = &mut kernel.rows;
         rows.set_first_and_newest(&saved.first_ns, &saved.newest_ns);
         let (cuts, origins) = (&saved.cuts, &saved.origins);

@@ -3,7 +3,7 @@
 //!
 //! Times are nanoseconds after the run's origin, values lie about an origin that is the same for all runs. Nothing is
 //! ever subtracted from a sum: a sample leaves by not being in the runs that remain.
-//! While no sample is missing, count and times are the same for all channels: sums of them per channel are kept only on demand.
+//! While no sample is missing, count and times are the same for all channels: sums of them per channel have room from the first gap on.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -204,8 +204,12 @@ impl Table {
 
     /// From now on sums of time are kept per channel or not; runs must be computed anew when this is switched on.
     pub(super) fn keep_times(&mut self, keep: bool) {
+        let slots = self.slots();
         for group in &mut self.groups {
             group.keeps_times = keep;
+            if keep {
+                group.times.resize(slots, TimesOfLanes(Times::NONE));
+            }
         }
     }
 
@@ -214,9 +218,27 @@ impl Table {
         self.common.resize(slots, Common::NONE);
         for group in &mut self.groups {
             group.values.resize(slots, Values::NONE);
-            group.times.resize(slots, TimesOfLanes(Times::NONE));
+            // Once there was a gap, a later one must not have to make room.
+            if !group.times.is_empty() {
+                group.times.resize(slots, TimesOfLanes(Times::NONE));
+            }
             if group.keeps_squares {
                 group.squares.resize(slots, [0.0; LANES]);
+            }
+        }
+    }
+
+    /// Forgets the first runs.
+    pub(super) fn forget(&mut self, first: usize) {
+        let first = first.min(self.slots());
+        self.common.copy_within(first.., 0);
+        for group in &mut self.groups {
+            group.values.copy_within(first.., 0);
+            if group.keeps_times {
+                group.times.copy_within(first.., 0);
+            }
+            if group.keeps_squares {
+                group.squares.copy_within(first.., 0);
             }
         }
     }
@@ -229,56 +251,82 @@ impl Table {
         };
         for group in &mut self.groups {
             group.values[slot] = Values::NONE;
-            group.times[slot] = TimesOfLanes(Times::NONE);
+            if group.keeps_times {
+                group.times[slot] = TimesOfLanes(Times::NONE);
+            }
             if group.keeps_squares {
                 group.squares[slot] = [0.0; LANES];
             }
         }
     }
 
-    /// Adds a row to a run: its time, its samples less the origins of the channels.
+    /// Adds rows to a run, the last one first: their times, and their samples less the origins of the channels.
     #[inline(always)]
-    pub(super) fn add_row(&mut self, slot: usize, t_ns: i64, row: &[Lanes], origins: &[Lanes]) {
+    pub(super) fn add(&mut self, slot: usize, rows: &Rows, numbers: Range<u64>, origins: &[Lanes]) {
         let common = &mut self.common[slot];
-        let t = common.add_time(t_ns);
-        let samples = row.iter().zip(origins);
-        for (group, (y, origin)) in self.groups.iter_mut().zip(samples) {
-            group.values[slot] = group.values[slot].plus(&Values::of(t, y, origin));
+        for row in numbers.clone().rev() {
+            common.add_time(rows.time(row));
+        }
+        let origin = common.origin;
+        for (index, (group, about)) in self.groups.iter_mut().zip(origins).enumerate() {
+            let samples = numbers.clone().rev().map(|row| {
+                let t = rows.time(row).wrapping_sub(origin) as f64;
+                (t, rows.sample(row, index))
+            });
+            let mut values = group.values[slot];
+            for (t, y) in samples.clone() {
+                values = values.plus(&Values::of(t, y, about));
+            }
+            group.values[slot] = values;
             if group.keeps_squares {
-                let squares = squares(y, origin);
-                let run = &mut group.squares[slot];
-                *run = from_fn(|i| run[i] + squares[i]);
+                let mut sum = group.squares[slot];
+                for (_, y) in samples.clone() {
+                    let squares = squares(y, about);
+                    sum = from_fn(|i| sum[i] + squares[i]);
+                }
+                group.squares[slot] = sum;
             }
             if group.keeps_times {
-                group.times[slot].0 = group.times[slot].0.plus(&Times::of(t, y));
+                let mut times = group.times[slot].0;
+                for (t, y) in samples {
+                    times = times.plus(&Times::of(t, y));
+                }
+                group.times[slot].0 = times;
             }
         }
     }
 
-    /// Sets the run of each of these rows to the rows from it on, about the time of the last.
+    /// Sets runs from a slot on to the sums from each row on, the last one first, and of what comes behind: a run of another table, or
+    /// nothing, about an origin.
     #[inline(always)]
-    pub(super) fn sum_tails(&mut self, rows: &Rows, numbers: Range<u64>, origins: &[Lanes]) {
-        let origin = rows.time(numbers.end - 1);
-        let mut common = Common {
-            origin,
-            ..Common::NONE
-        };
-        for row in numbers.clone().rev() {
+    pub(super) fn sum_each(
+        &mut self,
+        slot: usize,
+        behind: Option<(&Table, usize)>,
+        rows: &Rows,
+        numbers: Range<u64>,
+        (origin, origins): (i64, &[Lanes]),
+    ) {
+        let mut common = behind.map_or(Common::NONE, |(table, run)| table.common[run]);
+        common.origin = origin;
+        let slots = slot..;
+        for (slot, row) in slots.clone().zip(numbers.clone().rev()) {
             common.add_time(rows.time(row));
-            self.common[rows.slot(row)] = common;
+            self.common[slot] = common;
         }
         for (index, (group, about)) in self.groups.iter_mut().zip(origins).enumerate() {
-            let samples = numbers.clone().rev().map(|row| {
+            let behind = behind.map(|(table, run)| (&table.groups[index], run));
+            let samples = slots.clone().zip(numbers.clone().rev()).map(|(slot, row)| {
                 let t = rows.time(row).wrapping_sub(origin) as f64;
-                (rows.slot(row), t, rows.sample(row, index))
+                (slot, t, rows.sample(row, index))
             });
-            let mut values = Values::NONE;
+            let mut values = behind.map_or(Values::NONE, |(group, run)| group.values[run]);
             for (slot, t, y) in samples.clone() {
                 values = values.plus(&Values::of(t, y, about));
                 group.values[slot] = values;
             }
             if group.keeps_squares {
-                let mut sum = [0.0; LANES];
+                let mut sum = behind.map_or([0.0; LANES], |(group, run)| group.squares[run]);
                 for (slot, _, y) in samples.clone() {
                     let squares = squares(y, about);
                     sum = from_fn(|i| sum[i] + squares[i]);
@@ -286,7 +334,7 @@ impl Table {
                 }
             }
             if group.keeps_times {
-                let mut times = Times::NONE;
+                let mut times = behind.map_or(Times::NONE, |(group, run)| group.times[run].0);
                 for (slot, t, y) in samples {
                     times = times.plus(&Times::of(t, y));
                     group.times[slot].0 = times;
@@ -295,40 +343,65 @@ impl Table {
         }
     }
 
-    /// Sets runs 0 on to the sums of the runs of another table from the one with the same place in `slots` on, about an origin;
-    /// the run after them is an empty one.
+    /// Sets a run to one of another table.
     #[inline(always)]
-    pub(super) fn sum_from_end(
-        &mut self,
-        origin: i64,
-        table: &Table,
-        slots: impl DoubleEndedIterator<Item = usize> + ExactSizeIterator + Clone,
-    ) {
-        self.clear(slots.len(), origin);
+    pub(super) fn set(&mut self, slot: usize, other: &Table, from: usize) {
+        self.common[slot] = other.common[from];
+        for (group, other) in self.groups.iter_mut().zip(&other.groups) {
+            group.values[slot] = other.values[from];
+            if group.keeps_times {
+                group.times[slot] = other.times[from];
+            }
+            if group.keeps_squares {
+                group.squares[slot] = other.squares[from];
+            }
+        }
+    }
+
+    /// Sets a run to another one.
+    #[inline(always)]
+    pub(super) fn repeat(&mut self, slot: usize, from: usize) {
+        self.common[slot] = self.common[from];
+        for group in &mut self.groups {
+            group.values[slot] = group.values[from];
+            if group.keeps_times {
+                group.times[slot] = group.times[from];
+            }
+            if group.keeps_squares {
+                group.squares[slot] = group.squares[from];
+            }
+        }
+    }
+
+    /// Sets the first runs to the sums of as many of another table from the one at the same place on, about an origin; the run after
+    /// them is an empty one.
+    #[inline(always)]
+    pub(super) fn sum_from_end(&mut self, origin: i64, table: &Table, runs: usize) {
+        self.clear(runs, origin);
         let by = |slot: usize| table.common[slot].origin.wrapping_sub(origin) as f64;
         let mut rows = Times::NONE;
-        for (to, slot) in slots.clone().enumerate().rev() {
+        for slot in (0..runs).rev() {
             rows = rows.plus(&table.common[slot].rows.shifted(&[by(slot)]));
-            self.common[to] = Common { origin, rows };
+            self.common[slot] = Common { origin, rows };
         }
         for (group, other) in self.groups.iter_mut().zip(&table.groups) {
             let mut values = Values::NONE;
-            for (to, slot) in slots.clone().enumerate().rev() {
+            for slot in (0..runs).rev() {
                 values = values.plus(&other.values[slot].shifted(by(slot)));
-                group.values[to] = values;
+                group.values[slot] = values;
             }
             if group.keeps_squares {
                 let mut sum = [0.0; LANES];
-                for (to, slot) in slots.clone().enumerate().rev() {
+                for slot in (0..runs).rev() {
                     sum = from_fn(|i| sum[i] + other.squares[slot][i]);
-                    group.squares[to] = sum;
+                    group.squares[slot] = sum;
                 }
             }
             if group.keeps_times {
                 let mut times = Times::NONE;
-                for (to, slot) in slots.clone().enumerate().rev() {
+                for slot in (0..runs).rev() {
                     times = times.plus(&other.times[slot].0.shifted(&[by(slot); LANES]));
-                    group.times[to].0 = times;
+                    group.times[slot].0 = times;
                 }
             }
         }

@@ -22,6 +22,10 @@ pub(super) struct Window {
     pub(super) parts: Parts,
     /// From this oldest row on the parts are to be found anew.
     pub(super) parts_until: u64,
+    /// Whether it begins in a closed block, the sums of which are then its first part.
+    pub(super) begins_closed: bool,
+    /// Up to this oldest row its first parts are summed.
+    pub(super) summed_until: u64,
     pub(super) kind: Kind,
 }
 
@@ -47,6 +51,8 @@ impl Window {
             block: 0,
             parts: Parts::NONE,
             parts_until: 0,
+            begins_closed: false,
+            summed_until: 0,
             kind: Kind::Absent,
         }
     }
@@ -68,28 +74,25 @@ impl Window {
     pub(super) fn advance_to_next(&mut self, rows: &Rows, t_ns: i64) {
         let next = rows.next();
         let time = |row: u64| if row < next { rows.time(row) } else { t_ns };
-        self.advance(rows, t_ns, time);
+        self.advance(t_ns, time);
     }
 
     /// The same where the row at `t_ns` is the last one.
     #[inline(always)]
     pub(super) fn advance_to_last(&mut self, rows: &Rows, t_ns: i64) {
-        self.advance(rows, t_ns, |row| rows.time(row));
+        self.advance(t_ns, |row| rows.time(row));
     }
 
     /// Drops the rows that are outside at `t_ns`, given the times of rows. Where the oldest leaves, the new one is taken to lie in
     /// the same block; if it does not, the parts are to be found anew.
     #[inline(always)]
-    fn advance(&mut self, rows: &Rows, t_ns: i64, time: impl Fn(u64) -> i64) {
+    fn advance(&mut self, t_ns: i64, time: impl Fn(u64) -> i64) {
         // Without a sign no two instants are too far apart.
         let width = self.width_ns as u64;
         let leaves = |t: i64| t_ns.wrapping_sub(t) as u64 >= width;
-        if leaves(self.head_ns) {
-            while leaves(self.head_ns) {
-                self.head += 1;
-                self.head_ns = time(self.head);
-            }
-            self.parts.places[0] = rows.slot(self.head);
+        while leaves(self.head_ns) {
+            self.head += 1;
+            self.head_ns = time(self.head);
         }
     }
 
@@ -105,15 +108,16 @@ impl Window {
     ) {
         self.block = blocks.find(self.head, self.block);
         let current = blocks.current_start();
-        let (place, rest, by) = blocks.rest_of(rows, self.head, self.block);
+        let (place, rest, by) = blocks.rest_of(self.block);
         weights.set_rest(index % ABREAST, rest, by);
         self.parts = Parts {
-            places: [rows.capacity(), place, 0],
+            places: [blocks.heads().len() - 1, place, 0],
             by,
         };
+        (self.begins_closed, self.summed_until) = (false, 0);
         self.parts_until = match self.head.cmp(&current) {
             Ordering::Less => {
-                self.parts.places[0] = rows.slot(self.head);
+                self.begins_closed = true;
                 blocks.starts()[self.block + 1]
             }
             Ordering::Equal => current + 1,
