@@ -26,4 +26,5 @@ mod starter_graphs;
 mod state_space;
 mod streaming;
 mod uncertainty;
+mod unlike_machines;
 mod watches;

@@ -10,7 +10,7 @@
 //! | [`found`] | which files are of which machine |
 //! | [`pool`] | how jobs are given to processes, and what happens when one dies |
 //! | [`manifest`] | what a folder of models remembers, so that a fit is resumed |
-//! | [`figure`], [`unlike`] | how a machine stands beside the others |
+//! | [`figure`], [`spread`], [`unlike`] | how a machine stands beside the others |
 //! | `commands` | `athermal fleet` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -28,6 +28,7 @@ pub mod manifest;
 mod once;
 pub mod page;
 pub mod pool;
+pub mod spread;
 pub mod unlike;
 mod worker;
 

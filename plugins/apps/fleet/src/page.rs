@@ -238,8 +238,8 @@ fn unlike(html: &mut String, facts: &Facts<'_>) {
     let limit = number(comparison.limit);
     let _ = write!(
         html,
-        "<p class=\"muted\">Coefficients, errors and the ranges of sensors over the rows of the fit: {} of each machine. The score is the distance from the median of the fleet \
-         over 1.4826 times the median absolute deviation (Iglewicz &amp; Hoaglin 1993). A fleet of machines that are all alike has one beyond {limit} in one of twenty cases.</p>",
+        "<p class=\"muted\">Coefficients, errors and the ranges of sensors over the rows of the fit: {} of each machine. The score is the distance from what the fleet has in common, \
+         in standard deviations: how far machines differ, and how sure the value is. Of a hundred machines that are as they should be about one is beyond {limit}.</p>",
         counted(comparison.traits as u64, "trait")
     );
     let _ = write!(

@@ -4,22 +4,18 @@ use std::collections::BTreeMap;
 
 use athermal_analysis::chart::{Chart, Layer, Mark};
 use athermal_analysis::figures::number;
-use athermal_numerics::{median, robust_deviation};
+use athermal_core::node::Figure;
+use athermal_estimators::input_of;
 use athermal_run::model::Model;
 use serde::{Serialize, Serializer};
+
+use crate::spread::{Fleet, Measured, moderated, student_quantile, usual_error};
 
 /// Of fewer machines no spread is known.
 pub const FEWEST: usize = 5;
 
-/// The chance that a fleet of machines that are all alike has one that is named.
-const CHANCE: f64 = 0.05;
-
-/// How well the median absolute deviation knows the spread of normal values, beside the standard deviation: 0.368 (Rousseeuw & Croux
-/// 1993, "Alternatives to the Median Absolute Deviation", JASA 88, table 2).
-const EFFICIENCY: f64 = 0.368;
-
-/// Below so many medians a spread is one of rounding alone.
-const ROUNDING: f64 = 1e-9;
+/// The share of machines that are named although they are as they should be.
+pub const RATE: f64 = 0.01;
 
 /// What machines are compared by.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -89,14 +85,22 @@ impl Serialize for Trait {
     }
 }
 
-/// What a machine is compared by, with its values.
-pub type Traits = BTreeMap<Trait, f64>;
+/// What a machine is compared by, each with its value.
+pub type Traits = BTreeMap<Trait, Measured>;
 
-/// Those of a model: of its coefficients and its card.
+/// Those of a model: of its coefficients and its card. A response is as sure as the jackknife of the fit says, else as theory says of its
+/// coefficients as if they knew nothing of each other.
 #[must_use]
 pub fn traits_of(model: &Model) -> Traits {
     let mut all = Traits::new();
+    let cards = || model.card.iter().flat_map(|card| &card.estimators);
+    let figure =
+        |node: &str, name: &str| cards().find(|of| of.node == node)?.report.figures.get(name);
     for estimator in model.estimators() {
+        let errors = match figure(&estimator.node, "input_errors") {
+            Some(Figure::Named(errors)) => Some(errors),
+            _ => None,
+        };
         let coefficients = estimator.parts.iter().flat_map(|of| &of.coefficients);
         for of in coefficients {
             // Products and polynomials have no part that is one input's alone.
@@ -104,38 +108,41 @@ pub fn traits_of(model: &Model) -> Traits {
                 continue;
             };
             let per = of.per.as_deref().unwrap_or("1");
-            let to = without_span(&factor.regressor);
+            let to = input_of(&factor.regressor);
             let key = Trait::Response {
                 of: estimator.node.clone(),
                 to: to.to_owned(),
                 unit: format!("{} per {per}", estimator.unit),
             };
-            *all.entry(key).or_default() += of.value;
+            let sum = all.entry(key).or_insert(Measured::exactly(0.0));
+            sum.value += of.value;
+            sum.error = match errors.and_then(|errors| errors.get(to)) {
+                Some(error) => error.0,
+                None => sum.error.hypot(of.standard_error.unwrap_or(0.0)),
+            };
         }
     }
-    let Some(card) = &model.card else {
-        return all;
-    };
-    for of in &card.estimators {
+    for of in cards() {
         if let Some(rmse) = of.report.in_sample_rmse.filter(|rmse| *rmse > 0.0) {
-            let (of, unit) = (of.node.clone(), of.unit.clone());
-            all.insert(Trait::Error { of, unit }, libm::log(rmse));
+            let error = match of.report.figures.get("log_rmse_error") {
+                Some(Figure::Number(error)) => error.0,
+                _ => 0.0,
+            };
+            let (node, unit) = (of.node.clone(), of.unit.clone());
+            let value = libm::log(rmse);
+            all.insert(Trait::Error { of: node, unit }, Measured { value, error });
         }
     }
-    for range in &card.ranges {
+    for range in model.card.iter().flat_map(|card| &card.ranges) {
         let (low, high) = (range.lowest, range.highest);
-        all.insert(Trait::Middle(range.channel.clone()), 0.5 * (low + high));
+        let middle = Measured::exactly(0.5 * (low + high));
+        all.insert(Trait::Middle(range.channel.clone()), middle);
         if high > low {
-            all.insert(Trait::Width(range.channel.clone()), libm::log(high - low));
+            let width = Measured::exactly(libm::log(high - low));
+            all.insert(Trait::Width(range.channel.clone()), width);
         }
     }
     all
-}
-
-/// The name of a regressor without its window or lag.
-fn without_span(name: &str) -> &str {
-    let name = name.split(" lag ").next().unwrap_or(name);
-    name.split('@').next().unwrap_or(name)
 }
 
 /// One value of one machine beside those of the others.
@@ -146,9 +153,9 @@ pub struct Departure {
     pub of: Trait,
     /// The value, as words.
     pub value: String,
-    /// The median of the fleet, as words.
+    /// What the fleet has in common, as words.
     pub fleet: String,
-    /// The modified z-score.
+    /// How many standard deviations these are apart.
     pub score: f64,
 }
 
@@ -199,6 +206,8 @@ impl Member {
 pub struct Comparison {
     /// Scores beyond this are named.
     pub limit: f64,
+    /// So many machines would be named if all were as they should be.
+    pub expected: f64,
     /// How many traits were compared.
     pub traits: usize,
     /// The machines, the one that is most unlike the others first.
@@ -207,134 +216,115 @@ pub struct Comparison {
 
 /// Compares machines trait by trait.
 ///
-/// The score is the modified z-score of Iglewicz & Hoaglin (1993, "How to Detect and Handle Outliers", section 3): the distance from the
-/// median over `1.4826 · MAD`, the median absolute deviation as that of normal values (Hampel 1974). It is beyond the [`limit`] by chance
-/// in one of twenty fleets. What half of the machines or more have in common has no spread, and is not compared. An input that an
-/// estimator did not choose has a response of 0.
+/// The score of a value is its distance from what the fleet has in common, over the root of three variances: of a machine's true value about
+/// that, of the machine's own value by its standard error, and of what the fleet has in common. The first is found beside the second, and
+/// from machines that are not far off. Responses that have the same sign in all machines, by twice their standard errors, are compared by
+/// their logarithms, since parameters of machines differ by factors. An input that an estimator did not choose has no response.
+///
+/// A machine is named by its largest score. The limit is one that a machine exceeds by chance in [`RATE`] of cases: by Student's t and
+/// Bonferroni's share for so many traits, or by the largest scores of the machines of this very fleet, where these are larger: their
+/// logarithms have a mean and a spread too.
 #[must_use]
 pub fn compare(fleet: &BTreeMap<String, Traits>) -> Comparison {
     let mut keys: Vec<&Trait> = fleet.values().flat_map(BTreeMap::keys).collect();
     keys.sort();
     keys.dedup();
+    let of_all = keys.iter().map(|key| Some((*key, Beside::of(key, fleet)?)));
+    let found: Vec<(&Trait, Beside)> = of_all.flatten().collect();
+    let chance = RATE / (2 * found.len()).max(1) as f64;
+    let usual = student_quantile(chance, (fleet.len() as f64 - 1.0).max(1.0));
     let mut members: Vec<Member> = fleet
-        .keys()
-        .map(|machine| Member {
-            machine: machine.clone(),
-            unlike: false,
-            departures: Vec::new(),
+        .iter()
+        .map(|(machine, traits)| {
+            let departures = found.iter().filter_map(|(key, beside)| {
+                let value = *traits.get(key)?;
+                // A spread that fewer machines tell is less sure.
+                let surety = usual / student_quantile(chance, beside.fleet.freedom);
+                Some(Departure {
+                    of: (*key).clone(),
+                    value: key.shown(value.value),
+                    fleet: key.shown(beside.centre()),
+                    score: surety * beside.score(value),
+                })
+            });
+            let mut departures: Vec<Departure> = departures.collect();
+            departures.sort_by(|one, other| other.score.abs().total_cmp(&one.score.abs()));
+            Member {
+                machine: machine.clone(),
+                unlike: false,
+                departures,
+            }
         })
         .collect();
-    let mut judged = 0;
-    for key in keys {
-        let value = |traits: &Traits| match (traits.get(key), key) {
-            (None, Trait::Response { .. }) => Some(0.0),
-            (found, _) => found.copied(),
-        };
-        let values: Vec<Option<f64>> = fleet.values().map(value).collect();
-        let Some((centre, deviation)) = middle(values.iter().flatten().copied()) else {
-            continue;
-        };
-        judged += 1;
-        for (member, value) in members.iter_mut().zip(values) {
-            if let Some(value) = value {
-                member.departures.push(Departure {
-                    of: key.clone(),
-                    value: key.shown(value),
-                    fleet: key.shown(centre),
-                    score: (value - centre) / deviation,
-                });
-            }
-        }
-    }
-    let limit = limit(fleet.len(), judged);
+    members.sort_by(|one, other| other.largest().total_cmp(&one.largest()));
+    let largest: Vec<Measured> = members
+        .iter()
+        .filter(|of| of.largest() > 0.0)
+        .map(|of| Measured {
+            value: libm::log(of.largest()),
+            error: 0.0,
+        })
+        .collect();
+    let of_fleet = Fleet::of(&largest, FEWEST).map_or(0.0, |of| libm::exp(of.exceeded(RATE)));
+    let limit = usual.max(of_fleet);
     for member in &mut members {
-        let by = |one: &Departure, other: &Departure| other.score.abs().total_cmp(&one.score.abs());
-        member.departures.sort_by(by);
         member.unlike = member.largest() > limit;
     }
-    members.sort_by(|one, other| other.largest().total_cmp(&one.largest()));
     Comparison {
         limit,
-        traits: judged,
+        expected: RATE * fleet.len() as f64,
+        traits: found.len(),
         machines: members,
     }
 }
 
-/// The median of values and their robust deviation; none where they are too few, or have no spread.
-fn middle(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    if values.len() < FEWEST {
-        return None;
-    }
-    let centre = median(&mut values)?;
-    let mut sizes: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
-    let deviation = robust_deviation(&mut sizes)?;
-    (deviation > ROUNDING * centre.abs()).then_some((centre, deviation))
+/// One trait of all machines.
+struct Beside {
+    fleet: Fleet,
+    /// The sign of values that are compared by the logarithms of their sizes.
+    by_size: Option<f64>,
+    /// By how much the variance of its errors is the fleet's.
+    usual: Option<f64>,
 }
 
-/// The score that all of so many machines and traits stay within, but for one fleet in twenty: the quantile of Student's t by
-/// Bonferroni's share of that chance, and at least the 3.5 of Iglewicz & Hoaglin. It has as many degrees of freedom as a standard
-/// deviation would need to know the spread as well as the MAD of so many machines does.
-#[must_use]
-pub fn limit(machines: usize, traits: usize) -> f64 {
-    let looks = (machines * traits).max(1) as f64;
-    let freedom = (EFFICIENCY * (machines as f64 - 1.0)).max(1.0);
-    student_quantile(CHANCE / (2.0 * looks), freedom).max(3.5)
-}
-
-/// The value that Student's t exceeds with this chance, by halving an interval.
-fn student_quantile(chance: f64, freedom: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
-    while student_tail(high, freedom) > chance && high < 1e9 {
-        high *= 2.0;
-    }
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        match student_tail(middle, freedom) > chance {
-            true => low = middle,
-            false => high = middle,
+impl Beside {
+    /// None of a trait that few machines have, or in which they do not differ.
+    fn of(key: &Trait, fleet: &BTreeMap<String, Traits>) -> Option<Self> {
+        let all = fleet.values().filter_map(|traits| traits.get(key));
+        let mut all: Vec<Measured> = all.copied().collect();
+        let usual = usual_error(&all);
+        let sign = all.first()?.value.signum();
+        let is_sure = |of: &Measured| sign * of.value > 2.0 * of.error;
+        let is_response = matches!(key, Trait::Response { .. });
+        let by_size = (is_response && all.iter().all(is_sure)).then_some(sign);
+        for of in &mut all {
+            *of = scaled(moderated(*of, usual), by_size);
         }
+        let fleet = Fleet::of(&all, FEWEST)?;
+        Some(Self {
+            fleet,
+            by_size,
+            usual,
+        })
     }
-    high
+
+    fn score(&self, of: Measured) -> f64 {
+        self.fleet
+            .score(scaled(moderated(of, self.usual), self.by_size))
+    }
+
+    /// What the fleet has in common, as a value is.
+    fn centre(&self) -> f64 {
+        let centre = self.fleet.centre;
+        self.by_size.map_or(centre, |sign| sign * libm::exp(centre))
+    }
 }
 
-/// The chance that Student's t is larger than t > 0: half the regularised incomplete beta function of ν / (ν + t²) with ν/2 and 1/2
-/// (Abramowitz & Stegun 26.7.1, 26.5.27).
-fn student_tail(t: f64, freedom: f64) -> f64 {
-    let x = freedom / (freedom + t * t);
-    let (a, b) = (0.5 * freedom, 0.5);
-    // The continued fraction converges fast below this; above it stands for the rest.
-    match x < (a + 1.0) / (a + b + 2.0) {
-        true => 0.5 * incomplete_beta(x, a, b),
-        false => 0.5 * (1.0 - incomplete_beta(1.0 - x, b, a)),
-    }
-}
-
-/// The regularised incomplete beta function by its continued fraction (Abramowitz & Stegun 26.5.8), from the front as Lentz does
-/// (Press et al. 2007, "Numerical Recipes", section 6.4).
-fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
-    const TINY: f64 = 1e-300;
-    let kept = |value: f64| if value.abs() < TINY { TINY } else { value };
-    let front = libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b);
-    let front = libm::exp(front + a * libm::log(x) + b * libm::log1p(-x)) / a;
-    let mut c = 1.0;
-    let mut d = 1.0 / kept(1.0 - (a + b) * x / (a + 1.0));
-    let mut fraction = d;
-    for m in 1..500 {
-        let m = f64::from(m);
-        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
-        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
-        let before = fraction;
-        for term in [even, odd] {
-            d = 1.0 / kept(1.0 + term * d);
-            c = kept(1.0 + term / c);
-            fraction *= c * d;
-        }
-        if (fraction / before - 1.0).abs() < 1e-14 {
-            break;
-        }
-    }
-    front * fraction
+fn scaled(of: Measured, by_size: Option<f64>) -> Measured {
+    by_size.map_or(of, |sign| Measured {
+        value: libm::log(sign * of.value),
+        error: of.error / of.value.abs(),
+    })
 }
 
 /// Scores of all machines as a picture: a column of dots for each, the one that is most unlike the others first.
@@ -390,88 +380,84 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn the_tail_of_students_t_is_that_of_published_tables() {
-        // Abramowitz & Stegun, table 26.10: t of one-sided chances 0.05, 0.005 and 0.0005.
-        let table = [
-            (1.0, [6.314, 63.657, 636.619]),
-            (5.0, [2.015, 4.032, 6.869]),
-            (30.0, [1.697, 2.750, 3.646]),
-        ];
-        for (freedom, quantiles) in table {
-            for (chance, expected) in [0.05, 0.005, 0.0005].into_iter().zip(quantiles) {
-                let found = student_quantile(chance, freedom);
-                assert!(
-                    (found - expected).abs() < 6e-4,
-                    "{freedom} {chance}: {found}"
-                );
-            }
-        }
-    }
-
-    fn alike(machines: usize, traits: usize, seed: u64) -> BTreeMap<String, Traits> {
+    /// Machines whose traits differ by a factor `exp(spread · n)`, or by the errors of their values alone.
+    fn alike(machines: usize, traits: usize, seed: u64, spread: f64) -> BTreeMap<String, Traits> {
         let mut random = Prng::stream(seed, "machines that are alike");
+        let mut measured = |nth: usize| {
+            let error = 0.02 * (1.0 + nth as f64 % 3.0);
+            let value = libm::exp(spread * random.normal()) + error * random.normal();
+            Measured { value, error }
+        };
         let fleet = (0..machines).map(|nth| {
-            let traits = (0..traits).map(|nth| (Trait::Middle(nth.to_string()), random.normal()));
+            let traits = (0..traits).map(|nth| (response(&nth.to_string()), measured(nth)));
             (format!("m{nth:03}"), traits.collect())
         });
         fleet.collect()
     }
 
+    fn response(to: &str) -> Trait {
+        let (of, to, unit) = ("e".to_owned(), to.to_owned(), String::new());
+        Trait::Response { of, to, unit }
+    }
+
     #[test]
-    fn machines_that_are_alike_are_seldom_named_in_fleets_of_any_size() {
-        for machines in [5, 8, 12, 40, 200] {
-            let fleets = 60;
-            let named = (0..fleets).filter(|seed| {
-                let comparison = compare(&alike(machines, 20, *seed));
-                comparison.machines[0].unlike
-            });
-            let share = named.count() as f64 / fleets as f64;
-            assert!(share < 0.15, "{machines} machines: {share}");
+    fn of_a_hundred_machines_that_are_as_they_should_be_about_one_is_named_in_fleets_of_any_size_and_spread()
+     {
+        for spread in [0.0, 0.3] {
+            for machines in [5, 12, 60] {
+                let fleets = 600 / machines;
+                let named = (0..fleets).map(|seed| {
+                    let comparison = compare(&alike(machines, 12, seed as u64, spread));
+                    comparison.machines.iter().filter(|of| of.unlike).count()
+                });
+                let share = named.sum::<usize>() as f64 / (fleets * machines) as f64;
+                assert!(share < 0.02, "{machines} machines of {spread}: {share}");
+            }
         }
     }
 
     #[test]
     fn a_machine_that_is_unlike_the_others_is_named_with_what_differs() {
-        let mut fleet = alike(20, 10, 1);
-        let key = Trait::Middle("3".to_owned());
-        fleet.get_mut("m007").unwrap().insert(key.clone(), -25.0);
+        let mut fleet = alike(20, 10, 1, 0.1);
+        let mut set = |to: &str, value: f64, error: f64| {
+            let machine = fleet.get_mut("m007").unwrap();
+            machine.insert(response(to), Measured { value, error });
+        };
+        // The one is sure, the other is nothing that its rows know.
+        set("3", 2.0, 0.02);
+        set("4", 2.0, 5.0);
         let comparison = compare(&fleet);
         let unlike: Vec<_> = comparison.machines.iter().filter(|of| of.unlike).collect();
         assert_eq!(unlike.len(), 1);
         assert_eq!(unlike[0].machine, "m007");
         let beyond: Vec<_> = unlike[0].beyond(comparison.limit).collect();
-        assert_eq!((beyond.len(), &beyond[0].of), (1, &key));
-        assert!(beyond[0].score < -15.0);
+        assert_eq!((beyond.len(), &beyond[0].of), (1, &response("3")));
+        assert!((comparison.expected - 0.2).abs() < 1e-12);
     }
 
     #[test]
-    fn what_most_machines_have_in_common_is_not_compared() {
+    fn what_few_machines_have_is_not_compared_and_what_a_selection_left_out_is_no_response() {
         let mut fleet = BTreeMap::new();
         for nth in 0..20 {
-            let key = |to: &str| Trait::Response {
-                of: "e".to_owned(),
-                to: to.to_owned(),
-                unit: String::new(),
-            };
-            // The first was chosen by one machine alone, the second by all.
-            let mut traits = Traits::from([(key("all"), 1.0 + f64::from(nth))]);
+            let value = Measured::exactly(1.0 + f64::from(nth));
+            let mut traits = Traits::from([
+                (response("all"), value),
+                (response("same"), Measured::exactly(2.0)),
+            ]);
             if nth == 4 {
-                traits.insert(key("one"), 5.0);
+                traits.insert(response("one"), Measured::exactly(5.0));
+            }
+            // Half of the machines were fitted without it.
+            if nth % 2 == 0 {
+                traits.insert(
+                    response("half"),
+                    Measured::exactly(9.0 + 0.1 * f64::from(nth)),
+                );
             }
             fleet.insert(format!("m{nth}"), traits);
         }
         let comparison = compare(&fleet);
-        assert_eq!(comparison.traits, 1);
-        assert!(!comparison.machines[0].unlike);
-    }
-
-    #[test]
-    fn windows_and_lags_are_no_part_of_the_name_of_an_input() {
-        let names = ["gradients.room@150s", "drift.Z1 lag 5min", "room"];
-        assert_eq!(
-            names.map(without_span),
-            ["gradients.room", "drift.Z1", "room"]
-        );
+        assert_eq!(comparison.traits, 2);
+        assert!(!comparison.machines[0].unlike, "{comparison:?}");
     }
 }

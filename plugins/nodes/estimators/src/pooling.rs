@@ -16,7 +16,7 @@ use athermal_numerics::{
     Standardization, logarithmic_grid, pool,
 };
 
-use crate::prior::{EstimatorPrior, Prior, PriorRegressor};
+use crate::prior::{EstimatorPrior, Prior, PriorNoise, PriorRegressor};
 
 /// The kinds whose coefficients can be pooled, where their solver is ridge.
 const KINDS: [&str; 3] = ["linear", "ar", "arx"];
@@ -258,6 +258,7 @@ impl Pool {
                     .collect(),
                 coefficients: prior,
                 novelty: novelty(&part),
+                noise: PriorNoise::of(&noises(&rows, self.alpha)),
             }
         });
         (fit, prior)
@@ -283,6 +284,17 @@ fn without_prior(machines: &[MachineRows], alpha: f64) -> f64 {
         }
     }
     (log / tests).exp()
+}
+
+/// The variances of what machines' own fits leave.
+fn noises(machines: &[MachineRows], alpha: f64) -> Vec<f64> {
+    let of = machines.iter().filter_map(|MachineRows { total, .. }| {
+        let columns: Vec<usize> = (0..total.width()).collect();
+        let scales = Standardization::of(total).scales;
+        let fit = LeastSquares::ridge(alpha).solve(total, &columns, &scales, None);
+        Some(fit.ok()?.residual_sum_of_squares / total.weight())
+    });
+    of.filter(|of| *of > 0.0).collect()
 }
 
 /// The sum of the squared errors of a model of all columns.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use athermal_core::node::{Mistake, Regressor, TrainingReport};
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
-use athermal_numerics::{CoefficientPrior, Novelty, NumericsError, Pull};
+use athermal_numerics::{CoefficientPrior, Novelty, NumericsError, PredictionVariance, Pull};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The format that this version writes.
@@ -48,6 +48,35 @@ pub struct EstimatorPrior {
     /// How far regressors are from those that machines of the fleet had.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub novelty: Option<Novelty>,
+    /// What the machines' own fits leave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<PriorNoise>,
+}
+
+/// What fits of machines to all of their own rows leave.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorNoise {
+    /// The mean of its variance, in squares of the truth's unit.
+    pub variance: f64,
+    /// How many independent rows of a machine of its own would know its variance as well, above 0.
+    pub freedom: f64,
+}
+
+impl PriorNoise {
+    /// Of the variances of machines. These differ as those of so many rows would, of which the logarithm has the variance `2 / freedom`.
+    pub(crate) fn of(variances: &[f64]) -> Option<Self> {
+        let count = variances.len() as f64;
+        let mean = |of: &dyn Fn(&f64) -> f64| variances.iter().map(of).sum::<f64>() / count;
+        let middle = mean(&|of| of.ln());
+        let apart = mean(&|of| (of.ln() - middle).powi(2)) * count / (count - 1.0);
+        let variance = mean(&|of| *of);
+        let is_known = count > 1.0 && variance > 0.0 && apart.is_finite();
+        is_known.then(|| Self {
+            variance,
+            freedom: (2.0 / apart).clamp(1.0, 1e3),
+        })
+    }
 }
 
 /// A regressor of a prior.
@@ -81,6 +110,7 @@ pub(crate) struct Met {
     penalty: f64,
     machines: usize,
     novelty: Option<Novelty>,
+    noise: Option<PriorNoise>,
 }
 
 /// What an estimator is made for.
@@ -201,6 +231,10 @@ impl Prior {
             penalty: prior.penalty * truth_factor * truth_factor,
             machines: prior.machines,
             novelty: prior.novelty.clone().filter(|_| is_same && in_its_units),
+            noise: prior.noise.map(|of| PriorNoise {
+                variance: of.variance * truth_factor * truth_factor,
+                ..of
+            }),
         })
     }
 }
@@ -221,6 +255,13 @@ impl EstimatorPrior {
                 "has the penalty {}, which must be above 0",
                 self.penalty
             ));
+        }
+        let is_wrong =
+            |of: &PriorNoise| !(of.variance > 0.0 && of.freedom > 0.0 && of.freedom.is_finite());
+        if self.noise.as_ref().is_some_and(is_wrong) {
+            return Some(
+                "has a noise that is none: both of its numbers must be above 0".to_owned(),
+            );
         }
         match coefficients.check() {
             Ok(()) => None,
@@ -255,6 +296,31 @@ impl Met {
         self.novelty.clone().filter(|_| all)
     }
 
+    /// How far predictions may be off, of a fit to so many rows. What is left beside a prediction is as much as the fleet's machines leave on
+    /// weeks of rows, as far as these few do not know it better: as many of them say as much as one as the penalty is above that. The
+    /// coefficients are as sure as their posterior is, of which the noise is the penalty. How much is left is not sure itself, so errors have
+    /// Student's t, and the variance is that of normal errors whose middle nine tenths reach as far.
+    pub(crate) fn variance(
+        &self,
+        of: PredictionVariance,
+        pull: Pull,
+        rows: u64,
+    ) -> PredictionVariance {
+        let (noise, wider) = self.noise.map_or((of.noise, 1.0), |fleet| {
+            let own = rows as f64 * (fleet.variance / self.penalty).min(1.0);
+            let freedom = fleet.freedom + own;
+            let noise = (fleet.freedom * fleet.variance + own * of.noise) / freedom;
+            (noise, student_over_normal(freedom))
+        });
+        let share = pull.penalty / noise;
+        PredictionVariance {
+            noise: noise * wider * wider,
+            rows: ((of.rows as f64 / share) as u64).max(1),
+            root: of.root.iter().map(|w| w * share.sqrt()).collect(),
+            ..of
+        }
+    }
+
     /// What there is to tell of it.
     pub(crate) fn tell(
         &self,
@@ -283,6 +349,13 @@ impl Met {
             ));
         }
     }
+}
+
+/// How much farther the middle nine tenths of Student's t reach than those of a normal variable (Abramowitz and Stegun 26.7.5).
+fn student_over_normal(freedom: f64) -> f64 {
+    let z2 = 1.644_854_f64.powi(2);
+    let second = (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / 96.0;
+    1.0 + (z2 + 1.0) / (4.0 * freedom) + second / (freedom * freedom)
 }
 
 #[cfg(test)]
@@ -319,6 +392,10 @@ mod tests {
                 covariance: vec![4.0, 0.0, 1.0, 0.5, 0.25, 2.0],
             },
             novelty: None,
+            noise: Some(PriorNoise {
+                variance: 30.0,
+                freedom: 12.0,
+            }),
         };
         Prior::new(BTreeMap::from([("thermal".to_owned(), estimator)]))
     }
@@ -376,6 +453,37 @@ mod tests {
             wrong(&[regressor("c", "mK/min")], "nm/min"),
             "the prior of `thermal` knows none of the node's regressors: it has `a` …, and the node `c` …"
         );
+    }
+
+    #[test]
+    fn the_noise_of_the_fleet_counts_beside_that_of_few_rows_and_the_posterior_is_that_of_the_penalty()
+     {
+        let met = met(
+            &[regressor("a", "mK/min"), regressor("b", "mK/min")],
+            "nm/min",
+        )
+        .unwrap();
+        let of = PredictionVariance {
+            noise: 3.0,
+            rows: 200,
+            centre: vec![0.0; 2],
+            root: vec![0.1, 0.0, 0.2],
+        };
+        let found = met.variance(of.clone(), met.pull(1.0, 1.0), 20);
+        // 20 rows say as much as 20 · 30 / 50.
+        let noise = (12.0 * 30.0 + 12.0 * 3.0) / 24.0;
+        // Abramowitz and Stegun, table 26.10: t of 24 degrees of freedom and a chance of 0.05 is 1.711.
+        let wider = student_over_normal(24.0);
+        assert!((1.645 * wider - 1.711).abs() < 1e-3, "{wider}");
+        let wider = wider * wider;
+        assert!((found.noise - noise * wider).abs() < 1e-12, "{found:?}");
+        let beyond = found.at(&[1.0, 1.0]) - found.at(&[0.0, 0.0]);
+        let expected = 50.0 * (0.01 + 0.04) * wider;
+        assert!((beyond - expected).abs() < 1e-12, "{beyond}");
+        assert_eq!(found.rows, 66);
+        // Of machines whose logarithms differ by 0.4 the variance is known as of twelve rows.
+        let of = PriorNoise::of(&[-0.4_f64, 0.4, 0.0, -0.4, 0.4, 0.0].map(f64::exp)).unwrap();
+        assert!((of.freedom - 2.0 / 0.128).abs() < 1e-9, "{of:?}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ use athermal_numerics::{
 use serde::{Deserialize, Serialize};
 
 use crate::conditioning::name_columns;
+use crate::jackknife;
 use crate::lag_order::LagOrder;
 use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 use crate::online::{Frame, OnlinePredictor, Recursion};
@@ -39,6 +40,7 @@ pub(crate) struct LinearTrainer {
 /// A fit of the chosen columns, and what it stands on.
 pub(crate) struct Found {
     pub(crate) names: Vec<String>,
+    alpha: f64,
     pub(crate) gram: Gram,
     pub(crate) standard: Standardization,
     pub(crate) squares: LeastSquares,
@@ -142,6 +144,7 @@ impl LinearTrainer {
             .collect();
         Ok(Found {
             names,
+            alpha,
             gram,
             standard,
             squares,
@@ -175,7 +178,10 @@ impl LinearTrainer {
         // What is said of how least squares were solved is not of this fit.
         fit.method = Method::Cholesky;
         prior.tell(pull, &self.regressors, &fit.columns, report);
-        Ok(Some((solved.variance, prior.novelty(&fit.columns))))
+        let variance = solved
+            .variance
+            .map(|of| prior.variance(of, pull, gram.count()));
+        Ok(Some((variance, prior.novelty(&fit.columns))))
     }
 
     /// The range of some of the regressors, where it was kept.
@@ -198,15 +204,24 @@ impl LinearTrainer {
         &self,
         report: &mut TrainingReport,
     ) -> Result<LinearPredictor, TrainingError> {
-        self.fitted(report).map(|(model, _)| model)
+        self.fitted(report, false).map(|(model, _)| model)
     }
 
     /// The fitted model, and the same as one that goes on learning, where it is to.
     fn fitted(
         &self,
         report: &mut TrainingReport,
+        tells_errors: bool,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
         let mut found = self.find(report)?;
+        if tells_errors && !matches!(self.solver, Solver::Sgd { .. }) {
+            jackknife::tell(
+                &self.blocks,
+                &found.names,
+                |gram| self.again(&found, gram),
+                report,
+            );
+        }
         if let Some((variance, novelty)) = found.of_prior.take() {
             let model = LinearPredictor {
                 variance,
@@ -247,6 +262,18 @@ impl LinearTrainer {
                 self.descend(SgdOptions { alpha, rate }, epochs, (found, novelty), report)
             }
         }
+    }
+
+    /// Coefficients and the sum of the squared residuals of a fit of the same columns to other rows.
+    fn again(&self, found: &Found, gram: &Gram) -> Option<(Vec<f64>, f64)> {
+        let (columns, scales) = (&found.fit.columns, &found.standard.scales);
+        if let (Some(Ok(prior)), Some((_, weight))) = (&self.prior, self.solver.prior()) {
+            let (known, pull) = (prior.columns(columns), prior.pull(weight, found.alpha));
+            let fit = prior.coefficients.fit(gram, &known, scales, pull).ok()?;
+            return Some((fit.coefficients, fit.residual_sum_of_squares));
+        }
+        let fit = found.squares.solve(gram, columns, scales, None).ok()?;
+        Some((fit.coefficients, fit.residual_sum_of_squares))
     }
 
     /// Stochastic gradients on standardised regressors and centred truths, given on the scale of the data.
@@ -360,7 +387,7 @@ impl Trainer for LinearTrainer {
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let predictor: Box<dyn Predictor> = match self.fitted(&mut report)? {
+        let predictor: Box<dyn Predictor> = match self.fitted(&mut report, true)? {
             (_, Some(online)) => Box::new(online),
             (model, None) => Box::new(model),
         };

@@ -14,9 +14,9 @@ use crate::unlike::{Comparison, FEWEST, compare, picture, traits_of};
 /// Show the machines that are unlike the others
 ///
 /// The models of a folder are compared by their coefficients, by their errors on the rows of the fit, and by the range of
-/// each sensor in these rows. A loose sensor or a worn part shows in them. The score of a value is its distance from the
-/// median of the fleet over 1.4826 times the median absolute deviation (Iglewicz & Hoaglin 1993). A fleet of machines that
-/// are all alike has one beyond the limit in one of twenty cases. The exit status is 1 where a machine is beyond it.
+/// each sensor in these rows. A loose sensor or a worn part shows in them. The score of a value is its distance from what the
+/// fleet has in common, in standard deviations: how far machines differ, and how sure the value is. Of a hundred machines
+/// that are as they should be about one is beyond the limit. The exit status is 1 where a machine is beyond it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fleet compare models\n  athermal fleet compare models --plot unlike.svg"
@@ -53,6 +53,7 @@ impl Compare {
                 json!({
                     "models": self.models,
                     "limit": comparison.limit,
+                    "expected": comparison.expected,
                     "traits": comparison.traits,
                     "machines": comparison.machines.iter().map(|of| json!({
                         "machine": of.machine,
@@ -77,10 +78,11 @@ impl Compare {
 
 fn text(comparison: &Comparison) -> String {
     let mut text = format!(
-        "{} by {}; named is what has a score beyond {}\n",
+        "{} by {}; named is what has a score beyond {}, as {} would if all were as they should be\n",
         counted(comparison.machines.len() as u64, "machine"),
         counted(comparison.traits as u64, "trait"),
-        number(comparison.limit)
+        number(comparison.limit),
+        number(comparison.expected)
     );
     let mut any = false;
     for of in comparison.machines.iter().filter(|of| of.unlike) {
