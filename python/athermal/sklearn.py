@@ -163,10 +163,12 @@ class GraphRegressor(_Regressor):
     def _columns_of(self, X: Any, y: Any, reset: bool) -> tuple[Any, Any, list[str]]:
         """A frame, which an array is made one of, and the names of its columns."""
         if not _is_array(X):
+            if not callable(self.graph):
+                return X, y, []
             names = [str(of) for of in getattr(X, "columns", X if isinstance(X, Mapping) else [])]
-            if callable(self.graph) and reset and names:
+            if reset and names:
                 self.feature_names_in_, self.n_features_in_ = _array(names), len(names)
-            elif callable(self.graph) and hasattr(self, "feature_names_in_"):
+            elif hasattr(self, "feature_names_in_"):
                 _check_names(self, X)
             return X, y, names
         try:
@@ -247,7 +249,7 @@ def _graph(of: Any) -> athermal.Graph:
 
 def _is_array(X: Any) -> bool:
     """Whether it is an array of numbers, or a list of lists of them, which has no names of columns."""
-    if hasattr(X, "columns") or isinstance(X, (Mapping, str, os.PathLike)) or hasattr(X, "__arrow_c_stream__"):
+    if hasattr(type(X), "columns") or isinstance(X, (Mapping, str, os.PathLike)) or hasattr(X, "__arrow_c_stream__"):
         return False
     if isinstance(X, (list, tuple)):
         return not X or isinstance(X[0], (list, tuple, int, float)) or _is_array(X[0])

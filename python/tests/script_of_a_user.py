@@ -28,7 +28,7 @@ def spread(values: list[float | None]) -> list[float | None]:
 
 
 def main(folder: Path) -> float:
-    week: athermal.Frame = athermal.simulate("die-tester", days=0.5, seed=1, faults=["temperature.room=missing,from=1h,for=10min"])
+    week: athermal.Frame = athermal.simulate("die-tester", days=0.3, seed=1, faults=["temperature.room=missing,from=1h,for=10min"])
     starter: athermal.Starter = athermal.init(week, drifts=["Z1_nm", "Z2_nm"])
     (folder / "graph.toml").write_text(starter.text)
     graph = athermal.Graph(folder / "graph.toml")

@@ -189,3 +189,14 @@ def test_the_index_of_a_frame_is_the_time_here_too(graph, week):
     expected = GraphRegressor(graph, target="drift.Z1").fit(frame).predict(frame)
     indexed = frame.set_index("time_s")
     assert str(list(GraphRegressor(graph, target="drift.Z1").fit(indexed).predict(indexed))) == str(list(expected))
+
+
+def test_a_lazy_frame_of_polars_is_taken_without_a_warning(graph, week):
+    polars = pytest.importorskip("polars")
+    import warnings
+
+    lazy = week.to_polars().lazy()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", polars.exceptions.PerformanceWarning)
+        predicted = GraphRegressor(graph, target="drift.Z1").fit(lazy).predict(lazy)
+    assert len(predicted) == len(week)
