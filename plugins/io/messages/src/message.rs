@@ -128,7 +128,7 @@ pub enum Arrival {
 pub struct QualityForm {
     /// Where, a JSON pointer.
     pub at: String,
-    /// What stands there for good values, such as [192] or ["good"].
+    /// What stands there for good values, such as `[192]` or `["good"]`.
     pub good: Vec<serde_json::Value>,
 }
 

@@ -94,6 +94,9 @@ pub struct Simulate {
     disturbances: Vec<Disturbance>,
 }
 
+/// Takes a row, by its time in ns and its values.
+pub type PutRow<'a> = dyn FnMut(i64, &[f64]) -> Result<(), Failure> + 'a;
+
 /// A machine of the registry, or one whose world changes.
 pub enum OneMachine {
     /// As it is known.
@@ -167,7 +170,7 @@ impl Simulate {
         &self,
         machine: &dyn Machine,
         host: &dyn Watch,
-        put: &mut dyn FnMut(i64, &[f64]) -> Result<(), Failure>,
+        put: &mut PutRow<'_>,
     ) -> Result<(), Failure> {
         let recording = self.recording(machine)?;
         let engine = self.compensate.as_ref().map(|model| {
