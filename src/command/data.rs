@@ -174,6 +174,19 @@ impl Data {
         }
     }
 
+    /// Warns where they are of several machines, by folders `machine=…`: a fit takes them for one.
+    pub fn warn_of_machines(&self, host: &dyn Watch) {
+        let files: Vec<PathBuf> = self.paths().map(Path::to_owned).collect();
+        let machines = athermal_fleet::found::names_in(&files, "machine");
+        if machines.len() > 1 {
+            host.warning(format_args!(
+                "the data are of {} machines, by folders such as `machine={}`, and are fitted as one: `athermal fleet fit` fits each",
+                machines.len(),
+                machines.first().map_or("", String::as_str)
+            ));
+        }
+    }
+
     /// Whether only rows of some time are read.
     pub fn is_a_stretch(&self) -> bool {
         self.times != Times::default()

@@ -8,6 +8,7 @@ use athermal::run::fit::{
     Block, FitError, FitOptions, FitProgress, blocks_of, check_blocks, fit_from_blocks,
 };
 use athermal::run::model::{Card, DataCard};
+use athermal_analysis::figures::counted;
 use athermal_blocks::{KeptBlocks, OtherFolder};
 use athermal_fleet::blocks::BlockOptions;
 
@@ -42,6 +43,7 @@ pub fn fit_on_blocks(
         Ok(())
     };
     let (dataset, cards, (fitted, report));
+    let mut lost = Vec::new();
     match &of.keep_blocks {
         None => {
             let mut blocks = Vec::new();
@@ -55,6 +57,7 @@ pub fn fit_on_blocks(
         }
         Some(folder) => {
             let kept = refresh(folder, model, data, &mut make)?;
+            lost.clone_from(&kept.0.lost);
             (fitted, report) = fit_from_blocks(plan, &kept.0, options, &mut nothing)?;
             (dataset, cards) = (data.dataset(), kept.1);
         }
@@ -63,6 +66,16 @@ pub fn fit_on_blocks(
     let reports = dataset.reports();
     let doubts = data::doubts(plan, &reports, report.refused, &report.rejected);
     data::warn_of(host, doubts, &reports);
+    if let (Some(first), Some(last)) = (lost.first(), lost.last()) {
+        let (first, last) = (
+            first.trim_end_matches(".json"),
+            last.trim_end_matches(".json"),
+        );
+        host.warning(format_args!(
+            "{} kept although the rows are gone, {first} to {last}: what files hold no more of these is as it was",
+            counted(lost.len() as u64, "block")
+        ));
+    }
     faults::warn(host, &faults);
     let outcome = FitOutcome {
         bare: report.bare_outputs(plan),

@@ -1,6 +1,6 @@
 //! Decides which files are of which machine: by a folder such as `machine=17`, or by what stands for `{machine}` in a pattern.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, MAIN_SEPARATOR, Path, PathBuf};
 
 use athermal_files::recordings_in;
@@ -96,6 +96,15 @@ pub fn machines_of(given: &[String], key: &str) -> Result<Machines, FindError> {
         files.dedup();
     }
     Ok(machines)
+}
+
+/// The names of machines by the folders `key=…` of files.
+#[must_use]
+pub fn names_in(files: &[PathBuf], key: &str) -> BTreeSet<String> {
+    files
+        .iter()
+        .filter_map(|file| of_folder(file, key))
+        .collect()
 }
 
 /// The value of the last folder `key=value` on a path.

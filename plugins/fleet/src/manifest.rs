@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::blocks::Cut;
+use crate::doubts::Doubt;
 use crate::figure::Figure;
-use crate::job::{Doubt, Reading, Unfitted};
+use crate::job::{Reading, Unfitted};
 use crate::rows::RowsId;
 
 /// The file in a folder of models.
