@@ -281,6 +281,87 @@ fn a_fleet_is_scored_reported_and_compared_and_the_sensor_that_is_off_is_found()
 }
 
 #[test]
+fn what_was_left_out_while_reading_is_reported_by_machine_and_a_fit_of_all_says_how_many_they_are()
+{
+    let fleet = Fleet::new("fleet-doubts", &["a", "b"]);
+    let text = fs::read_to_string(fleet.log("a")).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.insert(500, lines[499]);
+    lines.insert(900, "not a time,,,,,,,,,,,,");
+    fs::write(fleet.log("a"), lines.join("\n") + "\n").unwrap();
+    let again = "row whose time is that of the row before, left out";
+    let table = fleet.fit(&["--lenient"]).ended(0).out;
+    for words in [again, "unreadable row, left out"] {
+        assert!(table.contains(words), "{table}");
+    }
+    let manifest = fleet.manifest();
+    let of = |machine: &str| manifest["machines"][machine]["doubts"].clone();
+    assert!(of("b").is_null(), "{}", of("b"));
+    let found = of("a");
+    let counts = ["unreadable_rows", "time_again"].map(|fault| {
+        let mut all = found.as_array().unwrap().iter();
+        all.find(|of| of["fault"] == fault).unwrap()["count"].as_u64()
+    });
+    assert_eq!(counts, [Some(1), Some(1)]);
+    let evaluate = |more: &str| {
+        athermal(&[
+            &"fleet",
+            &"evaluate",
+            &fleet.models,
+            &"--lenient",
+            &"--data",
+            &fleet.pattern,
+            &"--format",
+            &more,
+        ])
+        .ended(0)
+    };
+    let table = evaluate("table").out;
+    assert!(table.contains(again), "{table}");
+    let scored = evaluate("json").json();
+    let of_a = scored["machines"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|of| of["machine"] == "a");
+    assert!(of_a.unwrap()["doubts"].to_string().contains("time_again"));
+    let page = fleet.scratch.path("fleet.html");
+    athermal(&[&"fleet", &"report", &fleet.models, &"-o", &page]).ended(0);
+    assert!(fs::read_to_string(page).unwrap().contains(again));
+    // One fit of a whole lake.
+    let (lake, model) = (fleet.scratch.path("logs"), fleet.scratch.path("all.json"));
+    athermal(&[
+        &"fit",
+        &fleet.graph,
+        &"--lenient",
+        &"--segments",
+        &"--data",
+        &lake,
+        &"-o",
+        &model,
+    ])
+    .ended(0)
+    .tells(&[
+        "the data are of 2 machines",
+        "`athermal fleet fit` fits each",
+    ]);
+}
+
+#[test]
+fn a_quiet_fit_that_ends_with_1_says_why() {
+    let fleet = Fleet::new("fleet-quiet", &["a"]);
+    let text = thermal().replace(
+        "[outputs]",
+        "[nodes.other]\ntype = \"ar\"\ninputs.truth = \"drift.Z1\"\nahead = \"5min\"\nlags = [\"12h\"]\n[outputs]\nother = \"other\"",
+    );
+    fs::write(&fleet.graph, text).unwrap();
+    fleet
+        .fit(&["-q"])
+        .ended(1)
+        .tells(&["a: other.Z1 is constant"]);
+}
+
+#[test]
 fn of_few_machines_none_is_said_to_be_unlike_the_others() {
     let fleet = Fleet::new("fleet-few", &["a", "b"]);
     fleet.fit(&[]).ended(0);

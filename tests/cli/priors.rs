@@ -120,6 +120,22 @@ fn a_fleet_that_is_pooled_gives_the_prior_that_new_machines_are_fitted_towards()
         let simulate: Vec<&str> = simulate.split(' ').collect();
         assert_eq!(ran(&folder, &simulate).0, Some(0));
     }
+    // One more, whose positions are in µm under a name that says nm.
+    std::fs::create_dir_all(folder.0.join("logs/machine=um")).unwrap();
+    let log = std::fs::read_to_string(folder.0.join("logs/machine=m5/log.csv")).unwrap();
+    let (header, rows) = log.split_once('\n').unwrap();
+    let in_um = rows.lines().map(|row| {
+        let cells = row
+            .split(',')
+            .enumerate()
+            .map(|(nth, cell)| match cell.parse::<f64>() {
+                Ok(nm) if nth > 6 => format!("{}", nm / 1000.0),
+                _ => cell.to_owned(),
+            });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    });
+    let in_um = format!("{header}\n{}", in_um.collect::<String>());
+    std::fs::write(folder.0.join("logs/machine=um/log.csv"), in_um).unwrap();
     let graph = graph("die-tester-fleet").display().to_string();
     let pool = |data: &str| {
         let pool = [
@@ -138,7 +154,13 @@ fn a_fleet_that_is_pooled_gives_the_prior_that_new_machines_are_fitted_towards()
     assert_ne!(status, Some(0), "{text}");
     assert!(!folder.0.join("type.json").exists());
     let (status, text) = pool("logs/machine=*/*.csv");
-    assert_eq!(status, Some(0), "{text}");
+    assert_eq!(status, Some(1), "{text}");
+    for word in [
+        "um failed: position.",
+        "is it in another unit? The machine is left out",
+    ] {
+        assert!(text.contains(word), "{text}");
+    }
     let file = std::fs::read_to_string(folder.0.join("type.json")).unwrap();
     let of = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
     let (found, expected) = (of(&file), of(&prior()));

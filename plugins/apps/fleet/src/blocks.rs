@@ -8,13 +8,14 @@ use athermal_files::{Dataset, Options};
 use athermal_run::fit::{Block, FitError, FitOptions, blocks_of, check_blocks, fit_from_blocks};
 use athermal_run::model::Model;
 
+use crate::doubts::{Doubt, of_reading};
 use crate::machine::{MachineError, MachineFit};
 use athermal_jobs::RowsId;
 
 /// A machine that was fitted on blocks, or the rows where they are those that are known.
 pub(crate) enum Outcome {
     Same,
-    Fitted(Box<MachineFit>, Vec<ChannelFaults>),
+    Fitted(Box<MachineFit>, Vec<ChannelFaults>, Vec<Doubt>),
 }
 
 /// What is fitted, on what.
@@ -36,14 +37,14 @@ impl OnBlocks<'_> {
     ) -> Result<Outcome, MachineError> {
         let plan = &self.graph.plan;
         check_blocks(plan).map_err(|error| MachineError::Fit(error.into()))?;
-        let mut faults = Vec::new();
+        let (mut faults, mut reports, mut lost) = (Vec::new(), Vec::new(), 0);
         let mut make =
             |dataset: &Dataset,
              wanted: &dyn Fn(i64) -> bool,
              take: &mut dyn FnMut(Block) -> Result<(), FitError>| {
                 let watch = FaultWatch::new(dataset, Purpose::Fit);
                 blocks_of(plan, &watch, wanted, &mut |_| {}, take)?;
-                faults = watch.found();
+                (faults, reports) = (watch.found(), dataset.reports());
                 Ok(())
             };
         let data = |files, within| {
@@ -70,6 +71,7 @@ impl OnBlocks<'_> {
                 let blocks =
                     KeptBlocks::refresh(folder, plan, self.files, &reading, &data, &mut make)
                         .map_err(MachineError::Fit)?;
+                lost = blocks.lost.len() as u64;
                 rows = RowsId::of_blocks(&blocks).map_err(MachineError::Fit)?;
                 if known == Some(&rows) {
                     return Ok(Outcome::Same);
@@ -79,6 +81,10 @@ impl OnBlocks<'_> {
         }
         let (fitted, report) = fitted.map_err(MachineError::Fit)?;
         let fit = MachineFit::of(self.graph, fitted, report, rows, created)?;
-        Ok(Outcome::Fitted(Box::new(fit), faults))
+        let mut doubts = of_reading(&reports);
+        if lost > 0 {
+            doubts.push(Doubt::counted("blocks_without_rows", lost, None));
+        }
+        Ok(Outcome::Fitted(Box::new(fit), faults, doubts))
     }
 }

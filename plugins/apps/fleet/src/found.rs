@@ -1,7 +1,7 @@
 //! Decides which files are of which machine: by a folder such as `machine=17`, or by what stands for `{machine}` in a pattern.
 
 use std::collections::BTreeMap;
-use std::path::{Component, MAIN_SEPARATOR, Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use athermal_files::recordings_in;
 use thiserror::Error;
@@ -75,7 +75,7 @@ pub fn machines_of(given: &[String], key: &str) -> Result<Machines, FindError> {
                 vec![path]
             };
             for file in files {
-                let of_folder = || of_folder(&file, key);
+                let of_folder = || athermal_jobs::data::of_folder(&file, key);
                 let Some(name) = name.clone().or_else(of_folder) else {
                     let (path, key) = (file.display().to_string(), key.to_owned());
                     return Err(FindError::Nameless { path, key });
@@ -96,19 +96,6 @@ pub fn machines_of(given: &[String], key: &str) -> Result<Machines, FindError> {
         files.dedup();
     }
     Ok(machines)
-}
-
-/// The value of the last folder `key=value` on a path.
-fn of_folder(file: &Path, key: &str) -> Option<String> {
-    let folders = file.parent()?.components().rev();
-    let mut values = folders.filter_map(|of| match of {
-        Component::Normal(name) => {
-            let value = name.to_str()?.strip_prefix(key)?.strip_prefix('=')?;
-            Some(value.to_owned())
-        }
-        _ => None,
-    });
-    values.next().filter(|value| !value.is_empty())
 }
 
 /// What there is below a folder by the rest of a pattern, each with the name of its machine as far as that is known.

@@ -9,6 +9,7 @@ use athermal_jobs::data::Reading;
 use athermal_run::model::Model;
 use serde::{Deserialize, Serialize};
 
+use crate::doubts::Doubt;
 use crate::figure::Figure;
 
 /// The first line: what all jobs of a worker have in common.
@@ -110,15 +111,6 @@ pub struct Unfitted {
     pub node: String,
     /// Why.
     pub error: String,
-}
-
-/// What may be wrong with a channel of the data.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Doubt {
-    /// The channel.
-    pub channel: String,
-    /// What: `leaps`, `stuck`, `silent` or `rejected_samples`.
-    pub fault: String,
 }
 
 /// The checksum of a graph's content, by which it is known again: FNV-1a of 64 bits of the graph as a model has it.

@@ -10,6 +10,7 @@
 //! | [`found`] | which files are of which machine |
 //! | [`pool`] | how jobs are given to processes, and what happens when one dies |
 //! | [`manifest`] | what a folder of models remembers, so that a fit is resumed |
+//! | [`doubts`] | what was left out of the data of a machine, and what may be wrong with them |
 //! | [`figure`], [`spread`], [`unlike`] | how a machine stands beside the others |
 //! | `commands` | `athermal fleet` |
 
@@ -19,6 +20,7 @@
 pub mod batches;
 pub mod blocks;
 mod commands;
+pub mod doubts;
 pub mod figure;
 pub mod found;
 pub mod job;

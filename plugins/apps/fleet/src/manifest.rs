@@ -10,8 +10,9 @@ use athermal_run::live::store::write_whole;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::doubts::Doubt;
 use crate::figure::Figure;
-use crate::job::{Doubt, Unfitted};
+use crate::job::Unfitted;
 use athermal_jobs::RowsId;
 use athermal_jobs::blocks::Cut;
 use athermal_jobs::data::Reading;

@@ -8,8 +8,8 @@ use athermal_analysis::figures::{count, counted, number, or_dash};
 use athermal_analysis::markup::escaped;
 use athermal_run::model::{Card, Model};
 
+use crate::doubts::Doubt;
 use crate::figure::{Relative, Standing};
-use crate::job::Doubt;
 use crate::unlike::{Comparison, Member, picture};
 
 /// So many machines are among the worst.
@@ -239,7 +239,7 @@ fn unlike(html: &mut String, facts: &Facts<'_>) {
     let _ = write!(
         html,
         "<p class=\"muted\">Coefficients, errors and the ranges of sensors over the rows of the fit: {} of each machine. The score is the distance from what the fleet has in common, \
-         in standard deviations: how far machines differ, and how sure the value is. Of a hundred machines that are as they should be about one is beyond {limit}.</p>",
+         in standard deviations: how far machines differ, and how sure the value is. Of a hundred machines that are as they should be about two are beyond {limit}.</p>",
         counted(comparison.traits as u64, "trait")
     );
     let _ = write!(
@@ -357,9 +357,7 @@ fn about(html: &mut String, known: &Known) {
     );
     if !known.doubts.is_empty() {
         let doubts = known.doubts.iter();
-        let doubts: Vec<String> = doubts
-            .map(|of| escaped(&format!("{} ({})", of.channel, of.fault)))
-            .collect();
+        let doubts: Vec<String> = doubts.map(|of| escaped(&of.to_string())).collect();
         let _ = write!(
             html,
             "<p class=\"bad\">Its data may be wrong: {}.</p>",

@@ -13,8 +13,9 @@ use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
 use crate::blocks::{self, OnBlocks};
+use crate::doubts::{of_channels, of_reading};
 use crate::figure::Figure;
-use crate::job::{Doubt, Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
+use crate::job::{Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
 use crate::machine::{MachineError, MachineFit, fit_machine};
 use athermal_jobs::{RowsId, Summed};
 
@@ -90,8 +91,9 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
             let fit = on_blocks.fit(known.as_ref(), &options(setup.memory), created.clone());
             match fit.map_err(|error| error.to_string())? {
                 blocks::Outcome::Same => Ok(Reply::Same),
-                blocks::Outcome::Fitted(fit, faults) => {
-                    let fitted = whole(*fit, &faults).map_err(|error| error.to_string())?;
+                blocks::Outcome::Fitted(fit, faults, doubts) => {
+                    let mut fitted = whole(*fit, &faults).map_err(|error| error.to_string())?;
+                    fitted.doubts.extend(doubts);
                     Ok(Reply::Fitted(Box::new(fitted)))
                 }
             }
@@ -104,7 +106,8 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
                 }
             }
             let fitted = fitted(graph, &dataset, setup.memory, created.clone());
-            let fitted = fitted.map_err(|error| error.to_string())?;
+            let mut fitted = fitted.map_err(|error| error.to_string())?;
+            fitted.doubts.extend(of_reading(&dataset.reports()));
             Ok(Reply::Fitted(Box::new(fitted)))
         }
         (Task::Fit { .. }, None) => Err("no graph was given".to_owned()),
@@ -158,7 +161,7 @@ fn whole(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Fitted, MachineErr
             .map_or_else(Vec::new, Figure::of_card),
         unfitted: unfitted.collect(),
         constant: bare.map(|of| of.output.clone()).collect(),
-        doubts: doubts(faults, &fit.report.rejected),
+        doubts: of_channels(faults, &fit.report.rejected, fit.report.refused),
         rows: fit.rows,
     })
 }
@@ -187,32 +190,11 @@ fn evaluated(setup: &Setup, model: &Model, dataset: &Dataset) -> Result<Reply, S
     Ok(Reply::Evaluated(Box::new(Evaluated {
         fitted_on: model.card.as_ref().is_some_and(of_fit),
         scores: found,
-        doubts: doubts(&watch.found(), &scores.rejected),
+        doubts: [
+            of_channels(&watch.found(), &scores.rejected, scores.refused),
+            of_reading(&dataset.reports()),
+        ]
+        .concat(),
         rows,
     })))
-}
-
-fn doubts(faults: &[ChannelFaults], rejected: &[(String, u64)]) -> Vec<Doubt> {
-    let mut all = Vec::new();
-    let mut add = |channel: &String, fault: &str| {
-        all.push(Doubt {
-            channel: channel.clone(),
-            fault: fault.to_owned(),
-        });
-    };
-    for of in faults {
-        let found = [
-            ("leaps", of.leaps.is_some()),
-            ("stuck", of.stuck.is_some()),
-            ("silent", of.silent.is_some()),
-        ];
-        found
-            .iter()
-            .filter(|(_, is_there)| *is_there)
-            .for_each(|(fault, _)| add(&of.channel, fault));
-    }
-    for (channel, _) in rejected {
-        add(channel, "rejected_samples");
-    }
-    all
 }

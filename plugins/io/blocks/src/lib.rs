@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 /// The form that this version writes.
 const FORMAT: u64 = 1;
 const INDEX: &str = "index.json";
+/// The folder in which blocks are made, beside those that are there.
+const NEW: &str = ".new";
 const DAY_NS: i64 = 86_400_000_000_000;
 
 /// What the blocks of a folder were made of.
@@ -94,6 +96,17 @@ impl File {
         days.into_iter().flat_map(|(from, to)| from..=to)
     }
 
+    /// Whether it is there no more, and none of the others has all of its period.
+    fn is_lost(&self, others: &[Self]) -> bool {
+        let has_all = |other: &Self| match (self.period, other.period) {
+            _ if (other.bytes, &other.hash) == (self.bytes, &self.hash) => true,
+            (Some((from, to)), Some((first, last))) => first <= from && to <= last,
+            (None, _) => true,
+            _ => false,
+        };
+        !Path::new(&self.path).exists() && !others.iter().any(has_all)
+    }
+
     fn take(&mut self, reports: &[(String, Report)]) {
         if let Some((_, report)) = reports.iter().find(|(file, _)| *file == self.path) {
             (self.rows, self.period) = (report.rows, report.period);
@@ -130,6 +143,8 @@ pub struct KeptBlocks {
     pub cards: Vec<DataCard>,
     /// How many of the blocks were made just now.
     pub made: u64,
+    /// The blocks of which the rows, or some of them, are gone: they stay as they were.
+    pub lost: Vec<String>,
 }
 
 /// A folder for blocks that holds something else: it is left as it is.
@@ -196,11 +211,13 @@ pub type Make<'a> = &'a mut dyn FnMut(
 impl KeptBlocks {
     /// Brings the blocks of a folder up to date with files of data. Where these, the version of this crate, the graph as far as it makes
     /// examples of rows, and `reading` (how files are read, in any words) are those of the last time, nothing but the folder is read. Days of files that are
-    /// new, changed or gone, and the days after them, are made anew by `make`, from the files that have rows of these days. `data` is a
-    /// data set of some of the files, of which no rows outside of a stretch of time are needed.
+    /// new, changed or not among the files any more, and the days after them, are made anew by `make`, from the files that have rows of these
+    /// days. Blocks of a file that is there no more stay as they are, unless another has all of its
+    /// period. `data` is a data set of some of the files, of which no rows outside of a stretch of time are needed.
     ///
     /// # Errors
-    /// When files cannot be read or written, the folder holds something else ([`OtherFolder`]), or `make` fails. What was made until then is kept.
+    /// When files cannot be read or written, the folder holds something else ([`OtherFolder`]), or `make` fails. The folder is then
+    /// as it was.
     pub fn refresh(
         folder: &Path,
         plan: &Plan,
@@ -228,7 +245,7 @@ impl KeptBlocks {
             .filter(is_other)
             .map(|of| of.path.clone())
             .collect();
-        let mut made = 0;
+        let (mut made, mut lost) = (0, Vec::new());
         if !gone.is_empty() || !new.is_empty() {
             let is_first = index.files.is_empty();
             if !is_first && !new.is_empty() {
@@ -238,22 +255,24 @@ impl KeptBlocks {
                 let changed = now.iter_mut().filter(|file| new.contains(&file.path));
                 changed.for_each(|file| file.take(&reports));
             }
+            let (without_rows, gone): (Vec<File>, Vec<File>) =
+                gone.into_iter().partition(|file| file.is_lost(&now));
+            lost = without_rows;
+            // The day after one that is lost can be made again: it knows less of the one before.
+            let own = |file: &File| {
+                file.period
+                    .map(|(from, to)| from.div_euclid(DAY_NS)..=to.div_euclid(DAY_NS))
+            };
+            let kept: BTreeSet<i64> = lost.iter().filter_map(own).flatten().collect();
             let changed = now.iter().filter(|file| new.contains(&file.path));
-            let stale: BTreeSet<i64> = changed.chain(&gone).flat_map(File::days).collect();
-            // A call that ends here leaves nothing that is taken for up to date.
-            index
-                .files
-                .retain(|file| !file.days().any(|day| stale.contains(&day)));
-            index.write(folder)?;
-            let names = match is_first {
+            let days = changed.chain(&gone).flat_map(File::days);
+            let stale: BTreeSet<i64> = days.filter(|day| !kept.contains(day)).collect();
+            let names: Vec<String> = match is_first {
                 true => names_in(folder).map_err(|error| failed(folder, error))?,
                 false => stale.iter().filter_map(|&day| name_of(day)).collect(),
             };
-            for path in names.iter().map(|name| folder.join(name)) {
-                if path.exists() {
-                    fs::remove_file(&path).map_err(|error| failed(&path, error))?;
-                }
-            }
+            let beside = folder.join(NEW);
+            let _ = fs::remove_dir_all(&beside);
             // A block knows the day before.
             let is_stale = |day: i64| stale.contains(&day) || stale.contains(&(day + 1));
             let near = now
@@ -265,23 +284,56 @@ impl KeptBlocks {
                 let first = stale.first().map(|day| (day - 1) * DAY_NS);
                 let last = stale.last().map(|day| (day + 1) * DAY_NS);
                 let dataset = data(near, first.zip(last).filter(|_| !is_first));
+                fs::create_dir_all(&beside).map_err(|error| failed(&beside, error))?;
                 let wanted = |day: i64| is_first || stale.contains(&day);
-                make(&dataset, &wanted, &mut |block| {
+                let made_all = make(&dataset, &wanted, &mut |block| {
                     let name = name_of(block.day);
                     let name =
                         name.ok_or_else(|| failed(folder, "a day is beyond all calendars"))?;
-                    let path = folder.join(name);
+                    let path = beside.join(name);
                     let text = block.to_json().map_err(|error| failed(&path, error))?;
                     made += 1;
                     write(&path, &text)
-                })?;
+                });
+                if let Err(error) = made_all {
+                    let _ = fs::remove_dir_all(&beside);
+                    return Err(error);
+                }
                 if is_first {
                     let reports = dataset.reports();
                     now.iter_mut().for_each(|file| file.take(&reports));
                 }
             }
+            // A program that is killed from here on leaves nothing that is taken for up to date.
+            index
+                .files
+                .retain(|file| !file.days().any(|day| stale.contains(&day)));
+            index.write(folder)?;
+            for path in names.iter().map(|name| folder.join(name)) {
+                if path.exists() {
+                    fs::remove_file(&path).map_err(|error| failed(&path, error))?;
+                }
+            }
+            if beside.exists() {
+                let moved = names_in(&beside).and_then(|names| {
+                    let mut names = names.iter();
+                    names.try_for_each(|name| fs::rename(beside.join(name), folder.join(name)))
+                });
+                moved.map_err(|error| failed(&beside, error))?;
+                let _ = fs::remove_dir_all(&beside);
+            }
         }
+        let own = |file: &File| {
+            file.period
+                .map(|(from, to)| from.div_euclid(DAY_NS)..=to.div_euclid(DAY_NS))
+        };
+        let without_rows: BTreeSet<i64> = lost.iter().filter_map(own).flatten().collect();
+        let without_rows = without_rows.iter().filter_map(|day| name_of(*day));
+        let without_rows = without_rows
+            .filter(|name| folder.join(name).exists())
+            .collect();
         index.files = now;
+        index.files.extend(lost);
         index.write(folder)?;
         let cards = index.files.into_iter().map(|file| DataCard {
             path: file.path,
@@ -295,11 +347,12 @@ impl KeptBlocks {
             folder: folder.to_owned(),
             cards: cards.collect(),
             made,
+            lost: without_rows,
         })
     }
 }
 
-/// What the blocks of a folder were made of; where that was something else, the folder is emptied of blocks first.
+/// What the blocks of a folder were made of; nothing where that was something else, so that all are made anew.
 fn index_of(folder: &Path, identity: &str, reading: &str) -> Result<Index, FitError> {
     let path = folder.join(INDEX);
     let names = names_in(folder).map_err(|error| failed(folder, error))?;
@@ -323,10 +376,6 @@ fn index_of(folder: &Path, identity: &str, reading: &str) -> Result<Index, FitEr
     };
     if (index.athermal_blocks, &*index.graph, &*index.reading) == (FORMAT, identity, reading) {
         return Ok(index);
-    }
-    for name in names {
-        let path = folder.join(name);
-        fs::remove_file(&path).map_err(|error| failed(&path, error))?;
     }
     Ok(Index {
         athermal_blocks: FORMAT,

@@ -472,9 +472,76 @@ fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
             blocks_of(&model.plan, data, wanted, &mut |_| {}, &mut some)
         },
     );
-    assert!(ends.is_err() && blocks.join("1970-01-02.json").exists());
+    assert!(ends.is_err() && !blocks.join("1970-01-02.json").exists());
     let (fitted, made) = kept(&blocks, &model, &files[2..]);
     assert_eq!((fitted, made), (fresh(&files[2..], &Options::default()), 2));
+}
+
+#[test]
+fn a_call_that_fails_leaves_blocks_as_they_are_and_those_whose_rows_are_gone_stay() {
+    let folder = Folder::of("failing");
+    let model = folder.model(GRAPH);
+    let mut days = days(5);
+    let mut files: Vec<PathBuf> = (0..4)
+        .map(|nth| folder.file(&format!("day{nth}.csv"), text(&days[nth..=nth])))
+        .collect();
+    let blocks = folder.0.join("blocks");
+    let names = |days: std::ops::RangeInclusive<u32>| -> Vec<String> {
+        days.map(|day| format!("1970-01-0{day}.json")).collect()
+    };
+    let contents = || {
+        names(1..=4)
+            .iter()
+            .map(|name| std::fs::read(blocks.join(name)).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let of_all = kept(&blocks, &model, &files).0;
+    let before = contents();
+    // A day changes and another graph asks for all: neither call comes to its end.
+    let last = days[3].clone();
+    let half = last[..last.len() / 2].rfind('\n').unwrap() + 1;
+    days[3].truncate(half);
+    folder.file("day3.csv", text(&days[3..=3]));
+    let refresh = |model: &Model, files: &[PathBuf], fails: bool| {
+        KeptBlocks::refresh(
+            &blocks,
+            &model.plan,
+            files,
+            "",
+            &|files, _| data(&files),
+            &mut |data, wanted, take| {
+                blocks_of(&model.plan, data, wanted, &mut |_| {}, take)?;
+                match fails {
+                    true => Err(FitError::Recording("the disk went away".into())),
+                    false => Ok(()),
+                }
+            },
+        )
+    };
+    let other = folder.model(&GRAPH.replace("\"20min\"", "\"30min\""));
+    for model in [&model, &other] {
+        assert!(refresh(model, &files, true).is_err());
+        assert_eq!(contents(), before);
+    }
+    days[3] = last;
+    folder.file("day3.csv", text(&days[3..=3]));
+    assert_eq!(kept(&blocks, &model, &files), (of_all.clone(), 0));
+    // The raw rows of two days are deleted, and a day comes.
+    files[..2]
+        .iter()
+        .for_each(|file| std::fs::remove_file(file).unwrap());
+    let found = refresh(&model, &files[2..], false).unwrap();
+    assert_eq!((found.made, &found.lost), (0, &names(1..=2)));
+    let fit = |blocks: &KeptBlocks| {
+        let fitted = fit_from_blocks(&model.plan, blocks, &FitOptions::default(), &mut |_| {});
+        text_of(&fitted.unwrap().0)
+    };
+    assert_eq!(fit(&found), of_all);
+    files.push(folder.file("day4.csv", text(&days[4..=4])));
+    let found = refresh(&model, &files[2..], false).unwrap();
+    assert_eq!((found.made, &found.lost), (1, &names(1..=2)));
+    let all = [folder.file("whole.csv", text(&days))];
+    assert_eq!(fit(&found), text_of(&on_blocks(&model, &all).0));
 }
 
 #[test]

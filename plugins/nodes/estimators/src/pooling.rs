@@ -162,6 +162,12 @@ impl Pooling {
         }
     }
 
+    /// Takes a machine out again.
+    pub fn leave_out(&mut self, machine: &str) {
+        let pools = self.estimators.values_mut();
+        pools.for_each(|pool| pool.machines.retain(|(of, _)| of != machine));
+    }
+
     /// The prior of all estimators that could be pooled, and what was found for each.
     #[must_use]
     pub fn finish(self) -> (Prior, Vec<PoolFit>) {

@@ -3,8 +3,9 @@
 mod cards;
 mod reading;
 
+use std::collections::BTreeSet;
 use std::fs::Metadata;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 use std::sync::OnceLock;
 
@@ -141,6 +142,20 @@ impl Data {
                 path.display()
             ))),
             None => Ok(()),
+        }
+    }
+
+    /// Warns where they are of several machines, by folders `machine=…`: a fit takes them for one.
+    pub fn warn_of_machines(&self, host: &dyn Watch) {
+        let machines: BTreeSet<String> = self
+            .paths()
+            .filter_map(|file| of_folder(file, "machine"))
+            .collect();
+        if let (Some(first), true) = (machines.first(), machines.len() > 1) {
+            host.warning(format_args!(
+                "the data are of {} machines, by folders such as `machine={first}`, and are fitted as one: `athermal fleet fit` fits each",
+                machines.len(),
+            ));
         }
     }
 
@@ -329,4 +344,18 @@ pub fn is_same_content(one: &Path, other: &Path) -> bool {
     };
     let same_length = length(one).is_some_and(|of_one| length(other) == Some(of_one));
     one == other || same_length && DataCard::of(one, 0).is_ok_and(|card| card.is_of(other))
+}
+
+/// The value of the last folder `key=value` on a path, by which files are of a machine.
+#[must_use]
+pub fn of_folder(file: &Path, key: &str) -> Option<String> {
+    let folders = file.parent()?.components().rev();
+    let mut values = folders.filter_map(|of| match of {
+        Component::Normal(name) => {
+            let value = name.to_str()?.strip_prefix(key)?.strip_prefix('=')?;
+            Some(value.to_owned())
+        }
+        _ => None,
+    });
+    values.next().filter(|value| !value.is_empty())
 }

@@ -84,6 +84,7 @@ impl Fit {
         self.data.thin(None, model)?;
         self.data.check_offsets(&[])?;
         self.blocks.check(self.data.is_a_stretch())?;
+        self.data.warn_of_machines(host);
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.count(),

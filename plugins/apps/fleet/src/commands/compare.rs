@@ -16,7 +16,7 @@ use crate::unlike::{Comparison, FEWEST, compare, picture, traits_of};
 /// The models of a folder are compared by their coefficients, by their errors on the rows of the fit, and by the range of
 /// each sensor in these rows. A loose sensor or a worn part shows in them. The score of a value is its distance from what the
 /// fleet has in common, in standard deviations: how far machines differ, and how sure the value is. Of a hundred machines
-/// that are as they should be about one is beyond the limit. The exit status is 1 where a machine is beyond it.
+/// that are as they should be about two are beyond the limit. The exit status is 1 where a machine is beyond it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fleet compare models\n  athermal fleet compare models --plot unlike.svg"

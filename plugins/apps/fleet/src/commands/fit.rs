@@ -359,15 +359,17 @@ impl Fit {
             return;
         }
         warn_failed(terminal, &tally.failed);
+        if terminal.quiet {
+            // What the exit status says stands in no table then.
+            for (name, of) in fitted.clone() {
+                let lacks = remark(&[], lacks(of));
+                if !lacks.is_empty() {
+                    terminal.warning(format_args!("{name}: {lacks}"));
+                }
+            }
+        }
         if !terminal.quiet && !standings.is_empty() {
-            let remarks = fitted.map(|(name, of)| {
-                let unfitted = of
-                    .unfitted
-                    .iter()
-                    .map(|of| format!("{} could not be fitted", of.node));
-                let constant = of.constant.iter().map(|of| format!("{of} is constant"));
-                (name.clone(), remark(&of.doubts, unfitted.chain(constant)))
-            });
+            let remarks = fitted.map(|(name, of)| (name.clone(), remark(&of.doubts, lacks(of))));
             athermal_command::print!(
                 "{}",
                 table::standings(&standings, &remarks.collect(), self.all)
@@ -399,6 +401,13 @@ impl Fit {
             ));
         }
     }
+}
+
+/// What a machine's model lacks.
+fn lacks(of: &Entry) -> impl Iterator<Item = String> + '_ {
+    let unfitted = of.unfitted.iter();
+    let unfitted = unfitted.map(|of| format!("{} could not be fitted", of.node));
+    unfitted.chain(of.constant.iter().map(|of| format!("{of} is constant")))
 }
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.

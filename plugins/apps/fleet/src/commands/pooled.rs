@@ -18,6 +18,7 @@ use serde_json::json;
 
 use super::{few, warn_failed};
 use crate::found::Machines;
+use crate::unlike::other_units;
 use athermal_jobs::data::Reading;
 
 /// What is pooled, and from where to where.
@@ -56,7 +57,7 @@ impl Pooled<'_> {
             ..FitOptions::default()
         };
         let mut progress = terminal.begin("pooling", Some(self.machines.len() as u64));
-        let mut failed = BTreeMap::new();
+        let (mut failed, mut ranges) = (BTreeMap::new(), BTreeMap::new());
         for (nth, (machine, files)) in self.machines.iter().enumerate() {
             let Some(watch) = pooling.watched(&graph.plan) else {
                 return Err(Failure::Request(format!(
@@ -66,12 +67,19 @@ impl Pooled<'_> {
             };
             let dataset = Dataset::new(files.clone(), self.reading.options(files));
             match fit(&watch.plan, &dataset, &options, &mut |_| {}) {
-                Ok(_) => pooling.add(machine, watch),
+                Ok((_, report)) => {
+                    ranges.insert(machine.clone(), report.ranges);
+                    pooling.add(machine, watch);
+                }
                 Err(error) => _ = failed.insert(machine.clone(), error.to_string()),
             }
             progress.set(nth as u64 + 1);
         }
         drop(progress);
+        for (machine, why) in other_units(&ranges) {
+            pooling.leave_out(&machine);
+            failed.insert(machine, why);
+        }
         warn_failed(terminal, &failed);
         let (prior, fits) = pooling.finish();
         if prior.estimators().is_empty() {
@@ -127,6 +135,11 @@ impl Pooled<'_> {
         }
         if !terminal.quiet {
             print!("{}", table(fits, self.stretch));
+        }
+        for of in fits.iter().filter(|_| terminal.quiet) {
+            if let Err(error) = &of.outcome {
+                terminal.warning(format_args!("{} could not be pooled: {error}", of.instance));
+            }
         }
         for of in fits.iter().filter(|of| !of.left_out.is_empty()) {
             terminal.warning(format_args!(

@@ -5,20 +5,15 @@ use std::collections::BTreeMap;
 use athermal_analysis::figures::{count, number, or_dash, table};
 use serde_json::{Value, json};
 
+use crate::doubts::Doubt;
 use crate::figure::Standing;
-use crate::job::Doubt;
 
 /// So many machines are shown where not all are asked for.
 const WORST: usize = 20;
 
 /// What stands behind the line of a machine.
 pub(crate) fn remark(doubts: &[Doubt], more: impl IntoIterator<Item = String>) -> String {
-    let doubts = doubts.iter().map(|of| match &*of.fault {
-        "rejected_samples" => format!("{} has samples out of range", of.channel),
-        "stuck" => format!("{} stands still", of.channel),
-        "silent" => format!("{} is silent", of.channel),
-        _ => format!("{} leaps", of.channel),
-    });
+    let doubts = doubts.iter().map(ToString::to_string);
     more.into_iter()
         .chain(doubts)
         .collect::<Vec<_>>()
