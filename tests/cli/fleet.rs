@@ -298,7 +298,7 @@ fn what_was_left_out_while_reading_is_reported_by_machine_and_a_fit_of_all_says_
     let of = |machine: &str| manifest["machines"][machine]["doubts"].clone();
     assert!(of("b").is_null(), "{}", of("b"));
     let found = of("a");
-    let counts = ["unreadable_rows", "time_again"].map(|fault| {
+    let counts = ["time_unreadable", "time_again"].map(|fault| {
         let mut all = found.as_array().unwrap().iter();
         all.find(|of| of["fault"] == fault).unwrap()["count"].as_u64()
     });

@@ -124,7 +124,7 @@ pub trait Blocks {
     fn read(&self, nth: usize, take: &mut dyn FnMut(&Block)) -> Result<(), SourceError>;
 }
 
-impl Blocks for [Block] {
+impl Blocks for Vec<Block> {
     fn count(&self) -> usize {
         self.len()
     }

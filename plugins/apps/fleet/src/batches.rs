@@ -4,8 +4,9 @@ use std::path::Path;
 
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
+use athermal_core::watch::Watch;
 use athermal_files::{FileError, Options, Reader, layout};
-use athermal_run::fit::{FitError, FitOptions, FitProgress};
+use athermal_run::fit::{FitError, FitOptions};
 use athermal_run::model::Model;
 
 use crate::machine::{MachineError, MachineFit, fit_machine};
@@ -57,10 +58,10 @@ pub fn fit_batches(
     batches: impl Iterator<Item = Result<RecordBatch, ArrowError>> + Send + 'static,
     options: &FitOptions,
     created: Option<String>,
-    progress: &mut (dyn FnMut(FitProgress<'_>) + Send),
+    host: &dyn Watch,
 ) -> Result<MachineFit, MachineError> {
     let once = once(graph, name, schema, batches, options.memory)?;
-    fit_machine(graph, &once, options, created, progress)
+    fit_machine(graph, &once, options, created, host)
 }
 
 #[cfg(test)]
@@ -73,6 +74,7 @@ mod tests {
     use athermal_core::compile::Wanted;
     use athermal_core::diagnostic::{Diagnostics, Sources};
     use athermal_core::prng::Prng;
+    use athermal_core::watch::Kept;
     use athermal_files::Dataset;
 
     // A plugin that no code names is left out by the linker.
@@ -174,7 +176,7 @@ z = "linear"
         let date = || Some("2026-01-31T12:00:00Z".to_owned());
         let csv = Dataset::new(vec![log], Options::default());
         let options = FitOptions::default();
-        let of_csv = fit_machine(&graph, &csv, &options, date(), &mut |_| {}).unwrap();
+        let of_csv = fit_machine(&graph, &csv, &options, date(), &Kept::default()).unwrap();
         assert_eq!(of_csv.rows.rows, 900);
         // Without memory for rows the fit reads them again.
         for (length, memory) in [(1, 64 << 20), (7, 64 << 20), (900, 0), (64, 0)] {
@@ -190,11 +192,11 @@ z = "linear"
                 batches.into_iter(),
                 &options,
                 date(),
-                &mut |_| {},
+                &Kept::default(),
             );
             let fit = fit.unwrap();
             // What rows that are read again leave out of a model they leave out of either.
-            let of_csv = fit_machine(&graph, &csv, &options, date(), &mut |_| {}).unwrap();
+            let of_csv = fit_machine(&graph, &csv, &options, date(), &Kept::default()).unwrap();
             assert_eq!(fit.rows, of_csv.rows);
             let text = |fit: &MachineFit| String::from_utf8(fit.bytes().unwrap()).unwrap();
             let behind_card = |text: &str| text[text.find("\n  \"graph\"").unwrap()..].to_owned();
@@ -212,7 +214,7 @@ z = "linear"
             batches.into_iter(),
             &options,
             date(),
-            &mut |_| {},
+            &Kept::default(),
         )
         .unwrap();
         assert_ne!(other.rows.hash, of_csv.rows.hash);

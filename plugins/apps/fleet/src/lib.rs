@@ -5,7 +5,6 @@
 //! | [`fit_machine`] | what the rows of a machine and a graph give: the bytes of a model |
 //! | [`fitted`] | the same, with what is reported of it |
 //! | [`RowsId`] | by what rows are known again |
-//! | [`blocks`] | how a machine is fitted on sums of its days in place of rows |
 //! | `batches` | how rows come as batches of Arrow |
 //! | [`found`] | which files are of which machine |
 //! | [`pool`] | how jobs are given to processes, and what happens when one dies |
@@ -18,7 +17,6 @@
 
 #[cfg(feature = "arrow")]
 pub mod batches;
-pub mod blocks;
 mod commands;
 pub mod doubts;
 pub mod figure;

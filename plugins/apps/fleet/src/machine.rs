@@ -1,12 +1,12 @@
 //! The one function of a fleet: the rows of a machine and a graph to a model. It knows neither clock nor path nor environment.
 
-use athermal_core::engine::Fitted;
-use athermal_run::fit::{BareOutput, FitError, FitOptions, FitProgress, FitReport, fit};
+use athermal_core::watch::Watch;
+use athermal_jobs::fit::FitOutcome;
+use athermal_jobs::{RowsId, Summed};
+use athermal_run::fit::{FitError, FitOptions, FitReport};
 use athermal_run::model::{Card, Model};
 use athermal_run::recording::Recording;
 use thiserror::Error;
-
-use athermal_jobs::{RowsId, Summed};
 
 /// Why a machine has no model.
 #[derive(Debug, Error)]
@@ -45,37 +45,31 @@ pub struct MachineFit {
     pub model: Model,
     /// The rows.
     pub rows: RowsId,
-    /// How the fit went.
-    pub report: FitReport,
-    /// Outputs of which voters have no regressor left.
-    pub bare: Vec<BareOutput>,
+    /// How the fit went, and what may be wrong with the data.
+    pub outcome: FitOutcome,
 }
 
 impl MachineFit {
     /// What was fitted, as a model.
     pub(crate) fn of(
         graph: &Model,
-        fitted: Fitted,
-        report: FitReport,
+        outcome: FitOutcome,
         rows: RowsId,
         created: Option<String>,
     ) -> Result<Self, MachineError> {
-        if !report.estimators.is_empty() && report.failed().count() == report.estimators.len() {
-            return Err(MachineError::NothingFitted(Box::new(report)));
+        if outcome.is_nothing() {
+            return Err(MachineError::NothingFitted(Box::new(outcome.report)));
         }
-        let card = Card::of(&report, vec![rows.card()], created);
+        let card = Card::of(&outcome.report, vec![rows.card()], created);
         let model = Model {
-            graph: graph.graph.clone(),
-            plan: graph.plan.clone(),
-            fitted,
+            fitted: outcome.fitted.clone(),
             card: Some(card),
+            ..graph.clone()
         };
-        let bare = report.bare_outputs(&graph.plan);
         Ok(Self {
             model,
             rows,
-            report,
-            bare,
+            outcome,
         })
     }
 
@@ -103,11 +97,10 @@ pub fn fit_machine(
     rows: &dyn Recording,
     options: &FitOptions,
     created: Option<String>,
-    progress: &mut (dyn FnMut(FitProgress<'_>) + Send),
+    host: &dyn Watch,
 ) -> Result<MachineFit, MachineError> {
     let rows = Summed::new(rows);
-    let fitted = fit(&graph.plan, &rows, options, progress);
-    let (fitted, report) = fitted.map_err(MachineError::Fit)?;
+    let outcome = FitOutcome::of(&graph.plan, &rows, options, host).map_err(MachineError::Fit)?;
     let rows = rows.id().ok_or(MachineError::Changed)?;
-    MachineFit::of(graph, fitted, report, rows, created)
+    MachineFit::of(graph, outcome, rows, created)
 }

@@ -3,21 +3,24 @@
 use std::io::{self, BufRead, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use athermal_analysis::diagnosis::watch::{ChannelFaults, FaultWatch, Purpose};
 use athermal_core::compile::Wanted;
 use athermal_core::diagnostic::{Diagnostics, Sources, panic_text};
-use athermal_files::Dataset;
-use athermal_run::fit::{FitOptions, Outcome};
+use athermal_core::watch::Kept;
+use athermal_files::{Dataset, Options};
+use athermal_jobs::beyond::beyond;
+use athermal_jobs::blocks::{OfFiles, Sums};
+use athermal_jobs::doubts::Doubts;
+use athermal_jobs::faults::{FaultWatch, Purpose};
+use athermal_jobs::{RowsId, Summed};
+use athermal_run::fit::FitOptions;
 use athermal_run::model::{Card, Model, ModelError};
 use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
-use crate::blocks::{self, OnBlocks};
-use crate::doubts::{of_channels, of_reading};
+use crate::doubts::Doubt;
 use crate::figure::Figure;
 use crate::job::{Evaluated, Fitted, Job, Reply, Setup, Task, Unfitted, graph_hash};
 use crate::machine::{MachineError, MachineFit, fit_machine};
-use athermal_jobs::{RowsId, Summed};
 
 /// Works until the input ends.
 ///
@@ -78,25 +81,35 @@ fn load_graph(setup: &Setup) -> Result<Model, String> {
 }
 
 fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String> {
-    let dataset = Dataset::new(job.files.clone(), setup.reading.options(&job.files));
-    match (&job.task, graph) {
+    let reading = setup.reading.options(&job.files);
+    let dataset = Dataset::new(job.files.clone(), reading.clone());
+    let failed = |error: MachineError| error.to_string();
+    let fit = match (&job.task, graph) {
+        (Task::Evaluate { model }, _) => {
+            let model = Model::load_for(model, Wanted::SCORES).map_err(|error| words(&error))?;
+            return evaluated(setup, &model, &dataset);
+        }
+        (Task::Fit { .. }, None) => return Err("no graph was given".to_owned()),
         (Task::Fit { created, known }, Some(graph)) if setup.blocks.blocks.is_some() => {
             let kept = setup.blocks.keep_blocks.as_ref();
-            let on_blocks = OnBlocks {
-                graph,
-                files: &job.files,
-                reading: &setup.reading.options(&job.files),
-                kept: kept.map(|folder| folder.join(&job.machine)),
+            let kept = kept.map(|folder| folder.join(&job.machine));
+            let of = OfFiles {
+                files: Some(job.files.clone()),
+                reading: format!("{:?}", setup.reading),
+                data: &|files, within| {
+                    let reading = reading.clone();
+                    Dataset::new(files, Options { within, ..reading })
+                },
             };
-            let fit = on_blocks.fit(known.as_ref(), &options(setup.memory), created.clone());
-            match fit.map_err(|error| error.to_string())? {
-                blocks::Outcome::Same => Ok(Reply::Same),
-                blocks::Outcome::Fitted(fit, faults, doubts) => {
-                    let mut fitted = whole(*fit, &faults).map_err(|error| error.to_string())?;
-                    fitted.doubts.extend(doubts);
-                    Ok(Reply::Fitted(Box::new(fitted)))
-                }
+            let sums = Sums::of(&graph.plan, kept.as_deref(), &of, &Kept::default());
+            let sums = sums.map_err(|error| error.to_string())?;
+            let rows = sums.rows().map_err(|error| error.to_string())?;
+            if known.as_ref() == Some(&rows) {
+                return Ok(Reply::Same);
             }
+            let outcome = sums.fit(&graph.plan, &options(setup.memory));
+            let outcome = outcome.map_err(|error| error.to_string())?;
+            MachineFit::of(graph, outcome, rows, created.clone()).map_err(failed)?
         }
         (Task::Fit { created, known }, Some(graph)) => {
             if let Some(known) = known {
@@ -105,17 +118,14 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
                     return Ok(Reply::Same);
                 }
             }
-            let fitted = fitted(graph, &dataset, setup.memory, created.clone());
-            let mut fitted = fitted.map_err(|error| error.to_string())?;
-            fitted.doubts.extend(of_reading(&dataset.reports()));
-            Ok(Reply::Fitted(Box::new(fitted)))
+            let (options, created) = (options(setup.memory), created.clone());
+            let fit = fit_machine(graph, &dataset, &options, created, &Kept::default());
+            let mut fit = fit.map_err(failed)?;
+            fit.outcome = fit.outcome.read_from(&dataset);
+            fit
         }
-        (Task::Fit { .. }, None) => Err("no graph was given".to_owned()),
-        (Task::Evaluate { model }, _) => {
-            let model = Model::load_for(model, Wanted::SCORES).map_err(|error| words(&error))?;
-            evaluated(setup, &model, &dataset)
-        }
-    }
+    };
+    Ok(Reply::Fitted(Box::new(whole(fit).map_err(failed)?)))
 }
 
 /// Fits a graph on the rows of one machine, with all that the manifest of a fleet says of it: for whoever spreads machines over processes,
@@ -129,9 +139,14 @@ pub fn fitted(
     memory: usize,
     created: Option<String>,
 ) -> Result<Fitted, MachineError> {
-    let watch = FaultWatch::new(rows, Purpose::Fit);
-    let fit = fit_machine(graph, &watch, &options(memory), created, &mut |_| {})?;
-    whole(fit, &watch.found())
+    let options = options(memory);
+    whole(fit_machine(
+        graph,
+        rows,
+        &options,
+        created,
+        &Kept::default(),
+    )?)
 }
 
 fn options(memory: usize) -> FitOptions {
@@ -142,27 +157,24 @@ fn options(memory: usize) -> FitOptions {
     }
 }
 
-fn whole(fit: MachineFit, faults: &[ChannelFaults]) -> Result<Fitted, MachineError> {
-    let failed = fit.report.estimators.iter();
-    let unfitted = failed.filter_map(|of| match &of.outcome {
-        Outcome::Failed(error) => Some(Unfitted {
-            node: of.node.clone(),
-            error: error.to_string(),
-        }),
-        Outcome::Fitted(_) => None,
+fn whole(fit: MachineFit) -> Result<Fitted, MachineError> {
+    let MachineFit {
+        model,
+        rows,
+        outcome,
+    } = fit;
+    let unfitted = outcome.report.failed().map(|(node, error)| Unfitted {
+        node: node.to_owned(),
+        error: error.to_string(),
     });
-    let bare = fit.bare.iter().filter(|of| !of.has_others);
+    let bare = outcome.bare.iter().filter(|of| !of.has_others);
     Ok(Fitted {
-        model: fit.model.to_text()?,
-        scores: fit
-            .model
-            .card
-            .as_ref()
-            .map_or_else(Vec::new, Figure::of_card),
+        scores: model.card.as_ref().map_or_else(Vec::new, Figure::of_card),
         unfitted: unfitted.collect(),
         constant: bare.map(|of| of.output.clone()).collect(),
-        doubts: of_channels(faults, &fit.report.rejected, fit.report.refused),
-        rows: fit.rows,
+        doubts: Doubt::all(&outcome.doubts(&model.plan), &outcome.files),
+        rows,
+        model: model.to_text()?,
     })
 }
 
@@ -187,14 +199,18 @@ fn evaluated(setup: &Setup, model: &Model, dataset: &Dataset) -> Result<Reply, S
     if found.iter().any(is_put_out) {
         found.retain(is_put_out);
     }
+    let doubts = Doubts {
+        plan: &model.plan,
+        dataset,
+        refused: scores.refused,
+        rejected: &scores.rejected,
+        faults: watch.found(),
+        outside_fit: beyond(model.sample_ranges(), &scores.ranges),
+    };
     Ok(Reply::Evaluated(Box::new(Evaluated {
         fitted_on: model.card.as_ref().is_some_and(of_fit),
         scores: found,
-        doubts: [
-            of_channels(&watch.found(), &scores.rejected, scores.refused),
-            of_reading(&dataset.reports()),
-        ]
-        .concat(),
+        doubts: Doubt::all(&doubts.messages(), &dataset.reports()),
         rows,
     })))
 }

@@ -154,7 +154,7 @@ fn blocks(model: &Model, files: &[PathBuf]) -> Vec<Block> {
 fn on_blocks(model: &Model, files: &[PathBuf]) -> (Fitted, FitReport) {
     let blocks = blocks(model, files);
     let options = FitOptions::default();
-    fit_from_blocks(&model.plan, &blocks[..], &options, &mut |_| {}).unwrap()
+    fit_from_blocks(&model.plan, &blocks, &options, &mut |_| {}).unwrap()
 }
 
 fn text_of(fitted: &Fitted) -> BTreeMap<String, Value> {
@@ -425,7 +425,7 @@ fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
         blocks_of(&model.plan, &data, &|_| true, &mut |_| {}, &mut take).unwrap();
         let options = FitOptions::default();
         text_of(
-            &fit_from_blocks(&model.plan, &blocks[..], &options, &mut |_| {})
+            &fit_from_blocks(&model.plan, &blocks, &options, &mut |_| {})
                 .unwrap()
                 .0,
         )

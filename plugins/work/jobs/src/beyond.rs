@@ -38,15 +38,21 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
     seen.iter().filter_map(of).collect()
 }
 
-/// Warns of them.
-pub fn warn(host: &dyn Watch, all: &[Beyond<'_>]) {
-    for of in all {
+/// The warnings, one for each.
+pub fn messages(all: &[Beyond<'_>]) -> Vec<Message> {
+    let message = |of: &Beyond<'_>| {
         let all = [of.lowest, of.highest, of.lowest_in_fit, of.highest_in_fit];
         let [lowest, highest, lowest_in_fit, highest_in_fit] = apart(all);
         let words = format!(
             "{} is between {lowest} and {highest}, and was between {lowest_in_fit} and {highest_in_fit} in the data of the fit: {}",
             of.channel, of.doubt
         );
-        host.warning(Message::new(OUTSIDE_FIT, json!(of), words));
-    }
+        Message::new(OUTSIDE_FIT, json!(of), words)
+    };
+    all.iter().map(message).collect()
+}
+
+/// Warns of them.
+pub fn warn(host: &dyn Watch, all: &[Beyond<'_>]) {
+    messages(all).into_iter().for_each(|of| host.warning(of));
 }

@@ -7,17 +7,17 @@ use athermal_blocks::{KeptBlocks, OtherFolder};
 use athermal_core::compile::Plan;
 use athermal_core::failure::Failure;
 use athermal_core::watch::Watch;
-use athermal_files::Dataset;
+use athermal_files::{Dataset, Report};
 use athermal_run::fit::{
-    Block, FitError, FitOptions, FitProgress, blocks_of, check_blocks, fit_from_blocks,
+    Block, Blocks, FitError, FitOptions, blocks_of, check_blocks, fit_from_blocks,
 };
 use athermal_run::model::DataCard;
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data::Data;
-use crate::faults::{FaultWatch, Purpose};
+use crate::RowsId;
+use crate::faults::{ChannelFaults, FaultWatch, Purpose};
 use crate::fit::FitOutcome;
 
 /// How rows are cut into blocks.
@@ -56,82 +56,127 @@ impl BlockOptions {
     }
 }
 
-/// Fits a graph on blocks of data, of which some may be kept. Gives the cards of the data beside it.
-///
-/// # Errors
-/// When the graph has nodes that sums do not suffice, or data or blocks cannot be read.
-pub fn fit_on_blocks(
-    of: &BlockOptions,
-    plan: &Arc<Plan>,
-    data: &Data,
-    options: &FitOptions,
-    host: &dyn Watch,
-) -> Result<(FitOutcome, Vec<DataCard>), Failure> {
-    check_blocks(plan).map_err(FitError::from)?;
-    let mut faults = Vec::new();
-    let mut progress = host.progress("summing");
-    let mut make = |dataset: &Dataset,
-                    wanted: &dyn Fn(i64) -> bool,
-                    take: &mut dyn FnMut(Block) -> Result<(), FitError>|
-     -> Result<(), FitError> {
-        let watch = FaultWatch::new(dataset, Purpose::Fit);
-        let stepped = &mut |ticks| progress.set(ticks);
-        blocks_of(plan, &watch, wanted, stepped, take)?;
-        faults = watch.found();
-        Ok(())
-    };
-    let (dataset, cards, fitted);
-    match &of.keep_blocks {
-        None => {
-            let mut blocks = Vec::new();
-            dataset = data.dataset();
-            make(&dataset, &|_| true, &mut |block| {
-                blocks.push(block);
+/// Data of which sums are made: files, and how some of them are read, of which no rows outside of a stretch of time are needed.
+pub struct OfFiles<'a> {
+    /// The files; none where something else is read.
+    pub files: Option<Vec<PathBuf>>,
+    /// How they are read, in words that differ where rows may.
+    pub reading: String,
+    /// Some of them as a data set.
+    pub data: &'a dyn Fn(Vec<PathBuf>, Option<(i64, i64)>) -> Dataset,
+}
+
+/// The sums of the days of some data.
+pub struct Sums {
+    blocks: Kept,
+    faults: Vec<ChannelFaults>,
+    files: Vec<(String, Report)>,
+}
+
+enum Kept {
+    Here(Vec<Block>),
+    InFolder(KeptBlocks),
+}
+
+impl Sums {
+    /// Makes them, or brings those of a folder up to date.
+    ///
+    /// # Errors
+    /// When the graph has nodes that sums do not suffice, there are no files of which they could be kept, or data or blocks cannot be read.
+    pub fn of(
+        plan: &Arc<Plan>,
+        kept: Option<&Path>,
+        of: &OfFiles<'_>,
+        host: &dyn Watch,
+    ) -> Result<Self, Failure> {
+        check_blocks(plan).map_err(FitError::from)?;
+        let (mut faults, mut files) = (Vec::new(), Vec::new());
+        let mut progress = host.progress("summing");
+        let mut make =
+            |dataset: &Dataset,
+             wanted: &dyn Fn(i64) -> bool,
+             take: &mut dyn FnMut(Block) -> Result<(), FitError>| {
+                let watch = FaultWatch::new(dataset, Purpose::Fit);
+                blocks_of(plan, &watch, wanted, &mut |ticks| progress.set(ticks), take)?;
+                (faults, files) = (watch.found(), dataset.reports());
                 Ok(())
-            })?;
-            cards = data.cards(plan, &dataset)?;
-            fitted = fit_from_blocks(plan, &blocks[..], options, &mut nothing)?;
-        }
-        Some(folder) => {
-            let kept = refresh(folder, plan, data, &mut make)?;
-            fitted = fit_from_blocks(plan, &kept.0, options, &mut nothing)?;
-            (dataset, cards) = (data.dataset(), kept.1);
+            };
+        let blocks = match (kept, &of.files) {
+            (None, given) => {
+                let mut blocks = Vec::new();
+                let dataset = (of.data)(given.clone().unwrap_or_default(), None);
+                make(&dataset, &|_| true, &mut |block| {
+                    blocks.push(block);
+                    Ok(())
+                })?;
+                Kept::Here(blocks)
+            }
+            (Some(folder), Some(files)) => {
+                let (reading, data) = (&of.reading, of.data);
+                let kept = KeptBlocks::refresh(folder, plan, files, reading, data, &mut make);
+                Kept::InFolder(kept.map_err(|error| match error {
+                    FitError::Recording(error) if error.is::<OtherFolder>() => {
+                        Failure::Request(format!("--keep-blocks {error}"))
+                    }
+                    other => other.into(),
+                })?)
+            }
+            (Some(_), None) => {
+                let words = "--keep-blocks: blocks are kept of files, not of a journal or of a table in memory";
+                return Err(Failure::Request(words.to_owned()));
+            }
+        };
+        Ok(Self {
+            blocks,
+            faults,
+            files,
+        })
+    }
+
+    fn blocks(&self) -> &dyn Blocks {
+        match &self.blocks {
+            Kept::Here(blocks) => blocks,
+            Kept::InFolder(blocks) => blocks,
         }
     }
-    drop(progress);
-    let outcome = FitOutcome::with(plan, fitted, faults);
-    Ok((outcome.read_from(&dataset), cards))
-}
 
-/// Brings the folder of blocks up to date.
-fn refresh(
-    folder: &Path,
-    plan: &Arc<Plan>,
-    data: &Data,
-    make: athermal_blocks::Make<'_>,
-) -> Result<(KeptBlocks, Vec<DataCard>), Failure> {
-    let files = data.files().ok_or_else(|| {
-        Failure::Request(
-            "--keep-blocks: blocks are kept of files, not of a journal or of a table in memory"
-                .to_owned(),
-        )
-    })?;
-    let mut kept = KeptBlocks::refresh(
-        folder,
-        plan,
-        &files,
-        &data.reading_words(),
-        &|files, within| data.dataset_of(files, within),
-        make,
-    )
-    .map_err(|error| match error {
-        FitError::Recording(error) if error.is::<OtherFolder>() => {
-            Failure::Request(format!("--keep-blocks {error}"))
+    /// The rows that they are of.
+    ///
+    /// # Errors
+    /// When a block cannot be read.
+    pub fn rows(&self) -> Result<RowsId, FitError> {
+        RowsId::of_blocks(self.blocks())
+    }
+
+    /// What was met in each file that was read.
+    #[must_use]
+    pub fn files(&self) -> &[(String, Report)] {
+        &self.files
+    }
+
+    /// The cards of the data where blocks are kept.
+    #[must_use]
+    pub fn cards(&self) -> Option<&[DataCard]> {
+        match &self.blocks {
+            Kept::Here(_) => None,
+            Kept::InFolder(blocks) => Some(&blocks.cards),
         }
-        other => other.into(),
-    })?;
-    let cards = std::mem::take(&mut kept.cards);
-    Ok((kept, cards))
-}
+    }
 
-fn nothing(_: FitProgress<'_>) {}
+    /// Fits a graph on them.
+    ///
+    /// # Errors
+    /// When a block cannot be read, or a node panics.
+    pub fn fit(self, plan: &Arc<Plan>, options: &FitOptions) -> Result<FitOutcome, FitError> {
+        let fitted = fit_from_blocks(plan, self.blocks(), options, &mut |_| {})?;
+        let lost = match self.blocks {
+            Kept::Here(_) => Vec::new(),
+            Kept::InFolder(blocks) => blocks.lost,
+        };
+        Ok(FitOutcome {
+            files: self.files,
+            lost,
+            ..FitOutcome::with(plan, fitted, self.faults)
+        })
+    }
+}

@@ -14,7 +14,7 @@ use athermal_core::compile::Plan;
 use athermal_core::failure::{Failure, outside};
 use athermal_core::time::Duration;
 use athermal_core::watch::Watch;
-use athermal_files::{Dataset, Options, Tables, recordings_in};
+use athermal_files::{Dataset, Options, Report, Tables, recordings_in};
 use athermal_run::model::{DataCard, Model};
 use athermal_run::recording::ThinnedChannels;
 use athermal_serve::journal::JournalRecording;
@@ -284,11 +284,14 @@ impl Data {
     ///
     /// # Errors
     /// When a file cannot be read.
-    pub fn cards(&self, plan: &Plan, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
+    pub fn cards(
+        &self,
+        plan: &Plan,
+        reports: &[(String, Report)],
+    ) -> Result<Vec<DataCard>, Failure> {
         if self.is_a_stretch() {
-            return self.cards_of_rows(plan, dataset);
+            return self.cards_of_rows(plan, reports);
         }
-        let reports = dataset.reports();
         let card = |path: &Path| {
             let name = path.display().to_string();
             if self.tables.has(path) {

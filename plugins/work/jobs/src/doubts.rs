@@ -8,6 +8,8 @@ use serde_json::{Map, Value, json};
 
 use crate::beyond::{self, Beyond};
 use crate::faults::{self, ChannelFaults};
+use crate::remarks;
+use athermal_core::message::Message;
 
 /// What is doubtful in a recording on which a model was run.
 pub struct Doubts<'a> {
@@ -33,17 +35,19 @@ impl Doubts<'_> {
         }
     }
 
+    /// The warnings of them, but for dates without a zone.
+    #[must_use]
+    pub fn messages(&self) -> Vec<Message> {
+        let (files, rejected) = (self.dataset.reports(), self.rejected);
+        let mut all = remarks::doubts(self.plan, &files, self.refused, rejected);
+        all.extend(beyond::messages(&self.outside_fit));
+        all.extend(faults::messages(&self.faults));
+        all
+    }
+
     /// Warns of them.
     pub fn warn(&self, host: &dyn Watch) {
-        crate::remarks::warn(
-            host,
-            self.plan,
-            &self.dataset.reports(),
-            self.refused,
-            self.rejected,
-        );
-        beyond::warn(host, &self.outside_fit);
-        faults::warn(host, &self.faults);
+        remarks::warn_of(host, self.messages(), &self.dataset.reports());
     }
 }
 

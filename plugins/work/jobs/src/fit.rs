@@ -19,7 +19,7 @@ use athermal_run::recording::Recording;
 use clap::Args;
 
 use crate::Threads;
-use crate::blocks::{BlockOptions, fit_on_blocks};
+use crate::blocks::{BlockOptions, OfFiles, Sums};
 use crate::data::Data;
 use crate::faults::{self, ChannelFaults, FaultWatch, Purpose};
 use crate::remarks;
@@ -92,14 +92,28 @@ impl Fit {
         };
         let plan = &model.plan;
         let (outcome, cards) = match self.blocks.blocks {
-            Some(_) => fit_on_blocks(&self.blocks, plan, &self.data, &options, host)?,
+            Some(_) => {
+                let of = OfFiles {
+                    files: self.data.files(),
+                    reading: self.data.reading_words(),
+                    data: &|files, within| match files.is_empty() {
+                        true => self.data.dataset(),
+                        false => self.data.dataset_of(files, within),
+                    },
+                };
+                let sums = Sums::of(plan, self.blocks.keep_blocks.as_deref(), &of, host)?;
+                let cards = match sums.cards() {
+                    Some(cards) => cards.to_vec(),
+                    None => self.data.cards(plan, sums.files())?,
+                };
+                (sums.fit(plan, &options)?, cards)
+            }
             None => {
                 let dataset = self.data.dataset();
                 let outcome = FitOutcome::of(plan, &dataset, &options, host)?;
-                (
-                    outcome.read_from(&dataset),
-                    self.data.cards(plan, &dataset)?,
-                )
+                let outcome = outcome.read_from(&dataset);
+                let cards = self.data.cards(plan, &outcome.files)?;
+                (outcome, cards)
             }
         };
         outcome.warn(plan, host);
@@ -143,6 +157,8 @@ pub struct FitOutcome {
     pub faults: Vec<ChannelFaults>,
     /// What was met in each file that was read.
     pub files: Vec<(String, Report)>,
+    /// Blocks that were kept although their rows are gone.
+    pub lost: Vec<String>,
 }
 
 impl FitOutcome {
@@ -186,6 +202,7 @@ impl FitOutcome {
             report,
             faults,
             files: Vec::new(),
+            lost: Vec::new(),
         }
     }
 
@@ -213,7 +230,7 @@ impl FitOutcome {
     #[must_use]
     pub fn doubts(&self, plan: &Plan) -> Vec<Message> {
         let report = &self.report;
-        let mut all = self.constant();
+        let mut all = Vec::new();
         all.extend(report.fallbacks(plan).into_iter().map(|(output, voter, share)| {
             let share = 100.0 * share;
             format!(
@@ -223,12 +240,21 @@ impl FitOutcome {
         }));
         let rejected = &report.rejected;
         all.extend(remarks::doubts(plan, &self.files, report.refused, rejected));
+        if let (Some(first), Some(last)) = (self.lost.first(), self.lost.last()) {
+            let [first, last] = [first, last].map(|name| name.trim_end_matches(".json"));
+            let words = format!(
+                "{} kept although the rows are gone, {first} to {last}: what files hold no more of these is as it was",
+                counted(self.lost.len() as u64, "block")
+            );
+            all.push(words.into());
+        }
         all.extend(faults::messages(&self.faults));
         all
     }
 
     /// Reports these.
     pub fn warn(&self, plan: &Plan, host: &dyn Watch) {
+        self.constant().into_iter().for_each(|of| host.warning(of));
         remarks::warn_of(host, self.doubts(plan), &self.files);
         if !self.is_nothing() {
             self.failed().iter().for_each(|words| host.warning(words));

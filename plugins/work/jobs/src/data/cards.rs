@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use athermal_core::compile::Plan;
-use athermal_files::{Dataset, Report};
+use athermal_files::Report;
 use athermal_run::model::DataCard;
 
 use super::Data;
@@ -19,7 +19,7 @@ impl Data {
     pub(super) fn cards_of_rows(
         &self,
         plan: &Plan,
-        dataset: &Dataset,
+        reports: &[(String, Report)],
     ) -> Result<Vec<DataCard>, Failure> {
         let mut of_one = plan.clone();
         // Files that are merged have other columns each.
@@ -27,7 +27,6 @@ impl Data {
         let tables = of_one.table.files.iter_mut().map(|(_, table)| table);
         let tables = tables.chain([&mut of_one.table.base]);
         tables.for_each(|table| table.segment = None);
-        let reports = dataset.reports();
         let taken = reports.iter().filter(|(_, report)| report.rows > 0);
         let card = |(name, _): &(String, Report)| {
             let mut file = self.others(vec![PathBuf::from(name)]);
@@ -47,7 +46,7 @@ impl Data {
         if let Some(cards) = cards {
             return Ok(cards);
         }
-        let rows = RowsId::of(dataset, plan).map_err(outside)?;
+        let rows = RowsId::of(&self.dataset(), plan).map_err(outside)?;
         Ok(vec![DataCard {
             from: self.reading.times.from.clone(),
             to: self.reading.times.to.clone(),
