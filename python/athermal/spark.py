@@ -75,7 +75,7 @@ _SCHEMA = (
     "`model` binary, `error` string, `rows` bigint, `rows_hash` string, "
     "`scores` array<struct<`of`: string, `truth`: string, `unit`: string, `n`: bigint, `rmse`: double>>, "
     "`unfitted` array<struct<`node`: string, `error`: string>>, `constant` array<string>, "
-    "`doubts` array<struct<`channel`: string, `fault`: string>>"
+    "`doubts` array<struct<`channel`: string, `fault`: string, `count`: bigint, `text`: string>>"
 )
 """The types of an answer for Spark, behind that of the machine."""
 
@@ -117,7 +117,7 @@ def _types() -> list[Any]:
         objects(of=text, truth=text, unit=text, n=count, rmse=number),
         objects(node=text, error=text),
         pa.list_(text),
-        objects(channel=text, fault=text),
+        objects(channel=text, fault=text, count=count, text=text),
     ]
 
 

@@ -3,7 +3,7 @@
 use arrow_array::RecordBatchReader as _;
 use arrow_array::ffi_stream::RecordBatchStreamReader;
 use arrow_pyarrow::FromPyArrow as _;
-use athermal_fleet::{batches, fitted};
+use athermal_fleet::batches;
 use pyo3::prelude::*;
 use serde_json::json;
 
@@ -26,8 +26,7 @@ pub fn fit_machine<'py>(
     // Whoever makes the stream needs Python for it.
     let fit = guarded(py, || {
         py.detach(move || {
-            let once = batches::once(graph, name, reader.schema(), reader, memory);
-            let fit = once.and_then(|rows| fitted(graph, &rows, memory, created));
+            let fit = batches::fitted(graph, name, reader.schema(), reader, memory, created);
             fit.map_err(|error| error.to_string())
         })
     });

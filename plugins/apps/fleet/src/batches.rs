@@ -1,16 +1,20 @@
 //! The rows of a machine as batches of Arrow, one after the other: as Spark, Dask and data frames hand them over.
 
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
-use athermal_core::watch::Watch;
-use athermal_files::{FileError, Options, Reader, layout};
+use athermal_core::watch::{Kept, Watch};
+use athermal_files::{FileError, Options, Reader, Report, layout};
 use athermal_run::fit::{FitError, FitOptions};
 use athermal_run::model::Model;
+use athermal_run::recording::{Event, Samples, Source, SourceError};
 
+use crate::job::Fitted;
 use crate::machine::{MachineError, MachineFit, fit_machine};
 use crate::once::Once;
+use crate::worker::{options, whole};
 
 /// Reads batches of a schema as the rows of a graph; `name` stands for them in messages.
 ///
@@ -30,7 +34,28 @@ pub fn rows_of(
     Reader::from_typed(Path::new(name), file, layout(&graph.plan), options)
 }
 
-/// The rows of batches that come once, as a recording of this graph. Batches that were read are let go; who reads them again gets them
+/// What was met in what was read, once it has been.
+type Found = Arc<Mutex<Vec<(String, Report)>>>;
+
+/// A reader, of which it stays known what it left out once it has been read.
+struct Reported {
+    reader: Reader,
+    name: String,
+    found: Found,
+}
+
+impl Source for Reported {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let next = Source::next(&mut self.reader, samples)?;
+        if next.is_none() {
+            let report = (self.name.clone(), self.reader.report().clone());
+            *self.found.lock().unwrap_or_else(PoisonError::into_inner) = vec![report];
+        }
+        Ok(next)
+    }
+}
+
+/// The rows of batches that come once, as a recording of this graph, and what was left out of them, once they have been read. Batches that were read are let go; who reads them again gets them
 /// from what was kept of them: in memory up to so many bytes, beyond that in a file without a name.
 ///
 /// # Errors
@@ -41,10 +66,35 @@ pub fn once(
     schema: SchemaRef,
     batches: impl Iterator<Item = Result<RecordBatch, ArrowError>> + Send + 'static,
     memory: usize,
-) -> Result<Once<'static>, MachineError> {
+) -> Result<(Once<'static>, Found), MachineError> {
     let rows = rows_of(graph, name, schema, batches);
-    let rows = rows.map_err(|error| MachineError::Fit(FitError::Recording(error.into())))?;
-    Ok(Once::new(Box::new(rows), memory))
+    let reader = rows.map_err(|error| MachineError::Fit(FitError::Recording(error.into())))?;
+    let (name, found) = (name.to_owned(), Arc::default());
+    let rows = Reported {
+        reader,
+        name,
+        found: Arc::clone(&found),
+    };
+    Ok((Once::new(Box::new(rows), memory), found))
+}
+
+/// A machine fitted on batches that come once, with all that the manifest of a fleet says of it: for whoever spreads machines over processes,
+/// each of which works on one at a time. So the fit has one thread.
+///
+/// # Errors
+/// As of [`rows_of`] and [`fit_machine`].
+pub fn fitted(
+    graph: &Model,
+    name: &str,
+    schema: SchemaRef,
+    batches: impl Iterator<Item = Result<RecordBatch, ArrowError>> + Send + 'static,
+    memory: usize,
+    created: Option<String>,
+) -> Result<Fitted, MachineError> {
+    let (rows, found) = once(graph, name, schema, batches, memory)?;
+    let mut fit = fit_machine(graph, &rows, &options(memory), created, &Kept::default())?;
+    fit.outcome.files = std::mem::take(&mut found.lock().unwrap_or_else(PoisonError::into_inner));
+    whole(fit)
 }
 
 /// [`fit_machine`] on batches that come once.
@@ -60,21 +110,19 @@ pub fn fit_batches(
     created: Option<String>,
     host: &dyn Watch,
 ) -> Result<MachineFit, MachineError> {
-    let once = once(graph, name, schema, batches, options.memory)?;
+    let (once, _) = once(graph, name, schema, batches, options.memory)?;
     fit_machine(graph, &once, options, created, host)
 }
 
 #[cfg(test)]
 mod tests {
     use std::fmt::Write as _;
-    use std::sync::Arc;
 
     use arrow_array::Float64Array;
     use arrow_schema::{DataType, Field, Schema};
     use athermal_core::compile::Wanted;
     use athermal_core::diagnostic::{Diagnostics, Sources};
     use athermal_core::prng::Prng;
-    use athermal_core::watch::Kept;
     use athermal_files::Dataset;
 
     // A plugin that no code names is left out by the linker.
@@ -82,6 +130,7 @@ mod tests {
     use athermal_features as _;
 
     use super::*;
+    use crate::doubts::Doubt;
 
     const GRAPH: &str = r#"
 schema = 1
@@ -146,6 +195,26 @@ z = "linear"
             Arc::clone(&schema),
             rows.chunks(length).map(batch).collect(),
         )
+    }
+
+    #[test]
+    fn what_is_left_out_of_batches_is_a_doubt_of_the_machine() {
+        let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
+        let file = tempfile::NamedTempFile::with_suffix(".toml").unwrap();
+        std::fs::write(file.path(), GRAPH).unwrap();
+        let graph = Model::load_to_fit(file.path(), Wanted::default(), &mut sources, &mut doubts);
+        let graph = graph.unwrap();
+        let mut rows = rows();
+        let found = |rows: &[[f64; 4]]| {
+            let (schema, batches) = batches_of(rows, 100);
+            fitted(&graph, "m", schema, batches.into_iter(), 1 << 20, None)
+                .unwrap()
+                .doubts
+        };
+        let is_reported = |all: &[Doubt]| all.iter().any(|of| of.fault == "time_before");
+        assert!(!is_reported(&found(&rows)));
+        rows.swap(300, 320);
+        assert!(is_reported(&found(&rows)), "{:?}", found(&rows));
     }
 
     #[test]

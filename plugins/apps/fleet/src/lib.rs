@@ -3,7 +3,6 @@
 //! | part | decides |
 //! |---|---|
 //! | [`fit_machine`] | what the rows of a machine and a graph give: the bytes of a model |
-//! | [`fitted`] | the same, with what is reported of it |
 //! | [`RowsId`] | by what rows are known again |
 //! | `batches` | how rows come as batches of Arrow |
 //! | [`found`] | which files are of which machine |
@@ -36,4 +35,3 @@ pub use athermal_jobs::RowsId;
 pub use machine::{MachineError, MachineFit, fit_machine};
 #[cfg(feature = "arrow")]
 pub use once::Once;
-pub use worker::fitted;

@@ -265,7 +265,7 @@ pub struct Comparison {
 /// from machines that are not far off. Responses that have the same sign in all machines, by twice their standard errors, are compared by
 /// their logarithms, since parameters of machines differ by factors. An input that an estimator did not choose has no response.
 ///
-/// A machine is named by its largest score. The limit is one that a machine exceeds by chance in [`CHANCE`] of cases: by Student's t and
+/// A machine is named by its largest score. The limit is one that a machine exceeds by chance in one of a hundred cases: by Student's t and
 /// Bonferroni's share for so many traits, or by the largest scores of the machines of this very fleet, where these are larger: their
 /// logarithms have a mean and a spread too.
 #[must_use]

@@ -14,7 +14,6 @@ use athermal_jobs::faults::{FaultWatch, Purpose};
 use athermal_jobs::{RowsId, Summed};
 use athermal_run::fit::FitOptions;
 use athermal_run::model::{Card, Model, ModelError};
-use athermal_run::recording::Recording;
 use athermal_run::score::{ScoreOptions, score};
 
 use crate::doubts::Doubt;
@@ -128,28 +127,7 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
     Ok(Reply::Fitted(Box::new(whole(fit).map_err(failed)?)))
 }
 
-/// Fits a graph on the rows of one machine, with all that the manifest of a fleet says of it: for whoever spreads machines over processes,
-/// each of which works on one at a time. So the fit has one thread.
-///
-/// # Errors
-/// As of [`fit_machine`].
-pub fn fitted(
-    graph: &Model,
-    rows: &dyn Recording,
-    memory: usize,
-    created: Option<String>,
-) -> Result<Fitted, MachineError> {
-    let options = options(memory);
-    whole(fit_machine(
-        graph,
-        rows,
-        &options,
-        created,
-        &Kept::default(),
-    )?)
-}
-
-fn options(memory: usize) -> FitOptions {
+pub(crate) fn options(memory: usize) -> FitOptions {
     FitOptions {
         memory,
         threads: 1,
@@ -157,7 +135,7 @@ fn options(memory: usize) -> FitOptions {
     }
 }
 
-fn whole(fit: MachineFit) -> Result<Fitted, MachineError> {
+pub(crate) fn whole(fit: MachineFit) -> Result<Fitted, MachineError> {
     let MachineFit {
         model,
         rows,
