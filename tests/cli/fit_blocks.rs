@@ -194,3 +194,40 @@ fn what_sums_do_not_suffice_is_refused_by_name() {
         .tells(&["holds 2026-03-01.json and no index.json"]);
     assert!(other.join("2026-03-01.json").exists());
 }
+
+#[test]
+fn a_day_of_data_is_cut_into_blocks_of_hours_which_are_kept_and_read_again() {
+    let scratch = Scratch::new("fit-blocks-hours");
+    let (whole, _) = days(&scratch, 1);
+    let (graph, blocks) = (graph("linear-axis"), scratch.path("blocks"));
+    let model = |name: &str| scratch.path(&format!("{name}.json"));
+    let fitted_on = |name: &str, length: &str, more: &[&str]| {
+        let words = [&["--blocks", length], more].concat();
+        fit(&graph, &[&whole], &model(name), &words)
+    };
+    // A day has no folds that end with days.
+    fitted_on("days", "day", &[]).ended(1);
+    fitted_on("hours", "6h", &[]).ended(0);
+    let folder = blocks.to_str().unwrap().to_owned();
+    for name in ["made", "read"] {
+        fitted_on(name, "6h", &["--keep-blocks", &folder]).ended(0);
+        assert_eq!(learned(&model(name)), learned(&model("hours")), "{name}");
+    }
+    let names = std::fs::read_dir(&blocks).unwrap();
+    let mut names: Vec<String> = names
+        .map(|of| of.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let of_blocks = ["T0000", "T0600", "T1200", "T1800"].map(|of| format!("1970-01-01{of}.json"));
+    assert_eq!(names[..4], of_blocks);
+    // Another length makes all anew.
+    fitted_on("longer", "4h", &["--keep-blocks", &folder]).ended(0);
+    assert!(!blocks.join("1970-01-01T0600.json").exists());
+    for (length, words) in [
+        ("10min", "looks back"),
+        ("90s", "whole minutes"),
+        ("never", "--blocks"),
+    ] {
+        fitted_on("none", length, &[]).ended(2).tells(&[words]);
+    }
+}

@@ -179,8 +179,8 @@ impl fmt::Display for NumericsError {
             ),
             Self::FoldsOfStretches { folds, stretches } => write!(
                 f,
-                "{stretches} blocks cannot be cut into {folds} folds of whole blocks that leave some to train on; fit without blocks, on \
-                 fewer folds, or on more data"
+                "{stretches} blocks cannot be cut into {folds} folds of whole blocks that leave some to train on; fit on shorter blocks, \
+                 without them, on fewer folds, or on more data"
             ),
             Self::FoldsApart {
                 test,

@@ -10,7 +10,7 @@ use crate::engine::SampleRange;
 /// The form that this version writes.
 const FORMAT: u64 = 1;
 
-/// What a fit needs of the rows of one UTC day, with which it can do without them.
+/// What a fit needs of the rows of one UTC day, or of another stretch of time, with which it can do without them.
 ///
 /// Windows and lags at the beginning of the day know the day before. What was summed is known by two checksums: of the rows of both days,
 /// and of [the part of the graph](super::rows_identity) that makes examples of them. In JSON every number comes back to the bit.
@@ -18,7 +18,7 @@ const FORMAT: u64 = 1;
 #[serde(deny_unknown_fields)]
 pub struct Block {
     athermal_block: u64,
-    /// The day, counted from 1970-01-01.
+    /// Which one it is of its length, counted from 1970-01-01.
     pub day: i64,
     /// The checksum of the rows of this day and the day before: instants and values, wherever they were read from.
     pub rows: String,

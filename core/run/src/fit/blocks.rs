@@ -19,8 +19,6 @@ use crate::recording::SourceError;
 use crate::score::Means;
 use crate::time::{Duration, Instant};
 
-const DAY: Duration = Duration::from_ns(super::cut::DAY_NS);
-
 /// Why a fit cannot be made by blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BlockError {
@@ -34,16 +32,18 @@ pub enum BlockError {
         /// Each with its kind.
         nodes: Vec<(String, &'static str)>,
     },
-    /// A node looks back farther than a day.
+    /// A node looks back farther than a block is long.
     LooksBack {
         /// The node.
         node: String,
         /// How far it does; none where it depends on all of the past.
         span: Option<Duration>,
+        /// How long a block is.
+        length: Duration,
     },
-    /// The rows go back to a day that has ended.
+    /// The rows go back to a block that has ended.
     GoesBack {
-        /// The day, counted from 1970-01-01.
+        /// Which one, counted from 1970-01-01.
         day: i64,
     },
     /// The rows of a node cannot be summed.
@@ -53,9 +53,9 @@ pub enum BlockError {
         /// Why.
         error: TrainingError,
     },
-    /// A block is not one of this graph, or not in the order of days.
+    /// A block is not one of this graph, or not in the order of time.
     Stray {
-        /// The day, counted from 1970-01-01.
+        /// Which one, counted from 1970-01-01.
         day: i64,
     },
     /// There is no block.
@@ -82,22 +82,23 @@ impl fmt::Display for BlockError {
                 "{} learns from what other nodes were fitted to, which blocks do not hold; fit without blocks",
                 named(nodes)
             ),
-            Self::LooksBack { node, span } => {
+            Self::LooksBack { node, span, length } => {
                 let span = span.map_or("all of the past".to_owned(), |span| span.to_string());
                 write!(
                     f,
-                    "`{node}` looks back {span}, and a block by day knows the day before and no more; fit without blocks, or shorten windows"
+                    "`{node}` looks back {span}, and a block of {length} knows the one before and no more; fit without blocks, make them longer, or \
+                     shorten windows"
                 )
             }
             Self::GoesBack { day } => write!(
                 f,
-                "the rows go back to day {day} since 1970-01-01, which has ended; blocks are made of rows in the order of time: fit logs \
+                "the rows go back to block {day} since 1970-01-01, which has ended; blocks are made of rows in the order of time: fit logs \
                  that overlap one by one, or without blocks"
             ),
             Self::NoSums { node, error } => write!(f, "`{node}`: {error}"),
             Self::Stray { day } => write!(
                 f,
-                "the block of day {day} since 1970-01-01 is of another graph, or not in the order of days; make it anew from the rows"
+                "block {day} since 1970-01-01 is of another graph, or not in the order of time; make it anew from the rows"
             ),
             Self::None => write!(f, "there is no block to fit on"),
         }
@@ -135,11 +136,11 @@ impl Blocks for Vec<Block> {
     }
 }
 
-/// Checks that sums suffice to fit a plan.
+/// Checks that sums over blocks of a length suffice to fit a plan.
 ///
 /// # Errors
 /// Which nodes need the rows.
-pub fn check(plan: &Plan) -> Result<(), BlockError> {
+pub fn check(plan: &Plan, length: Duration) -> Result<(), BlockError> {
     let named = |nodes: Vec<usize>| -> Vec<(String, &'static str)> {
         let of = |nth: usize| (plan.nodes[nth].instance(), plan.nodes[nth].kind.name);
         nodes.into_iter().map(of).collect()
@@ -177,9 +178,9 @@ pub fn check(plan: &Plan) -> Result<(), BlockError> {
                 continue;
             }
             let span = (!other.endless).then_some(warm_ups[nth] + ahead);
-            if span.is_none_or(|span| span > DAY) {
+            if span.is_none_or(|span| span > length) {
                 let node = other.instance();
-                return Err(BlockError::LooksBack { node, span });
+                return Err(BlockError::LooksBack { node, span, length });
             }
         }
     }
@@ -239,7 +240,8 @@ pub fn fit_from_blocks(
     options: &FitOptions,
     progress: &mut (dyn FnMut(FitProgress<'_>) + Send),
 ) -> Result<(Fitted, FitReport), FitError> {
-    check(plan)?;
+    // They were made of rows, and looked back far enough.
+    check(plan, Duration::from_ns(i64::MAX))?;
     let nodes: Vec<usize> = fitted_nodes(plan).collect();
     let (listener, identity) = (Listener::new(progress), rows_identity(plan));
     let mut fit = FromBlocks {

@@ -1,4 +1,4 @@
-//! Cuts a recording at UTC days and sums the examples of each. Not a fit from the sums.
+//! Cuts a recording into stretches of one length, as a rule UTC days, and sums the examples of each. Not a fit from the sums.
 
 use std::collections::BTreeMap;
 use std::hash::Hasher as _;
@@ -18,15 +18,13 @@ use crate::engine::{Engine, Fitted, Fnv1a, When, naming_one};
 use crate::node::{Trainer, TrainingError};
 use crate::recording::{Event, Recording, Samples, Steps, drive};
 use crate::score::Means;
-use crate::time::Instant;
-
-pub(super) const DAY_NS: i64 = 86_400_000_000_000;
+use crate::time::{Duration, Instant};
 
 /// So many rows are summed at a time.
 const BATCH: usize = 256;
 
-/// Steps a plan over a recording and hands on a block for each UTC day that has rows, in order; of days that are not `wanted` none is
-/// made. A day is stepped by an engine that has seen the day before and no more, so that its block does not depend on the rest of the
+/// Steps a plan over a recording and hands on a block for each stretch of that length that has rows, counted from 1970-01-01, in order; of
+/// those that are not `wanted` none is made. Below they are called days, which they are as a rule. A day is stepped by an engine that has seen the day before and no more, so that its block does not depend on the rest of the
 /// recording. `progress` is called with the number of ticks stepped so far.
 ///
 /// # Errors
@@ -35,13 +33,15 @@ const BATCH: usize = 256;
 pub fn blocks_of(
     plan: &Arc<Plan>,
     recording: &dyn Recording,
+    length: Duration,
     wanted: &dyn Fn(i64) -> bool,
     progress: &mut dyn FnMut(u64),
     take: &mut dyn FnMut(Block) -> Result<(), FitError>,
 ) -> Result<(), FitError> {
-    check(plan)?;
+    check(plan, length)?;
     let mut cutter = Cutter {
         plan,
+        length_ns: length.as_ns(),
         graph: rows_identity(plan),
         wanted,
         take,
@@ -66,6 +66,7 @@ pub fn blocks_of(
 /// The day that is summed, and beside it the one after, for which it is the day before.
 struct Cutter<'a> {
     plan: &'a Arc<Plan>,
+    length_ns: i64,
     graph: String,
     wanted: &'a dyn Fn(i64) -> bool,
     take: &'a mut dyn FnMut(Block) -> Result<(), FitError>,
@@ -86,7 +87,7 @@ impl Steps for Cutter<'_> {
             Event::Row(now) => {
                 let is_refused = !self.is_break && self.last.is_some_and(|last| now <= last);
                 if !is_refused {
-                    self.go_to(now.as_ns().div_euclid(DAY_NS))?;
+                    self.go_to(now.as_ns().div_euclid(self.length_ns))?;
                     (self.last, self.is_break) = (Some(now), false);
                 }
             }

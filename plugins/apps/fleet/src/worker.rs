@@ -83,16 +83,17 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
     let reading = setup.reading.options(&job.files);
     let dataset = Dataset::new(job.files.clone(), reading.clone());
     let failed = |error: MachineError| error.to_string();
-    let fit = match (&job.task, graph) {
-        (Task::Evaluate { model }, _) => {
+    let fit = match (&job.task, graph, setup.blocks.blocks) {
+        (Task::Evaluate { model }, ..) => {
             let model = Model::load_for(model, Wanted::SCORES).map_err(|error| words(&error))?;
             return evaluated(setup, &model, &dataset);
         }
-        (Task::Fit { .. }, None) => return Err("no graph was given".to_owned()),
-        (Task::Fit { created, known }, Some(graph)) if setup.blocks.blocks.is_some() => {
+        (Task::Fit { .. }, None, _) => return Err("no graph was given".to_owned()),
+        (Task::Fit { created, known }, Some(graph), Some(cut)) => {
             let kept = setup.blocks.keep_blocks.as_ref();
             let kept = kept.map(|folder| folder.join(&job.machine));
             let of = OfFiles {
+                cut,
                 files: Some(job.files.clone()),
                 reading: format!("{:?}", setup.reading),
                 data: &|files, within| {
@@ -110,7 +111,7 @@ fn done(setup: &Setup, graph: Option<&Model>, job: &Job) -> Result<Reply, String
             let outcome = outcome.map_err(|error| error.to_string())?;
             MachineFit::of(graph, outcome, rows, created.clone()).map_err(failed)?
         }
-        (Task::Fit { created, known }, Some(graph)) => {
+        (Task::Fit { created, known }, Some(graph), None) => {
             if let Some(known) = known {
                 let rows = RowsId::of(&dataset, &graph.plan).map_err(|error| error.to_string())?;
                 if rows == *known {

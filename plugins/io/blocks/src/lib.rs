@@ -1,4 +1,4 @@
-//! Blocks of a fit that are kept in a folder beside the data, a file for each UTC day: which of them files of data leave as they are,
+//! Blocks of a fit that are kept in a folder beside the data, a file for each UTC day or other stretch of time: which of them files of data leave as they are,
 //! and which are made anew. Not how rows become blocks, nor a fit on them.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use athermal_core::compile::Plan;
+use athermal_core::time::Duration;
 use athermal_files::{Dataset, Report};
 use athermal_run::fit::{Block, Blocks, FitError, rows_identity};
 use athermal_run::live::store::write_whole;
@@ -89,11 +90,15 @@ impl File {
     }
 
     /// The days whose blocks depend on its rows: its own, and the one after, which knows the day before.
-    fn days(&self) -> impl Iterator<Item = i64> + use<> {
-        let days = self
-            .period
-            .map(|(from, to)| (from.div_euclid(DAY_NS), to.div_euclid(DAY_NS) + 1));
-        days.into_iter().flat_map(|(from, to)| from..=to)
+    fn days(&self, length: Duration) -> impl Iterator<Item = i64> + use<> {
+        self.own(length).flat_map(|day| [day, day + 1])
+    }
+
+    /// The days of its rows.
+    fn own(&self, length: Duration) -> impl Iterator<Item = i64> + use<> {
+        let number = move |ns: i64| ns.div_euclid(length.as_ns());
+        let days = self.period.map(|(from, to)| number(from)..=number(to));
+        days.into_iter().flatten()
     }
 
     /// Whether it is there no more, and none of the others has all of its period.
@@ -173,15 +178,21 @@ fn failed(path: &Path, what: impl std::fmt::Display) -> FitError {
     FitError::Recording(format!("{}: {what}", path.display()).into())
 }
 
-/// The file of a day.
-fn name_of(day: i64) -> Option<String> {
-    let at = jiff::Timestamp::from_second(day.checked_mul(86_400)?).ok()?;
-    Some(at.strftime("%Y-%m-%d.json").to_string())
+/// The file of a block: its day, or its minute where blocks are no days.
+fn name_of(nth: i64, length: Duration) -> Option<String> {
+    let begin = nth.checked_mul(length.as_ns())?;
+    let at = jiff::Timestamp::from_nanosecond(begin.into()).ok()?;
+    let form = match length.as_ns() % DAY_NS {
+        0 => "%Y-%m-%d.json",
+        _ => "%Y-%m-%dT%H%M.json",
+    };
+    Some(at.strftime(form).to_string())
 }
 
 fn is_name(name: &str) -> bool {
-    let date = name.strip_suffix(".json");
-    date.is_some_and(|date| date.parse::<jiff::civil::Date>().is_ok())
+    let begin = name.strip_suffix(".json").unwrap_or_default();
+    let (date, minute) = begin.split_once('T').unwrap_or((begin, "0000"));
+    date.parse::<jiff::civil::Date>().is_ok() && minute.parse::<u32>().is_ok()
 }
 
 /// The files of a folder that are named as blocks, in the order of their days.
@@ -209,7 +220,7 @@ pub type Make<'a> = &'a mut dyn FnMut(
 ) -> Result<(), FitError>;
 
 impl KeptBlocks {
-    /// Brings the blocks of a folder up to date with files of data. Where these, the version of this crate, the graph as far as it makes
+    /// Brings the blocks of a folder, each of that length, up to date with files of data. Where these, the version of this crate, the graph as far as it makes
     /// examples of rows, and `reading` (how files are read, in any words) are those of the last time, nothing but the folder is read. Days of files that are
     /// new, changed or not among the files any more, and the days after them, are made anew by `make`, from the files that have rows of these
     /// days. Blocks of a file that is there no more stay as they are, unless another has all of its
@@ -221,6 +232,7 @@ impl KeptBlocks {
     pub fn refresh(
         folder: &Path,
         plan: &Plan,
+        length: Duration,
         files: &[PathBuf],
         reading: &str,
         data: &dyn Fn(Vec<PathBuf>, Within) -> Dataset,
@@ -229,7 +241,10 @@ impl KeptBlocks {
         fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
         let identity = rows_identity(plan);
         let version = env!("CARGO_PKG_VERSION");
-        let reading = format!("athermal {version}, {reading}, {:?}", plan.table);
+        let mut reading = format!("athermal {version}, {reading}, {:?}", plan.table);
+        if length.as_ns() != DAY_NS {
+            reading += &format!(", blocks of {length}");
+        }
         let mut index = index_of(folder, &identity, &reading)?;
         let whole = data(files.to_vec(), None);
         let now = files.iter().map(|path| {
@@ -259,17 +274,16 @@ impl KeptBlocks {
                 gone.into_iter().partition(|file| file.is_lost(&now));
             lost = without_rows;
             // The day after one that is lost can be made again: it knows less of the one before.
-            let own = |file: &File| {
-                file.period
-                    .map(|(from, to)| from.div_euclid(DAY_NS)..=to.div_euclid(DAY_NS))
-            };
-            let kept: BTreeSet<i64> = lost.iter().filter_map(own).flatten().collect();
+            let kept: BTreeSet<i64> = lost.iter().flat_map(|file| file.own(length)).collect();
             let changed = now.iter().filter(|file| new.contains(&file.path));
-            let days = changed.chain(&gone).flat_map(File::days);
+            let days = changed.chain(&gone).flat_map(|file| file.days(length));
             let stale: BTreeSet<i64> = days.filter(|day| !kept.contains(day)).collect();
             let names: Vec<String> = match is_first {
                 true => names_in(folder).map_err(|error| failed(folder, error))?,
-                false => stale.iter().filter_map(|&day| name_of(day)).collect(),
+                false => stale
+                    .iter()
+                    .filter_map(|&day| name_of(day, length))
+                    .collect(),
             };
             let beside = folder.join(NEW);
             let _ = fs::remove_dir_all(&beside);
@@ -277,17 +291,17 @@ impl KeptBlocks {
             let is_stale = |day: i64| stale.contains(&day) || stale.contains(&(day + 1));
             let near = now
                 .iter()
-                .filter(|of| is_first || of.days().any(is_stale))
+                .filter(|of| is_first || of.days(length).any(is_stale))
                 .map(|of| PathBuf::from(&of.path));
             let near: Vec<PathBuf> = near.collect();
             if !near.is_empty() {
-                let first = stale.first().map(|day| (day - 1) * DAY_NS);
-                let last = stale.last().map(|day| (day + 1) * DAY_NS);
+                let first = stale.first().map(|day| (day - 1) * length.as_ns());
+                let last = stale.last().map(|day| (day + 1) * length.as_ns());
                 let dataset = data(near, first.zip(last).filter(|_| !is_first));
                 fs::create_dir_all(&beside).map_err(|error| failed(&beside, error))?;
                 let wanted = |day: i64| is_first || stale.contains(&day);
                 let made_all = make(&dataset, &wanted, &mut |block| {
-                    let name = name_of(block.day);
+                    let name = name_of(block.day, length);
                     let name =
                         name.ok_or_else(|| failed(folder, "a day is beyond all calendars"))?;
                     let path = beside.join(name);
@@ -307,7 +321,7 @@ impl KeptBlocks {
             // A program that is killed from here on leaves nothing that is taken for up to date.
             index
                 .files
-                .retain(|file| !file.days().any(|day| stale.contains(&day)));
+                .retain(|file| !file.days(length).any(|day| stale.contains(&day)));
             index.write(folder)?;
             for path in names.iter().map(|name| folder.join(name)) {
                 if path.exists() {
@@ -323,12 +337,8 @@ impl KeptBlocks {
                 let _ = fs::remove_dir_all(&beside);
             }
         }
-        let own = |file: &File| {
-            file.period
-                .map(|(from, to)| from.div_euclid(DAY_NS)..=to.div_euclid(DAY_NS))
-        };
-        let without_rows: BTreeSet<i64> = lost.iter().filter_map(own).flatten().collect();
-        let without_rows = without_rows.iter().filter_map(|day| name_of(*day));
+        let without_rows: BTreeSet<i64> = lost.iter().flat_map(|file| file.own(length)).collect();
+        let without_rows = without_rows.iter().filter_map(|day| name_of(*day, length));
         let without_rows = without_rows
             .filter(|name| folder.join(name).exists())
             .collect();

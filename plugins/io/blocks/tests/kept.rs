@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use athermal_blocks::KeptBlocks;
 use athermal_core::engine::Fitted;
-use athermal_core::time::Instant;
+use athermal_core::time::{Duration, Instant};
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_files::{Dataset, Options};
@@ -19,6 +19,8 @@ use athermal_run::fit::{
 use athermal_run::model::Model;
 use athermal_run::recording::Table;
 use serde_json::Value;
+
+const DAY: Duration = Duration::from_ns(86_400_000_000_000);
 
 const GRAPH: &str = r#"
 schema = 1
@@ -147,7 +149,15 @@ fn blocks(model: &Model, files: &[PathBuf]) -> Vec<Block> {
         blocks.push(block);
         Ok(())
     };
-    blocks_of(&model.plan, &data(files), &|_| true, &mut |_| {}, &mut take).unwrap();
+    blocks_of(
+        &model.plan,
+        &data(files),
+        DAY,
+        &|_| true,
+        &mut |_| {},
+        &mut take,
+    )
+    .unwrap();
     blocks
 }
 
@@ -268,7 +278,7 @@ fn blocks_come_back_from_json_to_the_bit_and_each_knows_two_days_alone() {
         ..FitOptions::default()
     };
     let fit_of = |blocks: &[Block]| {
-        let fitted = fit_from_blocks(&model.plan, blocks, &options, &mut |_| {});
+        let fitted = fit_from_blocks(&model.plan, &blocks.to_vec(), &options, &mut |_| {});
         text_of(&fitted.unwrap().0)
     };
     assert_eq!(fit_of(&all), fit_of(&again));
@@ -281,11 +291,19 @@ fn blocks_come_back_from_json_to_the_bit_and_each_knows_two_days_alone() {
         of_pair.push(block.to_json().unwrap());
         Ok(())
     };
-    blocks_of(&model.plan, &table, &|day| day == 2, &mut |_| {}, &mut take).unwrap();
+    blocks_of(
+        &model.plan,
+        &table,
+        DAY,
+        &|day| day == 2,
+        &mut |_| {},
+        &mut take,
+    )
+    .unwrap();
     assert_eq!(of_pair, texts[2..3]);
     // Days are in order, and of this graph.
     let swapped = [again[1].clone(), again[0].clone()];
-    let stray = fit_from_blocks(&model.plan, &swapped[..], &options, &mut |_| {});
+    let stray = fit_from_blocks(&model.plan, &swapped.to_vec(), &options, &mut |_| {});
     assert!(
         stray
             .err()
@@ -294,7 +312,7 @@ fn blocks_come_back_from_json_to_the_bit_and_each_knows_two_days_alone() {
             .contains("not in the order of days")
     );
     let other = folder.model(&GRAPH.replace("\"20min\"", "\"30min\""));
-    let stray = fit_from_blocks(&other.plan, &again[..], &options, &mut |_| {});
+    let stray = fit_from_blocks(&other.plan, &again.to_vec(), &options, &mut |_| {});
     assert!(
         stray
             .err()
@@ -323,12 +341,13 @@ fn kept_with(
     let blocks = KeptBlocks::refresh(
         folder,
         &model.plan,
+        DAY,
         files,
         "",
         &open,
         &mut |data, wanted, take| {
             is_read.set(true);
-            blocks_of(&model.plan, data, wanted, &mut |_| {}, take)
+            blocks_of(&model.plan, data, DAY, wanted, &mut |_| {}, take)
         },
     );
     let blocks = blocks.unwrap();
@@ -386,6 +405,7 @@ fn days_that_come_change_or_go_are_made_anew_and_others_stay() {
     let refused = KeptBlocks::refresh(
         &strange.0,
         &model.plan,
+        DAY,
         &files,
         "",
         &|files, _| data(&files),
@@ -422,7 +442,7 @@ fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
             Ok(())
         };
         let data = Dataset::new(files.to_vec(), options.clone());
-        blocks_of(&model.plan, &data, &|_| true, &mut |_| {}, &mut take).unwrap();
+        blocks_of(&model.plan, &data, DAY, &|_| true, &mut |_| {}, &mut take).unwrap();
         let options = FitOptions::default();
         text_of(
             &fit_from_blocks(&model.plan, &blocks, &options, &mut |_| {})
@@ -456,6 +476,7 @@ fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
     let ends = KeptBlocks::refresh(
         &blocks,
         &model.plan,
+        DAY,
         &files,
         "",
         &|files, _| data(&files),
@@ -469,7 +490,7 @@ fn what_a_file_gives_beside_its_content_makes_its_days_anew() {
                 }
                 Ok(())
             };
-            blocks_of(&model.plan, data, wanted, &mut |_| {}, &mut some)
+            blocks_of(&model.plan, data, DAY, wanted, &mut |_| {}, &mut some)
         },
     );
     assert!(ends.is_err() && !blocks.join("1970-01-02.json").exists());
@@ -506,11 +527,12 @@ fn a_call_that_fails_leaves_blocks_as_they_are_and_those_whose_rows_are_gone_sta
         KeptBlocks::refresh(
             &blocks,
             &model.plan,
+            DAY,
             files,
             "",
             &|files, _| data(&files),
             &mut |data, wanted, take| {
-                blocks_of(&model.plan, data, wanted, &mut |_| {}, take)?;
+                blocks_of(&model.plan, data, DAY, wanted, &mut |_| {}, take)?;
                 match fails {
                     true => Err(FitError::Recording("the disk went away".into())),
                     false => Ok(()),
@@ -586,7 +608,7 @@ fn what_sums_do_not_suffice_is_named() {
     let folder = Folder::of("refused");
     let refused = |from: &str, to: &str| {
         let model = folder.model(&GRAPH.replace(from, to));
-        check_blocks(&model.plan).err().unwrap().to_string()
+        check_blocks(&model.plan, DAY).err().unwrap().to_string()
     };
     let huber = refused("type = \"lasso\"\nalpha = 0.001", "type = \"huber\"");
     assert!(
@@ -606,7 +628,14 @@ fn what_sums_do_not_suffice_is_named() {
     table.push(Instant::from_ns(86_400_000_000_000), &row);
     table.segment();
     table.push(Instant::from_ns(0), &row);
-    let back = blocks_of(&model.plan, &table, &|_| true, &mut |_| {}, &mut |_| Ok(()));
+    let back = blocks_of(
+        &model.plan,
+        &table,
+        DAY,
+        &|_| true,
+        &mut |_| {},
+        &mut |_| Ok(()),
+    );
     let back = back.err().unwrap().to_string();
     assert!(back.contains("the rows go back to day 0"), "{back}");
 }

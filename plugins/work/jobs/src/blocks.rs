@@ -1,39 +1,88 @@
 //! Fits on the sums of days in place of rows: made just now, or kept in a folder.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Arc;
 
 use athermal_blocks::{KeptBlocks, OtherFolder};
 use athermal_core::compile::Plan;
 use athermal_core::failure::Failure;
+use athermal_core::time::Duration;
 use athermal_core::watch::Watch;
 use athermal_files::{Dataset, Report};
 use athermal_run::fit::{
     Block, Blocks, FitError, FitOptions, blocks_of, check_blocks, fit_from_blocks,
 };
 use athermal_run::model::DataCard;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::RowsId;
+use crate::asked::by_text;
 use crate::faults::{ChannelFaults, FaultWatch, Purpose};
 use crate::fit::FitOutcome;
 
-/// How rows are cut into blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Cut {
-    /// At the ends of UTC days
-    Day,
+/// How long a block is: `day`, or a length such as `6h`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cut(Duration);
+
+const DAY: Duration = Duration::from_ns(86_400_000_000_000);
+const MINUTE: Duration = Duration::from_ns(60_000_000_000);
+
+impl Cut {
+    /// The length of a block.
+    #[must_use]
+    pub fn length(self) -> Duration {
+        self.0
+    }
+}
+
+impl FromStr for Cut {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "day" {
+            return Ok(Self(DAY));
+        }
+        let length: Duration = text.parse().map_err(|error| format!("{error}"))?;
+        match length >= MINUTE && length.as_ns() % MINUTE.as_ns() == 0 {
+            true => Ok(Self(length)),
+            false => Err("expected `day`, or whole minutes such as `6h`".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Cut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            DAY => f.write_str("day"),
+            length => length.fmt(f),
+        }
+    }
+}
+
+impl Serialize for Cut {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Cut {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        by_text(from)
+    }
 }
 
 /// A fit on sums in place of rows.
 #[derive(Debug, Clone, Default, Args, Serialize, Deserialize, JsonSchema)]
 pub struct BlockOptions {
-    /// Fit on the sums of days in place of rows: folds end with UTC days, and windows at the beginning of a day know the day before.
-    /// For estimators that are fitted by least squares
-    #[arg(long, value_name = "CUT")]
+    /// Fit on the sums of UTC days in place of rows (`day`), or of stretches of another length, such as `6h` where there are few days: folds
+    /// end with them, and windows at the beginning of one know the one before. For estimators that are fitted by least squares
+    #[arg(long, value_name = "LENGTH")]
+    #[serde(default)]
+    #[schemars(with = "Option<String>")]
     pub blocks: Option<Cut>,
     /// Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of the data only
     /// what is new or changed
@@ -58,6 +107,8 @@ impl BlockOptions {
 
 /// Data of which sums are made: files, and how some of them are read, of which no rows outside of a stretch of time are needed.
 pub struct OfFiles<'a> {
+    /// How long a block is.
+    pub cut: Cut,
     /// The files; none where something else is read.
     pub files: Option<Vec<PathBuf>>,
     /// How they are read, in words that differ where rows may.
@@ -89,7 +140,8 @@ impl Sums {
         of: &OfFiles<'_>,
         host: &dyn Watch,
     ) -> Result<Self, Failure> {
-        check_blocks(plan).map_err(FitError::from)?;
+        let length = of.cut.length();
+        check_blocks(plan, length).map_err(FitError::from)?;
         let (mut faults, mut files) = (Vec::new(), Vec::new());
         let mut progress = host.progress("summing");
         let mut make =
@@ -97,7 +149,8 @@ impl Sums {
              wanted: &dyn Fn(i64) -> bool,
              take: &mut dyn FnMut(Block) -> Result<(), FitError>| {
                 let watch = FaultWatch::new(dataset, Purpose::Fit);
-                blocks_of(plan, &watch, wanted, &mut |ticks| progress.set(ticks), take)?;
+                let stepped = &mut |ticks| progress.set(ticks);
+                blocks_of(plan, &watch, length, wanted, stepped, take)?;
                 (faults, files) = (watch.found(), dataset.reports());
                 Ok(())
             };
@@ -113,7 +166,8 @@ impl Sums {
             }
             (Some(folder), Some(files)) => {
                 let (reading, data) = (&of.reading, of.data);
-                let kept = KeptBlocks::refresh(folder, plan, files, reading, data, &mut make);
+                let kept =
+                    KeptBlocks::refresh(folder, plan, length, files, reading, data, &mut make);
                 Kept::InFolder(kept.map_err(|error| match error {
                     FitError::Recording(error) if error.is::<OtherFolder>() => {
                         Failure::Request(format!("--keep-blocks {error}"))

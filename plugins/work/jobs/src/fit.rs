@@ -92,8 +92,9 @@ impl Fit {
         };
         let plan = &model.plan;
         let (outcome, cards) = match self.blocks.blocks {
-            Some(_) => {
+            Some(cut) => {
                 let of = OfFiles {
+                    cut,
                     files: self.data.files(),
                     reading: self.data.reading_words(),
                     data: &|files, within| match files.is_empty() {
