@@ -301,6 +301,69 @@ fn every_job_gives_the_same_facts_and_remarks_by_words_and_by_data() {
     }
 }
 
+#[test]
+fn a_machine_of_a_fleet_has_the_model_and_the_remarks_of_a_fit_and_of_an_evaluation_alone() {
+    let scratch = Scratch::new("hosts-fleet");
+    let graph = scratch.file("graph.toml", GRAPH);
+    let folder = scratch.path("logs/machine=a");
+    std::fs::create_dir_all(&folder).unwrap();
+    let (log, models) = (folder.join("log.csv"), scratch.path("models"));
+    std::fs::write(&log, self::log()).unwrap();
+    let (data, alone) = (
+        json!({ "data": [log], "lenient": true }),
+        scratch.path("alone.json"),
+    );
+    let learned = |path: &Path| {
+        let text = std::fs::read_to_string(path).unwrap();
+        text[text.find("\"graph\":").unwrap()..].to_owned()
+    };
+    let texts = |doubts: &Value| -> Vec<String> {
+        let all = doubts.as_array().unwrap().iter();
+        all.map(|of| of_the_command_line(of["text"].as_str().unwrap()))
+            .collect()
+    };
+    for more in [&[][..], &["--blocks", "day"]] {
+        let mut words = vec!["-o", alone.to_str().unwrap()];
+        words.extend(more);
+        let fit = by_words("fit", &[&graph], &data, &words);
+        let mut fleet: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![
+            &"fleet",
+            &"fit",
+            &graph,
+            &"--data",
+            &log,
+            &"--lenient",
+            &"--all",
+            &"-o",
+            &models,
+        ];
+        fleet.extend(more.iter().map(|of| of as &dyn AsRef<std::ffi::OsStr>));
+        athermal(&fleet).ended(0);
+        let manifest = std::fs::read_to_string(models.join("_fleet.json")).unwrap();
+        let manifest: Value = serde_json::from_str(&manifest).unwrap();
+        assert_eq!(
+            texts(&manifest["machines"]["a"]["doubts"]),
+            fit.remarks,
+            "{more:?}"
+        );
+        assert_eq!(learned(&models.join("a.json")), learned(&alone), "{more:?}");
+    }
+    let evaluated = by_words("evaluate", &[&alone], &data, &[]);
+    let fleet = athermal(&[
+        &"fleet",
+        &"evaluate",
+        &models,
+        &"--data",
+        &log,
+        &"--lenient",
+        &"--format",
+        &"json",
+    ]);
+    let doubts = texts(&fleet.ended(0).json()["machines"][0]["doubts"]);
+    assert!(doubts.len() > 3, "{doubts:?}");
+    assert_eq!(doubts[..], evaluated.remarks[..doubts.len()]);
+}
+
 /// A row with its absent values as nothing.
 fn row(values: impl IntoIterator<Item = f64>) -> Value {
     values

@@ -2,11 +2,13 @@
 
 use athermal_core::compile::Plan;
 use athermal_core::engine::SampleRange;
+use athermal_core::message::Message;
 use athermal_core::prng::Prng;
 use athermal_core::time::{Duration, Instant};
 use athermal_core::watch::Kept;
 use athermal_estimators as _;
 use athermal_features as _;
+use athermal_jobs::fit::FitOutcome;
 use athermal_run::fit::{FitOptions, fit};
 use athermal_run::live::{LiveOptions, pair};
 use athermal_run::model::{Card, Model};
@@ -122,6 +124,27 @@ fn shadowed(running: &Model, candidate: &Model, data: &Table, minutes: i64) -> O
     let verdict = control.verdict().unwrap();
     assert!(verdict.over, "{verdict:?}");
     verdict.passes
+}
+
+#[test]
+fn a_proposal_is_the_fit_of_whoever_fits_on_the_same_rows_with_the_same_remarks() {
+    let graph = graph(1);
+    let data = machine(1, 9);
+    let old = fitted(&graph, &part(&data, 0, DAY));
+    let (rows, host) = (part(&data, 0, 8 * DAY), Kept::default());
+    let proposal = propose(&old, &rows, &terms(14), None, &host).unwrap();
+    let job = FitOutcome::of(&graph.plan, &rows, &FitOptions::default(), &Kept::default()).unwrap();
+    let texts = |all: Vec<Message>| all.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let remarks = host.remarks().into_iter().map(|of| of.message).collect();
+    assert_eq!(texts(remarks), texts(job.doubts(&graph.plan)));
+    let as_model = Model {
+        fitted: job.fitted,
+        ..proposal.model.clone()
+    };
+    assert_eq!(
+        as_model.to_text().unwrap(),
+        proposal.model.to_text().unwrap()
+    );
 }
 
 const SEEDS: u64 = 20;
