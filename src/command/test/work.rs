@@ -156,7 +156,7 @@ fn in_parallel<J: Sync, R: Send>(
 
 /// Data that a test names.
 enum Opened {
-    Files(Dataset),
+    Files(Box<Dataset>),
     Simulated(Box<dyn Recording>),
 }
 
@@ -165,7 +165,7 @@ impl Opened {
         match data {
             DataSet::Files(paths) => {
                 let dataset = Dataset::new(paths.clone(), Options::default());
-                Ok(Self::Files(dataset))
+                Ok(Self::Files(Box::new(dataset)))
             }
             DataSet::Simulated(simulation) => {
                 let simulated = simulation.recording();
@@ -178,7 +178,7 @@ impl Opened {
 
     fn recording(&self) -> &dyn Recording {
         match self {
-            Self::Files(dataset) => dataset,
+            Self::Files(dataset) => &**dataset,
             Self::Simulated(simulated) => &**simulated,
         }
     }
