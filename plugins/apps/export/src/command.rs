@@ -1,5 +1,6 @@
 //! The command: which graph is exported, how often samples come, and what it takes.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use athermal_command::{Answer, Command, Failure, Format, Group, Terminal, println};
@@ -9,7 +10,7 @@ use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 
 use crate::lower::Rates;
-use crate::{ExportError, Exported, Options, c, export_c, fmu, lower, onnx, st, state};
+use crate::{ExportError, Exported, Form, Options, c, export_c, fmu, lower, onnx, st, state};
 
 /// What a graph is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -40,8 +41,8 @@ pub(crate) struct Export {
     /// The folder that is written
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
-    /// The time between two samples, of all signals or of one: 1s, position=10s
-    #[arg(long, value_name = "[SIGNAL=]TIME", default_value = "1s")]
+    /// The time between two samples, of all signals or of one: 1s, position=10s. By default as in the data of the fit
+    #[arg(long, value_name = "[SIGNAL=]TIME")]
     rate: Vec<String>,
     /// The name of files and functions; that of the graph by default
     #[arg(long)]
@@ -66,9 +67,10 @@ impl Command for Export {
     const GROUP: Group = Group::Make;
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.for_target()?;
-        let mut engine = Model::load(&self.model)?.engine()?;
+        let model = Model::load(&self.model)?;
+        let mut engine = model.engine()?;
         let options = Options {
-            rates: self.rates()?,
+            rates: self.rates(terminal, &model)?,
             frozen: self.frozen,
             name: self.name.clone(),
         };
@@ -98,9 +100,42 @@ fn failure(error: ExportError) -> Failure {
     }
 }
 
+/// For which samples there is room: `a sample of each signal every 10s`, or by signal.
+fn rates_of(form: &Form) -> String {
+    let rates = form.rates();
+    let each = |ns: i64| Duration::from_ns(ns).to_string();
+    match rates.values().next() {
+        Some(&first) if rates.values().all(|&rate| rate == first) => {
+            format!("a sample each {}", each(first))
+        }
+        _ => {
+            let all = rates
+                .iter()
+                .map(|(of, &rate)| format!("{of} each {}", each(rate)));
+            format!("samples of {}", all.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
 impl Export {
-    fn rates(&self) -> Result<Rates, Failure> {
-        let mut rates = Rates::default();
+    /// How often samples come: as it is given, else as in the data of the fit.
+    fn rates(&self, terminal: &Terminal, model: &Model) -> Result<Rates, Failure> {
+        let signals: BTreeSet<&str> = (model.plan.sources.iter())
+            .filter_map(|source| source.name.split('.').next())
+            .collect();
+        let mut usual = model
+            .card
+            .as_ref()
+            .map_or_else(BTreeMap::new, |card| card.rates.clone());
+        usual.retain(|signal, _| signals.contains(&**signal));
+        let of_data = Rates::of_data(&usual);
+        let of_all = self.rate.iter().any(|rate| !rate.contains('='));
+        if of_data.is_none() && !of_all {
+            terminal.note(
+                "the model does not say how often samples come: room is made for one a second, where `--rate` says nothing else",
+            );
+        }
+        let mut rates = of_data.filter(|_| !of_all).unwrap_or_default();
         for rate in &self.rate {
             let (signal, time) = match rate.split_once('=') {
                 Some((signal, time)) => (Some(signal), time),
@@ -144,12 +179,13 @@ impl Export {
         c::write(&exported.files, &self.output).map_err(failure)?;
         let form = &exported.form;
         println!(
-            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state",
+            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state with {}",
             self.output.display(),
             st::block(form),
             form.sources.len(),
             form.outputs.len(),
             st::state_bytes(form),
+            rates_of(form),
         );
         Ok(Answer::Fine)
     }
@@ -184,8 +220,9 @@ impl Export {
             }
         };
         println!(
-            "wrote {}: {inputs} inputs and {outputs} outputs, with {with}",
-            path.display()
+            "wrote {}: {inputs} inputs and {outputs} outputs, with {with} and room for {}",
+            path.display(),
+            rates_of(form)
         );
         Ok(Answer::Fine)
     }
@@ -233,6 +270,7 @@ impl Export {
                 "revision": form.revision,
                 "state_bytes": if self.float { single } else { double },
                 "operations": operations,
+                "rates": form.rates().iter().map(|(signal, ns)| (*signal, *ns as f64 / 1e9)).collect::<BTreeMap<_, _>>(),
                 "single_precision_error": single_precision.as_ref().and_then(|of| of.as_ref().ok()),
                 "single_precision_problem":
                     single_precision.as_ref().and_then(|of| Some(of.as_ref().err()?.to_string())),
@@ -241,12 +279,13 @@ impl Export {
             return;
         }
         println!(
-            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state, about {operations} operations a tick",
+            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state with {}, about {operations} operations a tick",
             self.output.display(),
             form.name,
             form.sources.len(),
             form.outputs.len(),
             if self.float { single } else { double },
+            rates_of(form),
         );
         match single_precision {
             Some(Ok(error)) => println!(
