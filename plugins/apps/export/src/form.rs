@@ -50,6 +50,21 @@ pub struct Port {
     pub unit: String,
 }
 
+/// Names made of others, each once: those that are the same end in `_2`, `_3`.
+pub(crate) fn each_once(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for plain in names {
+        let mut name = plain.clone();
+        let mut nth = 2;
+        while all.contains(&name) {
+            name = format!("{plain}_{nth}");
+            nth += 1;
+        }
+        all.push(name);
+    }
+    all
+}
+
 /// Where the parts of a state lie, and how large it is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Layout {

@@ -61,6 +61,13 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
         let way = "leave out `known_ahead`, and read it as it is measured".to_owned();
         Refusal::count(&mut refusals, signal, source.name.clone(), why, way);
     }
+    let title = plan.name.clone().unwrap_or_else(|| "graph".to_owned());
+    let name = identifier(options.name.as_deref().unwrap_or(&title));
+    if let Some(why) = taken(&name) {
+        let why = format!("its files and functions cannot be called `{name}`: {why}");
+        let way = "`--name` calls them otherwise".to_owned();
+        Refusal::count(&mut refusals, &title, title.clone(), why, way);
+    }
     if !refusals.is_empty() {
         return Err(ExportError::Nodes(refusals));
     }
@@ -81,9 +88,8 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
         name: name.to_owned(),
         unit: plan.channels[slot].channel.unit.to_string(),
     };
-    let title = plan.name.clone().unwrap_or_else(|| "graph".to_owned());
     Ok(Form {
-        name: identifier(options.name.as_deref().unwrap_or(&title)),
+        name,
         title,
         revision: engine.revision().to_owned(),
         sources: (plan.sources.iter().enumerate())
@@ -118,8 +124,77 @@ pub fn identifier(name: &str) -> String {
     };
     let name: String = name.chars().map(word).collect();
     match name.chars().next() {
-        Some(first) if !first.is_ascii_digit() => name,
+        Some(first) if first.is_ascii_lowercase() => name,
         _ => format!("g_{name}"),
+    }
+}
+
+/// Headers that a compiler may read in place of its own where a graph has their name, and targets that a build has for itself.
+const TAKEN: [&str; 55] = [
+    "alloca",
+    "assert",
+    "complex",
+    "ctype",
+    "endian",
+    "errno",
+    "fcntl",
+    "features",
+    "fenv",
+    "float",
+    "inttypes",
+    "iso646",
+    "limits",
+    "locale",
+    "malloc",
+    "math",
+    "memory",
+    "poll",
+    "pthread",
+    "sched",
+    "semaphore",
+    "setjmp",
+    "signal",
+    "stdalign",
+    "stdarg",
+    "stdatomic",
+    "stdbit",
+    "stdbool",
+    "stdckdint",
+    "stddef",
+    "stdint",
+    "stdio",
+    "stdlib",
+    "stdnoreturn",
+    "string",
+    "strings",
+    "syslog",
+    "termios",
+    "tgmath",
+    "threads",
+    "time",
+    "uchar",
+    "unistd",
+    "values",
+    "wchar",
+    "wctype",
+    "all",
+    "clean",
+    "edit_cache",
+    "help",
+    "install",
+    "m",
+    "package",
+    "rebuild_cache",
+    "test",
+];
+
+/// Why files and functions cannot have a name.
+fn taken(name: &str) -> Option<&'static str> {
+    match name {
+        "athermal_rt" => Some("the file of the runtime has it"),
+        _ if name == "at" || name.starts_with("at_") => Some("what the runtime has begins so"),
+        _ if TAKEN.contains(&name) => Some("a header of C or a target of the build has it"),
+        _ => None,
     }
 }
 

@@ -3,7 +3,7 @@
 use athermal_core::engine::Engine;
 use athermal_core::prng::Prng;
 use athermal_core::time::Duration;
-use athermal_export::{ExportError, Options, Rates, lower};
+use athermal_export::{ExportError, Options, Rates, export_c, lower};
 
 use crate::support::{made_up, plan};
 
@@ -137,7 +137,58 @@ fn names_become_identifiers() {
         ("die-tester", "die_tester"),
         ("7 of all", "g_7_of_all"),
         ("", "g_"),
+        ("_Z", "g__z"),
     ] {
         assert_eq!(athermal_export::identifier(name), expected);
+    }
+}
+
+#[test]
+fn names_that_the_runtime_the_build_or_headers_of_c_have_are_refused_with_a_way() {
+    let plan = plan(&crate::random::graph(&mut Prng::stream(1, "a graph")));
+    let fitted = made_up(&plan, &mut Prng::stream(1, "fits"));
+    let engine = Engine::new(plan, &fitted).unwrap();
+    let named = |name: &str| {
+        let options = Options {
+            name: Some(name.to_owned()),
+            ..Options::default()
+        };
+        lower(&engine, &options).map(|form| form.name)
+    };
+    for name in [
+        "athermal rt",
+        "AT",
+        "at_tick",
+        "math",
+        "stdio",
+        "Features",
+        "test",
+        "m",
+    ] {
+        let error = named(name).unwrap_err().to_string();
+        let expected = format!("cannot be called `{}`", athermal_export::identifier(name));
+        assert!(
+            error.contains(&expected) && error.contains("`--name`"),
+            "{error}"
+        );
+    }
+    for name in ["attic", "mathematics", "athermal"] {
+        assert_eq!(named(name).unwrap(), name);
+    }
+}
+
+#[test]
+fn channels_whose_names_become_the_same_end_in_numbers() {
+    let text = GRAPH
+        .replace("[\"a\"]", "[\"a-b\", \"a_b\", \"a__b\"]")
+        .replace("known_ahead = \"60s\"\n", "");
+    let text = text.split("[nodes.smooth]").next().unwrap().to_owned()
+        + "[nodes.warm]\ntype = \"lag\"\ninputs.signal = \"temperature\"\nlags = [\"9s\"]\n[outputs]\nwarm = \"warm\"\n";
+    let engine = Engine::new(plan(&text), &Default::default()).unwrap();
+    let exported = export_c(&engine, &Options::default(), false).unwrap();
+    let header = &exported.files[2].text;
+    for (nth, name) in ["A_B", "A_B_2", "A__B"].iter().enumerate() {
+        let constant = format!("_IN_TEMPERATURE_{name} = {nth}");
+        assert!(header.contains(&constant), "{constant}: {header}");
     }
 }
