@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use super::doubt::Truths;
+use super::rates::Kept;
 use crate::engine::SampleRange;
 
 /// The form that this version writes.
@@ -35,6 +36,9 @@ pub struct Block {
     /// Samples rejected as infinite or out of range, by measured channel.
     pub(super) rejected: Vec<(String, u64)>,
     pub(super) ranges: Vec<SampleRange>,
+    /// The steps between the samples of each measured channel.
+    #[serde(default)]
+    pub(super) steps: Kept,
     /// The sum of each truth that is a level, and how many values it has.
     pub(super) levels: Vec<(f64, u64)>,
     /// The measured channels that had no value.
@@ -166,6 +170,7 @@ impl Block {
             refused: 0,
             rejected: Vec::new(),
             ranges: Vec::new(),
+            steps: Kept::new(),
             levels: Vec::new(),
             silent: Vec::new(),
             estimators: Vec::new(),

@@ -10,6 +10,7 @@ use super::collect::{Collector, Trainee};
 use super::cut::fitted_nodes;
 use super::levels::levels;
 use super::progress::{FitProgress, Listener};
+use super::rates::Spacing;
 use super::train::{Made, Making, begin, end, in_threads, trainer_of};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole, meaning};
@@ -248,6 +249,7 @@ pub fn fit_from_blocks(
         plan,
         collector: Collector::new(plan, &nodes, 0),
         means: Means::new(plan),
+        spacing: Spacing::new(plan),
         report: FitReport::default(),
         last: None,
     };
@@ -261,6 +263,7 @@ pub fn fit_from_blocks(
         return Err(BlockError::None.into());
     }
     fit.report.levels = fit.means.levels(plan);
+    fit.report.rates = fit.spacing.usual(plan);
     let mut makings = fit.make(blocks, nodes.iter().map(|_| Vec::new()), &listener)?;
     let constants: Vec<Vec<usize>> = makings.iter().map(Making::constant).collect();
     if constants.iter().any(|constant| !constant.is_empty()) {
@@ -310,6 +313,7 @@ struct FromBlocks<'a> {
     /// What is known of the rows of all blocks, without a row.
     collector: Collector,
     means: Means,
+    spacing: Spacing,
     report: FitReport,
     last: Option<i64>,
 }
@@ -354,6 +358,7 @@ impl FromBlocks<'_> {
         let is_silent = |slot: &usize| block.silent.contains(&plan.channels[*slot].name);
         collector.silent.retain(is_silent);
         self.means.add(&block.levels);
+        self.spacing.add(&block.steps);
         report.ticks += block.ticks;
         report.segments += block.segments;
         report.refused += block.refused;

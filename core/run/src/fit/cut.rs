@@ -11,6 +11,7 @@ use super::block::{Block, Content, Examples, Group, State};
 use super::blocks::{BlockError, check, rows_identity};
 use super::collect::{Collector, Share, Sink, Trainee};
 use super::doubt::Truths;
+use super::rates::Spacing;
 use super::train::trainer_of;
 use crate::channel::Extremes;
 use crate::compile::{Plan, TruthLink};
@@ -140,6 +141,7 @@ struct DayInWork {
     collector: Collector,
     sums: Vec<Summing>,
     means: Means,
+    spacing: Spacing,
     hash: Fnv1a,
     /// Whether the day itself has begun.
     has_begun: bool,
@@ -158,6 +160,7 @@ impl DayInWork {
             sums: trainees.map(|of| Summing::new(plan, of)).collect(),
             collector,
             means: Means::new(plan),
+            spacing: Spacing::new(plan),
             hash: Fnv1a::default(),
             has_begun: false,
             is_break: true,
@@ -175,6 +178,7 @@ impl DayInWork {
         let Event::Row(now) = event else {
             self.is_break = true;
             self.engine.segment();
+            self.spacing.look(&self.engine, event, false);
             self.collector
                 .look::<Summing>(&self.engine, event, &Share::all(), None);
             return Ok(());
@@ -193,6 +197,7 @@ impl DayInWork {
             return Ok(());
         }
         let (engine, sums) = (&self.engine, &mut self.sums);
+        self.spacing.look(engine, event, self.has_begun);
         if !self.has_begun {
             self.collector
                 .look(engine, event, &Share::none(), Some(sums));
@@ -214,6 +219,7 @@ impl DayInWork {
         block.rejected = self.engine.rejected_channels();
         block.ranges = self.engine.sample_ranges();
         block.levels = self.means.sums();
+        block.steps = self.spacing.kept();
         let silent = self.collector.silent.iter();
         block.silent = silent
             .map(|&slot| plan.channels[slot].name.clone())

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::collect::{Collector, Share, Trainee};
 use super::progress::{FitProgress, Listener};
+use super::rates::Spacing;
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
@@ -153,13 +154,14 @@ impl<'a> Fitting<'a> {
     pub(super) fn run(mut self) -> Result<(Fitted, FitReport), FitError> {
         if self.levels.is_empty() {
             let mut engine = Engine::new(Arc::clone(self.plan), &Fitted::new())?;
-            let mut means = Means::new(self.plan);
+            let (mut means, mut spacing) = (Means::new(self.plan), Spacing::new(self.plan));
             let passed = pass(&mut engine, self.recording, |engine, event, _| {
+                spacing.look(engine, event, true);
                 if matches!(event, Event::Row(_)) {
                     means.look(|slot| engine.value(slot));
                 }
             })?;
-            self.note(&engine, passed, &means);
+            self.note(&engine, passed, &means, &spacing);
             return Ok((Fitted::new(), self.report));
         }
         let top = self.levels.len() - 1;
@@ -315,8 +317,9 @@ impl<'a> Fitting<'a> {
             report(*stepped);
             let (truths, counted) = (&self.truths, &mut self.counted);
             *counted = Counted::default();
-            let mut means = Means::new(self.plan);
+            let (mut means, mut spacing) = (Means::new(self.plan), Spacing::new(self.plan));
             let passed = pass(&mut engine, self.recording, |engine, event, _| {
+                spacing.look(engine, event, true);
                 collector.look(
                     engine,
                     event,
@@ -333,18 +336,19 @@ impl<'a> Fitting<'a> {
                     }
                 }
             })?;
-            self.note(&engine, passed, &means);
+            self.note(&engine, passed, &means, &spacing);
         }
         Ok(())
     }
 
-    fn note(&mut self, engine: &Engine, passed: Passed, means: &Means) {
+    fn note(&mut self, engine: &Engine, passed: Passed, means: &Means, spacing: &Spacing) {
         self.report.ticks = passed.ticks;
         self.report.segments = passed.segments;
         self.report.period = passed.period;
         self.report.refused = engine.refused();
         self.report.rejected = engine.rejected_channels();
         self.report.ranges = engine.sample_ranges();
+        self.report.rates = spacing.usual(self.plan);
         self.report.levels = means.levels(self.plan);
     }
 }

@@ -11,6 +11,7 @@ mod cut;
 mod doubt;
 mod levels;
 mod progress;
+mod rates;
 mod report;
 mod train;
 

@@ -1,5 +1,6 @@
 //! What a fit reports about itself.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -67,6 +68,8 @@ pub struct FitReport {
     pub rejected: Vec<(String, u64)>,
     /// Between which values the samples of each measured channel lay.
     pub ranges: Vec<SampleRange>,
+    /// The usual time between two samples of each signal, in seconds; without those of which there are no two.
+    pub rates: BTreeMap<String, f64>,
     /// The means of truths that are levels.
     pub levels: Levels,
     /// How the fit of each estimator, and of each feature that is fitted, went; in the order of the plan.

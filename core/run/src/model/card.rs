@@ -31,6 +31,9 @@ pub struct Card {
     /// Between which values the samples of each measured channel lay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ranges: Vec<SampleRange>,
+    /// The usual time between two samples of each signal, in seconds.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rates: BTreeMap<String, f64>,
     /// The means of truths that are levels, such as positions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub levels: Levels,
@@ -168,6 +171,7 @@ impl Card {
             }),
             ticks: report.ticks,
             ranges: report.ranges.clone(),
+            rates: report.rates.clone(),
             levels: report.levels.clone(),
             estimators,
         }

@@ -24,6 +24,7 @@
 #define AT_BREAK 4
 #define AT_REFUSED_COUNT 5
 #define AT_FLAGS 6
+#define AT_LOADED 7 /* whether no tick has come since the state was loaded; never saved */
 
 /* ---- Time: nanoseconds, saturating. */
 
@@ -82,6 +83,20 @@ static at_real at_root(at_real value)
 static at_real at_signed(at_real size, at_real of)
 {
     return (signbit(of) != 0) ? -size : size;
+}
+
+/* A quotient with the bits that a division by 0 has, without one: that a processor may trap. */
+static at_real at_over(at_real value, at_real by)
+{
+    at_real is = AT_NAN;
+    if (by != AT_R(0.0)) {
+        is = value / by;
+    } else if ((at_is_absent(value) == 0) && (value != AT_R(0.0))) {
+        is = ((signbit(value) != 0) != (signbit(by) != 0)) ? -(at_real)INFINITY : (at_real)INFINITY;
+    } else {
+        /* It is none. */
+    }
+    return is;
 }
 
 uint64_t at_bits(double value)
@@ -746,7 +761,7 @@ static double at_pow(double x, double y)
         }
     } else if (y == 1.0) {
         power = x;
-    } else if (y == -1.0) {
+    } else if ((y == -1.0) && (size > 0.0)) {
         power = 1.0 / x;
     } else if (y == 2.0) {
         power = x * x;
@@ -755,7 +770,10 @@ static double at_pow(double x, double y)
     } else if ((parity == AT_NO_INTEGER) && (x < 0.0) && (isinf(x) == 0)) {
         power = (double)NAN;
     } else if ((size == 0.0) || (size == 1.0) || (isinf(size) != 0)) {
-        power = (y < 0.0) ? (1.0 / size) : size;
+        power = size;
+        if (y < 0.0) {
+            power = (size == 0.0) ? (double)INFINITY : (1.0 / size);
+        }
         power = (parity == AT_ODD) ? -power : power;
     } else {
         power = at_pow_of_size(size, y);
@@ -1248,8 +1266,8 @@ static at_real at_line(const at_slope *s, at_memory m, int64_t head, int32_t cha
             mean_y = mean_y + y;
         }
     }
-    mean_t = mean_t / n;
-    mean_y = mean_y / n;
+    mean_t = at_over(mean_t, n);
+    mean_y = at_over(mean_y, n);
     for (row = head; row < rows; row++) {
         const at_real y = (at_row(s, m, row)[channel] - origin) - mean_y;
         if (at_is_absent(y) == 0) {
@@ -1258,7 +1276,7 @@ static at_real at_line(const at_slope *s, at_memory m, int64_t head, int32_t cha
             sxy = sxy + (t * y);
         }
     }
-    return (sxy / sxx) * AT_R(1.0e9);
+    return at_over(sxy, sxx) * AT_R(1.0e9);
 }
 
 /* Nanoseconds that the samples of a channel span within a window; below 0 where it has none. */
@@ -1315,7 +1333,7 @@ static void at_finish(const at_plan *p, const at_slope *s, at_memory m, int32_t 
                 t = (r[3] + w[3]) + (h[3] + (by * h[2]));
                 tt = (r[4] + w[4]) + (h[4] + (by * ((AT_R(2.0) * h[3]) + (by * h[2]))));
             }
-            scale = AT_R(1.0e9) / ((n * tt) - (t * t));
+            scale = at_over(AT_R(1.0e9), (n * tt) - (t * t));
             of_ty = n * scale;
             of_y = t * scale;
             of_head_y = of_y - (of_ty * by);
@@ -1526,7 +1544,7 @@ static at_real at_novelty_of(const at_novelty *n, const at_real row[], int32_t w
     if (!(beyond > AT_R(0.0))) {
         beyond = AT_R(0.0);
     }
-    return at_unless_infinite(at_root(beyond / ((size + (at_real)width) * n->edge)));
+    return at_unless_infinite(at_root(at_over(beyond, (size + (at_real)width) * n->edge)));
 }
 
 static void at_run_linear(const at_plan *p, const at_linear *l, at_memory m)
@@ -1822,14 +1840,14 @@ static int at_keeps_errors(const at_vote *v)
 /* The rate of a hedge, infinite while voters that are not the best deserve nothing. */
 static at_real at_hedge_rate(const at_vote *v, const at_ballot *b)
 {
-    return v->rate / b->squares[(v->adaptive != 0) ? AT_GAP : AT_WIDEST];
+    return at_over(v->rate, b->squares[(v->adaptive != 0) ? AT_GAP : AT_WIDEST]);
 }
 
 static void at_divide(const at_ballot *b, at_real total)
 {
     int32_t voter;
     for (voter = 0; voter < b->voters; voter++) {
-        b->weights[voter] = b->weights[voter] / total;
+        b->weights[voter] = at_over(b->weights[voter], total);
     }
 }
 
@@ -1878,7 +1896,7 @@ static at_real at_hedge_mix(const at_ballot *b, at_real rate, const at_real lost
             sum = sum + at_hedge_share(rate, lost[voter] - least);
         }
     }
-    return least - ((at_real)at_log((double)sum) / rate);
+    return least - at_over((at_real)at_log((double)sum), rate);
 }
 
 /* Adds what the votes of a run have lost by a truth; those that were absent lose what the others do. */
@@ -2123,7 +2141,7 @@ static void at_raise(const at_vote *v, const at_ballot *b)
                 }
             }
         }
-        scale = (AT_R(1.0) - below) / above;
+        scale = at_over(AT_R(1.0) - below, above);
     }
     for (voter = 0; voter < b->voters; voter++) {
         if (at_is_absent(b->votes[voter]) == 0) {
@@ -2285,7 +2303,7 @@ static at_real at_middle(const at_vote *v, const at_ballot *b)
                                     : AT_R(0.0);
         }
     }
-    return sum / (at_real)(count - (2 * away));
+    return at_over(sum, (at_real)(count - (2 * away)));
 }
 
 static int32_t at_best(const at_vote *v, const at_ballot *b)
@@ -2298,7 +2316,7 @@ static int32_t at_best(const at_vote *v, const at_ballot *b)
         if (at_is_absent(b->votes[voter]) == 0) {
             const at_real trust = (outside != 0) ? b->trust[voter] : AT_R(1.0);
             const at_real error =
-                (at_is_absent(b->means[voter]) != 0) ? (at_real)INFINITY : (b->means[voter] / trust);
+                (at_is_absent(b->means[voter]) != 0) ? (at_real)INFINITY : at_over(b->means[voter], trust);
             if ((chosen < 0) || (error < least)) {
                 chosen = voter;
                 least = error;
@@ -2532,7 +2550,7 @@ static void at_run_vote(const at_plan *p, const at_vote *v, at_memory m)
                 known = known + b.weights[voter];
             }
         }
-        at_give(p, m, v->novelty_slot, sum / known, stamp);
+        at_give(p, m, v->novelty_slot, at_over(sum, known), stamp);
     }
 }
 
@@ -3007,11 +3025,11 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
 #define AT_HAS_LOOKED 0
 #define AT_LOOKED 1
 #define AT_CONTRADICTS 2
-#define AT_CONTRADICTS_SINCE 3
+/* 3: since when. */
 #define AT_IS_OUT 4
 #define AT_PASSES 5
 #define AT_AGREES 6
-#define AT_AGREES_SINCE 7
+/* 7: since when. */
 #define AT_OF_SENSOR 8
 
 /* Whether something has lasted for so long; it begins now where it had not. */
@@ -3069,7 +3087,7 @@ static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, 
     for (nth = 0; nth < n; nth++) {
         const int32_t place = c->places[nth];
         const int32_t channel = place % c->channels;
-        z[nth] = (values[place] - c->mean[nth]) / c->scale[nth];
+        z[nth] = at_over(values[place] - c->mean[nth], c->scale[nth]);
         if ((at_is_absent(z[nth]) != 0)
             || ((channel != with) && (m.i[c->ints + (AT_OF_SENSOR * channel) + AT_IS_OUT] != 0))) {
             z[nth] = AT_R(0.0);
@@ -3085,7 +3103,7 @@ static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, 
     for (nth = 0; nth < n; nth++) {
         total = total + (pull[nth] * z[nth]);
     }
-    return ((total > AT_R(0.0)) ? total : AT_R(0.0)) / c->usual;
+    return at_over((total > AT_R(0.0)) ? total : AT_R(0.0), c->usual);
 }
 
 static at_real at_part(at_real pull, at_real own)
@@ -3110,7 +3128,7 @@ static at_real at_share(const at_plan *p, const at_cross_check *c, at_memory m, 
             share = share
                 + at_part(pull[second] - (along * pull[first]), matrix[(second * n) + second] - (along * own[second]));
         }
-        share = share / c->usual;
+        share = at_over(share, c->usual);
     }
     return share;
 }
@@ -3367,10 +3385,18 @@ void at_segment(const at_plan *plan, at_memory m)
 uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in[], double out[])
 {
     int32_t nth;
-    if (((m.i[AT_HAS_LAST] != 0) && (t_ns <= m.i[AT_LAST])) || (t_ns == INT64_MIN)) {
+    const int is_back = ((m.i[AT_HAS_LAST] != 0) && (t_ns <= m.i[AT_LAST])) ? 1 : 0;
+    if (((is_back != 0) && (m.i[AT_LOADED] == 0)) || (t_ns == INT64_MIN)) {
         m.i[AT_REFUSED_COUNT]++;
+        for (nth = 0; nth < plan->outputs; nth++) {
+            out[nth] = (double)NAN;
+        }
         return AT_REFUSED;
     }
+    if (is_back != 0) {
+        at_segment(plan, m);
+    }
+    m.i[AT_LOADED] = 0;
     if (m.i[AT_HAS_BREAK] != 0) {
         const int64_t shift = at_minus(t_ns, m.i[AT_BREAK]);
         m.i[AT_HAS_BREAK] = 0;
@@ -3383,7 +3409,7 @@ uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in
     m.i[AT_HAS_LAST] = 1;
     m.i[AT_LAST] = t_ns;
     m.i[AT_TICK]++;
-    m.i[AT_FLAGS] = 0;
+    m.i[AT_FLAGS] = (is_back != 0) ? (int64_t)AT_RESTARTED : 0;
     for (nth = 0; nth < plan->sources; nth++) {
         const at_real sample = (at_real)in[nth];
         if (isfinite(sample) && (sample >= plan->lowest[nth]) && (sample <= plan->highest[nth])) {
@@ -3474,7 +3500,7 @@ size_t at_save(const at_plan *plan, const int64_t ints[], const at_real reals[],
         at_put_word(bytes, 3, (uint64_t)plan->reals);
         at_put_word(bytes, 4, (uint64_t)sizeof(at_real));
         for (nth = 0; nth < count; nth++) {
-            at_put_word(bytes, (size_t)AT_HEADER + nth, (uint64_t)ints[nth]);
+            at_put_word(bytes, (size_t)AT_HEADER + nth, (nth == (size_t)AT_LOADED) ? 0u : (uint64_t)ints[nth]);
         }
         for (nth = 0; nth < (size_t)plan->reals; nth++) {
             at_put_word(bytes, ((size_t)AT_HEADER + count) + nth, at_bits((double)reals[nth]));
@@ -3502,5 +3528,6 @@ int at_load(const at_plan *plan, at_memory m, const uint8_t bytes[], size_t leng
     for (nth = 0; nth < (size_t)plan->reals; nth++) {
         m.r[nth] = (at_real)at_number(at_get_word(bytes, ((size_t)AT_HEADER + ints) + nth));
     }
+    m.i[AT_LOADED] = 1;
     return 0;
 }

@@ -36,9 +36,10 @@ typedef double at_real;
 #define AT_R(x) ((at_real)(x))
 
 /* What a step says; 0 is well. */
-#define AT_REFUSED 1u /* the time is not after the last one: nothing has changed */
+#define AT_REFUSED 1u /* the time is not after the last one: nothing has changed, and there are no outputs */
 #define AT_FULL 2u    /* ticks came faster than the plan has room for: the oldest were forgotten, results are no longer the engine's */
 #define AT_REJECTED 4u /* a sample was infinite or out of its range, and counts as absent */
+#define AT_RESTARTED 8u /* the clock began anew since the state was loaded: this tick begins another segment */
 
 /* A value that is read: which slot, how far back, and how old it may be; the history of the slot, -1 where it is read as it is now. */
 typedef struct {
@@ -358,7 +359,8 @@ typedef struct {
 /* Begins cold. */
 void at_init(const at_plan *plan, at_memory m);
 
-/* Takes the measurements of one instant, NaN where a channel has no new value, and gives the outputs, NaN where there is none. */
+/* Takes the measurements of one instant, NaN where a channel has no new value, and gives the outputs, NaN where there is none. The first
+ * tick after a state was loaded may have any time: before that of the state it begins another segment. */
 uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in[], double out[]);
 
 /* The next tick belongs to another segment: windows and lags start afresh, what votes have learned stays. */

@@ -1,5 +1,7 @@
 //! What is exported: a plan as constant tables and the room that its state takes; not how any language writes them.
 
+use std::collections::BTreeMap;
+
 /// A plan, lowered to what the runtime on a controller steps.
 #[derive(Debug, Clone)]
 pub struct Form {
@@ -48,6 +50,21 @@ pub struct Port {
     pub unit: String,
 }
 
+/// Names made of others, each once: those that are the same end in `_2`, `_3`.
+pub(crate) fn each_once(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for plain in names {
+        let mut name = plain.clone();
+        let mut nth = 2;
+        while all.contains(&name) {
+            name = format!("{plain}_{nth}");
+            nth += 1;
+        }
+        all.push(name);
+    }
+    all
+}
+
 /// Where the parts of a state lie, and how large it is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Layout {
@@ -91,6 +108,18 @@ pub const BY_COUNT: i64 = 1;
 pub const FADING: i64 = 2;
 
 impl Form {
+    /// The time between two samples of each signal, of its channels the least, in nanoseconds.
+    #[must_use]
+    pub fn rates(&self) -> BTreeMap<&str, i64> {
+        let mut rates = BTreeMap::new();
+        for (source, &period) in self.sources.iter().zip(&self.periods_ns) {
+            let signal = source.name.split('.').next().unwrap_or(&source.name);
+            let known = rates.entry(signal).or_insert(period);
+            *known = period.min(*known);
+        }
+        rates
+    }
+
     /// How many votes a vote has, and of how many it keeps errors: a guard compares each with predicting zero.
     #[must_use]
     pub fn voters(&self, vote: &Record) -> (usize, usize) {

@@ -1,6 +1,7 @@
 //! Writes a lowered plan as C99: the runtime as it is, the tables of the graph, its self test, an example and how all is built.
 
 mod example;
+mod flash;
 mod tables;
 
 use std::fmt::Write as _;
@@ -9,10 +10,11 @@ use std::path::Path;
 use std::process::Command;
 
 use athermal_features::slope::kernel::FEWEST_ROWS;
+pub use flash::{Flash, flash};
 use thiserror::Error;
 
 use crate::error::ExportError;
-use crate::form::{Form, Port, Record};
+use crate::form::{Form, Port, Record, each_once};
 use crate::ticks::Ticks;
 
 /// The runtime, written by hand.
@@ -194,15 +196,7 @@ fn constant(name: &str) -> String {
 
 /// Names of channels as constants, each once.
 fn constants(ports: &[Port]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for port in ports {
-        let mut name = constant(&port.name);
-        while names.contains(&name) {
-            name.push('_');
-        }
-        names.push(name);
-    }
-    names
+    each_once(ports.iter().map(|port| constant(&port.name)))
 }
 
 /// Text within a comment or a string of C.
@@ -290,13 +284,14 @@ fn header(form: &Form) -> String {
          extern const char *const {name}_output_names[{upper}_OUTPUTS];\n\
          extern const char *const {name}_output_units[{upper}_OUTPUTS];\n\n\
          /* Begins cold. */\nvoid {name}_init({name}_state *state);\n\n\
-         /* One instant: samples in, NaN where there is no new value; outputs, NaN where there is none. 0, or AT_REFUSED, AT_FULL, AT_REJECTED. */\n\
+         /* One instant: samples in, NaN where there is no new value; outputs, NaN where there is none. 0, or AT_REFUSED, AT_FULL, AT_REJECTED, AT_RESTARTED. */\n\
          int {name}_step({name}_state *state, int64_t t_ns, const double in[], double out[]);\n\n\
          /* The next tick begins another segment: windows start afresh, what votes have learned stays. */\n\
          void {name}_segment({name}_state *state);\n\n\
          /* The state as {upper}_SAVED_BYTES bytes, the same on every processor; 0 where there is too little room. */\n\
          size_t {name}_save(const {name}_state *state, uint8_t bytes[], size_t room);\n\n\
-         /* Goes on from them; 0, or 1 where they are damaged or of another graph. */\n\
+         /* Goes on from them; 0, or 1 where they are damaged or of another graph. The next tick may have any time: where the clock began anew, so\n\
+         \x20* that its time is not after that of the state, it begins another segment and says AT_RESTARTED. */\n\
          int {name}_load({name}_state *state, const uint8_t bytes[], size_t length);\n\n\
          /* Steps {} ticks and compares every output with that of the engine: 0, or the number of the first tick that differs, from 1. */\n\
          int {name}_self_test(void);\n\n\

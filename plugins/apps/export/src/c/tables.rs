@@ -52,11 +52,11 @@ pub(super) fn used(form: &Form) -> Vec<&'static str> {
 /// A number with all of its bits.
 pub(super) fn hex(value: f64) -> String {
     if value.is_nan() {
-        return "NAN".to_owned();
+        return "(double)NAN".to_owned();
     }
     let sign = if value.is_sign_negative() { "-" } else { "" };
     if value.is_infinite() {
-        return format!("{sign}INFINITY");
+        return format!("{sign}(double)INFINITY");
     }
     let (bits, subnormal) = (value.to_bits(), value.abs() < f64::MIN_POSITIVE);
     let (mantissa, exponent) = (bits & ((1 << 52) - 1), (bits >> 52) & 0x7ff);

@@ -35,6 +35,19 @@ impl Rates {
         }
     }
 
+    /// Those of the data that a model was fitted on, in seconds by signal; a signal of which they do not say it is taken to be as fast as
+    /// the fastest. None where they say nothing.
+    #[must_use]
+    pub fn of_data(usual: &BTreeMap<String, f64>) -> Option<Self> {
+        let signals = usual.iter().filter_map(|(signal, seconds)| {
+            let period = Duration::from_secs_f64(*seconds)?;
+            (period > Duration::ZERO).then(|| (signal.clone(), period))
+        });
+        let signals: BTreeMap<String, Duration> = signals.collect();
+        let period = *signals.values().min()?;
+        Some(Self { period, signals })
+    }
+
     /// And this for a signal.
     #[must_use]
     pub fn with(mut self, signal: &str, period: Duration) -> Self {

@@ -10,7 +10,7 @@ use athermal_core::engine::Engine;
 
 use crate::c::File;
 use crate::error::ExportError;
-use crate::form::{Form, Port};
+use crate::form::{Form, Port, each_once};
 use crate::ticks::{TICKS, Ticks, self_test};
 use crate::{Exported, Options, lower};
 use runtime::Parts;
@@ -63,29 +63,22 @@ fn word(name: &str) -> String {
 
 /// Constants that name channels, each once.
 fn constants(prefix: &str, ports: &[Port]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for port in ports {
-        let plain = format!("{prefix}_{}", word(&port.name).to_uppercase());
-        let mut name = plain.clone();
-        let mut nth = 2;
-        while names.contains(&name) {
-            name = format!("{plain}_{nth}");
-            nth += 1;
-        }
-        names.push(name);
-    }
-    names
+    let name = |port: &Port| format!("{prefix}_{}", word(&port.name).to_uppercase());
+    each_once(ports.iter().map(name))
 }
 
 fn source(form: &Form, ticks: &Ticks, parts: &Parts) -> String {
     let graph = word(&form.name);
     let head = format!(
         "(* The graph `{}`, revision {}, as `athermal export st` wrote it: not to be changed by hand. It goes with athermal_rt.st.\n\n\
-         \x20  Nanoseconds between two ticks at least: {}. Bytes of the state: {}. *)\n\n",
+         \x20  Nanoseconds between two ticks at least: {}. Bytes of the state: {}.\n\
+         \x20  Windows and lags are full after {} s. A tick takes about {} operations on numbers at worst. *)\n\n",
         plain(&form.title),
         plain(&form.revision),
         form.period_ns,
         state_bytes(form),
+        form.warm_up_ns / 1_000_000_000 + 1,
+        crate::c::operations(form),
     );
     let mut text = "VAR_GLOBAL CONSTANT\n".to_owned();
     text.push_str("    (* The places of channels and outputs. *)\n");

@@ -8,10 +8,14 @@ use athermal_command::{CommandKind, Failure, Terminal};
 use athermal_core::engine::{Engine, fnv_1a};
 use athermal_core::prng::Prng;
 use athermal_core::registry::find;
-use athermal_run::model::Model;
+use athermal_core::time::Duration;
+use athermal_run::fit::{FitOptions, fit};
+use athermal_run::model::{Card, Model};
+use athermal_trial::machine::{KnownMachine, Setup, Simulated};
 
 use crate::random::{events, graph};
-use crate::support::{Scratch, made_up, stepped};
+use crate::shipped::second;
+use crate::support::{Scratch, made_up, project, stepped};
 
 fn export(words: &[&str]) -> Result<(), String> {
     let kind = find::<CommandKind>("export").unwrap();
@@ -117,6 +121,71 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
     // Room for another rate is another state.
     let error = run(&["--rate", "1s", "--state-back", of_c.to_str().unwrap()]).unwrap_err();
     assert!(error.contains("another length"), "{error}");
+}
+
+#[test]
+fn room_is_made_for_the_rate_of_the_data_of_the_fit_unless_another_is_given() {
+    let scratch = Scratch::new("command-rates");
+    let mut model = Model::load(project().join("graphs/die-tester.toml")).unwrap();
+    let setup = Setup {
+        days: 0.5,
+        ..Setup::default()
+    };
+    let recording = Simulated::new(find::<KnownMachine>("die-tester").unwrap().machine, setup);
+    let (fitted, report) =
+        fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {}).unwrap();
+    model.fitted = fitted;
+    let card = Card::of(&report, Vec::new(), None);
+    println!("{:?}", card.rates);
+    let usual = |signal: &str| Duration::from_secs_f64(card.rates[signal]).unwrap();
+    let (temperature, position) = (usual("temperature"), usual("position"));
+    // Gaps are no steps, nor are ticks without a sample.
+    assert_eq!(temperature, second(10.0));
+    model.card = Some(card);
+    let path = scratch.path("model.json");
+    std::fs::write(&path, model.to_text().unwrap()).unwrap();
+    export(&["c", path.to_str().unwrap(), "--dry-run"]).unwrap();
+    let folder = scratch.path("out");
+    for (given, temperature, position) in [
+        (&[][..], temperature, position),
+        (&["--rate", "position=40s"], temperature, second(40.0)),
+        (&["--rate", "2s"], second(2.0), second(2.0)),
+        (
+            &["--rate", "position=40s", "--rate", "2s"],
+            second(2.0),
+            second(40.0),
+        ),
+    ] {
+        let words = ["c", path.to_str().unwrap(), "-o", folder.to_str().unwrap()];
+        export(&[&words[..], given].concat()).unwrap();
+        let readme = std::fs::read_to_string(folder.join("README.md")).unwrap();
+        for (channel, rate) in [
+            ("temperature.chuck` | Cel", temperature),
+            ("position.X1` | nm", position),
+        ] {
+            let line = format!("| `{channel} | {} s |", rate.secs());
+            assert!(readme.contains(&line), "{given:?}, {line}: {readme}");
+        }
+    }
+}
+
+#[test]
+fn a_dry_run_writes_nothing_and_needs_no_folder() {
+    let scratch = Scratch::new("command-dry");
+    let path = scratch.path("model.json");
+    model(&path);
+    for target in ["c", "fmu", "st", "onnx"] {
+        let words = [target, path.to_str().unwrap()];
+        let error = export(&words).unwrap_err();
+        assert!(error.contains("--output"), "{error}");
+        export(&[&words[..], &["--dry-run"]].concat()).unwrap();
+        let folder = scratch.path("out");
+        let more = ["--dry-run", "-o", folder.to_str().unwrap()];
+        export(&[&words[..], &more].concat()).unwrap();
+        assert!(!folder.exists());
+    }
+    let error = export(&["c", path.to_str().unwrap(), "--dry-run", "--name", "at"]).unwrap_err();
+    assert!(error.contains("`--name` calls them otherwise"), "{error}");
 }
 
 #[test]

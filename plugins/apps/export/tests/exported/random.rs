@@ -187,6 +187,78 @@ fn handed_over(
 }
 
 #[test]
+fn after_a_restart_a_clock_that_begins_at_0_begins_a_segment_and_else_no_time_goes_back() {
+    let Some(compiler) = compilers().into_iter().next() else {
+        return;
+    };
+    let scratch = Scratch::new("restart");
+    let mut random = Prng::stream(3, "an exported graph");
+    let plan = plan(&graph(&mut random));
+    let fitted = made_up(&plan, &mut random);
+    let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+    let exported = export_c(&engine, &options(), false).unwrap();
+    let exhibit = Exhibit::new(&exported, &scratch.path("c"));
+    let program = exhibit.built(compiler, &["-O2"], "driver.c");
+    let rows = events(&mut random, &plan, 1_500).into_iter();
+    let ticks = rows.filter_map(|event| match event {
+        Event::Tick(_, samples) => Some(samples),
+        Event::Break => None,
+    });
+    // The second half has a clock from boot.
+    let ticks = ticks.enumerate().map(|(nth, samples)| {
+        let begins = if nth < 1_000 { 1_700_000_000 } else { -1_000 };
+        Event::Tick((begins + nth as i64) * 1_000_000_000, samples)
+    });
+    let ticks: Vec<Event> = ticks.collect();
+    let (before, after) = ticks.split_at(1_000);
+    stepped(&mut engine, before);
+    let (begin, end) = (exhibit.folder.join("begin"), exhibit.folder.join("end"));
+    std::fs::write(&begin, state::to_c(&engine, &exhibit.form).unwrap()).unwrap();
+    // What is saved as soon as it is loaded is the same.
+    exhibit.stepped_from(&program, &[], Some(&begin), Some(&end));
+    assert!(std::fs::read(&begin).unwrap() == std::fs::read(&end).unwrap());
+    engine.segment();
+    let expected = stepped(&mut engine, after);
+    let (found, said) = exhibit.stepped_from(&program, after, Some(&begin), None);
+    assert_eq!(difference(&exhibit.form, &expected, &found), None);
+    assert_eq!(said & 11, 8, "restarted, and neither refused nor full");
+    let values = found.iter().flatten();
+    let there = values.filter(|&&bits| !f64::from_bits(bits).is_nan());
+    assert!(there.count() > 1_000);
+    // In a run that goes on, a time that goes back is refused, and gives no outputs.
+    let (found, said) = exhibit.stepped(&program, &[&after[..], &after[..1]].concat());
+    assert_eq!(said & 11, 1);
+    let last = found.last().unwrap();
+    assert!(last.iter().all(|&bits| f64::from_bits(bits).is_nan()));
+}
+
+#[test]
+fn nothing_is_divided_by_zero_which_a_processor_may_trap() {
+    let scratch = Scratch::new("zero");
+    let zeros = "float-divide-by-zero,integer-divide-by-zero";
+    for (seed, compiler, precision, ends) in [
+        (0, "gcc", "-UATHERMAL_FLOAT", "-fno-sanitize-recover"),
+        (1, "gcc", "-DATHERMAL_FLOAT", "-fno-sanitize-recover"),
+        // Without its library, which is a package of its own.
+        (2, "clang", "-UATHERMAL_FLOAT", "-fsanitize-trap"),
+    ] {
+        if !has(compiler) {
+            continue;
+        }
+        let mut random = Prng::stream(seed, "an exported graph");
+        let plan = plan(&graph(&mut random));
+        let fitted = made_up(&plan, &mut random);
+        let engine = Engine::new(plan.clone(), &fitted).unwrap();
+        let exported = export_c(&engine, &options(), false).unwrap();
+        let exhibit = Exhibit::new(&exported, &scratch.path(&seed.to_string()));
+        let events = events(&mut random, &plan, 2_000);
+        let (sanitized, ends) = (format!("-fsanitize={zeros}"), format!("{ends}={zeros}"));
+        let flags = ["-O1", precision, &sanitized, &ends];
+        exhibit.stepped(&exhibit.built(compiler, &flags, "driver.c"), &events);
+    }
+}
+
+#[test]
 fn no_byte_is_touched_that_is_not_of_the_state_as_valgrind_and_sanitizers_see_it() {
     if !["gcc", "valgrind"].iter().all(|program| has(program)) {
         return;

@@ -53,7 +53,10 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
         }
         let mut used: Vec<String> = names.filter(|_| random.between(0.0, 1.0) < 0.8).collect();
         if used.is_empty() {
-            used.push(rows.fit.regressors[0].name.clone());
+            let Some(first) = rows.fit.regressors.first() else {
+                continue;
+            };
+            used.push(first.name.clone());
         }
         let mut all =
             |scale: f64| -> Vec<f64> { used.iter().map(|_| scale * random.normal()).collect() };
@@ -231,7 +234,27 @@ pub struct Exhibit {
     pub form: Form,
 }
 
-const WARNINGS: [&str; 5] = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"];
+const WARNINGS: [&str; 7] = [
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wundef",
+    "-Werror",
+];
+
+/// All of clang's, but for those that say no more than how a structure lies in memory, that numbers are compared, that a result is cast, and
+/// that a variable is declared behind a statement, or not declared before.
+const OF_CLANG: [&str; 7] = [
+    "-Weverything",
+    "-Wno-padded",
+    "-Wno-float-equal",
+    "-Wno-bad-function-cast",
+    "-Wno-declaration-after-statement",
+    "-Wno-unsafe-buffer-usage",
+    "-Wno-unknown-warning-option",
+];
 
 impl Exhibit {
     pub fn new(exported: &Exported, folder: &Path) -> Self {
@@ -256,6 +279,11 @@ impl Exhibit {
             .current_dir(&self.folder)
             .args(["-std=c99", "-ffp-contract=off"])
             .args(WARNINGS)
+            .args(if compiler == "clang" {
+                &OF_CLANG[..]
+            } else {
+                &[]
+            })
             .args(flags)
             .arg("-I.")
             .args(["athermal_rt.c", &format!("{}.c", self.form.name), source])

@@ -248,9 +248,59 @@ fn a_time_that_is_not_after_the_last_one_is_refused_and_a_sample_out_of_its_rang
         (8, 20.5, 0),
     ] {
         samples[0] = sample;
-        stepped(&mut program, graph, form, time * 1_000_000_000, &samples);
+        let found = stepped(&mut program, graph, form, time * 1_000_000_000, &samples);
         assert_eq!(program.get(graph, "said", 0), said, "at {time}");
+        // What had a value at the tick before has none at one that is refused.
+        assert!(said != 1 || found.iter().all(Option::is_none), "at {time}");
     }
+}
+
+#[test]
+fn after_a_restart_a_clock_that_begins_at_0_begins_a_segment_in_structured_text() {
+    let mut random = Prng::stream(3, "an exported graph");
+    let plan = plan(&graph(&mut random));
+    let fitted = made_up(&plan, &mut random);
+    let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+    let exported = st::export(&engine, &options()).unwrap();
+    let form = &exported.form;
+    let mut program = program(&exported);
+    let graph = program.instance(&st::block(form)).unwrap();
+    let all: Vec<Event> = (events(&mut random, &plan, 300).into_iter())
+        .filter(|event| matches!(event, Event::Tick(..)))
+        .collect();
+    let (mut values, mut had) = (0, false);
+    for (nth, event) in all.iter().enumerate() {
+        let Event::Tick(_, samples) = event else {
+            continue;
+        };
+        // From the restart on a clock from boot.
+        let begins = if nth < 200 { 1_700_000_000 } else { -200 };
+        let time = (begins + nth as i64) * 1_000_000_000;
+        if nth == 200 {
+            let found = stepped(&mut program, graph, form, time, samples);
+            assert_eq!(program.get(graph, "said", 0), 1);
+            assert!(had && found.iter().all(Option::is_none));
+            engine.segment();
+        }
+        program.set(graph, "restart", 0, u64::from(nth == 200));
+        let found = stepped(&mut program, graph, form, time, samples);
+        let said = program.get(graph, "said", 0);
+        assert_eq!(said & 8 != 0, nth == 200, "at {nth}");
+        let expected = engine.step(Instant::from_ns(time), samples).unwrap();
+        had = found.iter().any(Option::is_some);
+        for (place, (expected, found)) in expected.iter().zip(found).enumerate() {
+            let name = &form.outputs[place].name;
+            assert_eq!(found.is_some(), !expected.is_nan(), "{nth}, {name}");
+            let Some(found) = found else { continue };
+            values += usize::from(nth > 200);
+            let off = (found - expected).abs();
+            assert!(
+                off <= 1e-9 * expected.abs().max(1.0),
+                "{nth}, {name}: {off}"
+            );
+        }
+    }
+    assert!(values > 500, "{values}");
 }
 
 #[test]
