@@ -63,7 +63,13 @@ fn traits(model: &Model, spread: &str, seed: u64, days: f64, kind: Kind) -> Trai
         }
         rows.push(*time, &values);
     }
-    let fit = fit_machine(model, &rows, &FitOptions::default(), None, &mut |_| {});
+    let fit = fit_machine(
+        model,
+        &rows,
+        &FitOptions::default(),
+        None,
+        &athermal::core::watch::Kept::default(),
+    );
     traits_of(&fit.unwrap().model)
 }
 
