@@ -177,7 +177,7 @@ class Graph:
         offset: str | Sequence[str] | None = None,
         from_: str | None = None,
         to: str | None = None,
-        blocks: Literal["day"] | None = None,
+        blocks: str | None = None,
         keep_blocks: str | os.PathLike[str] | None = None,
         threads: int = 0,
         memory: int = 64,
@@ -197,8 +197,9 @@ class Graph:
             from_: Read rows from this time on alone: an instant (`2026-03-01T06:00:00Z`), a date, or what stands in the log's column of
                 time, such as seconds. Without an offset from UTC it goes by the `zone` of `[time]`.
             to: Read rows before this time alone.
-            blocks: Fit on the sums of days in place of rows: folds end with UTC days, and windows at the beginning of a day know the day
-                before. For estimators that are fitted by least squares.
+            blocks: Fit on the sums of UTC days in place of rows (`day`), or of stretches of another length, such as `6h` where there are
+                few days: folds end with them, and windows at the beginning of one know the one before. For estimators that are fitted by
+                least squares.
             keep_blocks: Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of
                 the data only what is new or changed.
             threads: Threads to work with; 0 takes one for each core. The result does not depend on it.
