@@ -8,6 +8,7 @@ use athermal_core::engine::Engine;
 use athermal_core::time::Duration;
 use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
+use serde_json::{Map, Value, json};
 
 use crate::lower::Rates;
 use crate::{ExportError, Exported, Form, Options, c, export_c, fmu, lower, onnx, st, state};
@@ -28,6 +29,7 @@ enum Target {
 /// Write a fitted graph for a controller
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  athermal export c model.json --dry-run
   athermal export c model.json -o c
   athermal export c model.json -o c --rate 1s --rate position=10s --frozen
   athermal export fmu model.json -o fmu
@@ -39,8 +41,11 @@ pub(crate) struct Export {
     /// A fitted model
     model: PathBuf,
     /// The folder that is written
-    #[arg(long, short, value_name = "DIR")]
-    output: PathBuf,
+    #[arg(long, short, value_name = "DIR", required_unless_present = "dry_run")]
+    output: Option<PathBuf>,
+    /// Write nothing: report all that stands in the way, or what it would take
+    #[arg(long)]
+    dry_run: bool,
     /// The time between two samples, of all signals or of one: 1s, position=10s. By default as in the data of the fit
     #[arg(long, value_name = "[SIGNAL=]TIME")]
     rate: Vec<String>,
@@ -74,6 +79,11 @@ impl Command for Export {
             frozen: self.frozen,
             name: self.name.clone(),
         };
+        if self.dry_run {
+            let form = lower(&engine, &options).map_err(failure)?;
+            self.foresee(terminal, &form);
+            return Ok(Answer::Fine);
+        }
         if self.target == Target::Onnx {
             return self.onnx(&engine, &options);
         }
@@ -84,7 +94,7 @@ impl Command for Export {
         if self.target == Target::Fmu {
             return self.fmu(terminal, &exported);
         }
-        c::write(&exported.files, &self.output).map_err(failure)?;
+        c::write(&exported.files, self.folder()).map_err(failure)?;
         self.carry(&mut engine, &exported)?;
         self.report(terminal, &exported);
         Ok(Answer::Fine)
@@ -152,6 +162,71 @@ impl Export {
         Ok(rates)
     }
 
+    fn folder(&self) -> &Path {
+        self.output.as_deref().unwrap_or(Path::new("."))
+    }
+
+    /// What it takes, before anything is written.
+    fn foresee(&self, terminal: &Terminal, form: &Form) {
+        if terminal.format == Format::Json {
+            println!("{:#}", self.facts(form));
+            return;
+        }
+        let (inputs, outputs) = (form.sources.len(), form.outputs.len());
+        println!(
+            "{}: {inputs} inputs and {outputs} outputs, nothing is written",
+            form.name
+        );
+        if self.target == Target::Onnx {
+            let count = onnx::estimators(form).count();
+            println!("{count} linear estimators, whose rows the caller makes");
+            return;
+        }
+        let (state, rates) = (self.state_bytes(form), rates_of(form));
+        println!("state: {state} bytes with {rates}");
+        println!("a tick: about {} operations at worst", c::operations(form));
+        if self.target != Target::St {
+            let c::Flash {
+                runtime,
+                tables,
+                self_test,
+            } = c::flash(form);
+            println!(
+                "flash: about {} bytes on a Cortex-M4: {runtime} of the runtime, {tables} of tables, {self_test} of the self test",
+                runtime + tables + self_test
+            );
+        }
+    }
+
+    fn state_bytes(&self, form: &Form) -> usize {
+        match self.target {
+            Target::St => st::state_bytes(form),
+            _ => form.layout.bytes(if self.float { 4 } else { 8 }),
+        }
+    }
+
+    /// What programs read of it.
+    fn facts(&self, form: &Form) -> Value {
+        let c::Flash {
+            runtime,
+            tables,
+            self_test,
+        } = c::flash(form);
+        let seconds = |(signal, ns): (&str, i64)| (signal.to_owned(), json!(ns as f64 / 1e9));
+        let rates: Map<String, Value> = form.rates().into_iter().map(seconds).collect();
+        json!({
+            "name": form.name,
+            "revision": form.revision,
+            "inputs": form.sources.len(),
+            "outputs": form.outputs.len(),
+            "state_bytes": self.state_bytes(form),
+            "flash_bytes": (self.target != Target::St)
+                .then(|| json!({ "runtime": runtime, "tables": tables, "self_test": self_test })),
+            "operations": c::operations(form),
+            "rates": rates,
+        })
+    }
+
     /// Refuses what only C has a place for.
     fn for_target(&self) -> Result<(), Failure> {
         let given = [
@@ -176,15 +251,15 @@ impl Export {
     /// Writes Structured Text.
     fn st(&self, engine: &Engine, options: &Options) -> Result<Answer, Failure> {
         let exported = st::export(engine, options).map_err(failure)?;
-        c::write(&exported.files, &self.output).map_err(failure)?;
+        c::write(&exported.files, self.folder()).map_err(failure)?;
         let form = &exported.form;
         println!(
             "wrote {}: {} with {} inputs and {} outputs, {} bytes of state with {}",
-            self.output.display(),
+            self.folder().display(),
             st::block(form),
             form.sources.len(),
             form.outputs.len(),
-            st::state_bytes(form),
+            self.state_bytes(form),
             rates_of(form),
         );
         Ok(Answer::Fine)
@@ -196,10 +271,10 @@ impl Export {
         let path = format!("{}.onnx", form.name);
         let count = onnx::estimators(&form).count();
         let bytes = onnx::model(&form);
-        c::write_bytes(&self.output, &path, &bytes).map_err(failure)?;
+        c::write_bytes(self.folder(), &path, &bytes).map_err(failure)?;
         println!(
             "wrote {}: {count} linear estimators, whose rows the caller makes",
-            self.output.join(path).display()
+            self.folder().join(path).display()
         );
         Ok(Answer::Fine)
     }
@@ -207,7 +282,7 @@ impl Export {
     /// Writes a unit for co-simulation.
     fn fmu(&self, terminal: &Terminal, exported: &Exported) -> Result<Answer, Failure> {
         let form = &exported.form;
-        let path = self.output.join(format!("{}.fmu", form.name));
+        let path = self.folder().join(format!("{}.fmu", form.name));
         let binary = fmu::write(exported, &path, "cc").map_err(failure)?;
         let (inputs, outputs) = (form.sources.len(), form.outputs.len());
         let with = match binary {
@@ -237,7 +312,7 @@ impl Export {
                 .map_err(|error| Failure::Outside(format!("{}: {error}", path.display())))
         };
         let write = |name: &str, bytes: &[u8]| {
-            let path = self.output.join(name);
+            let path = self.folder().join(name);
             std::fs::write(&path, bytes)
                 .map_err(|error| Failure::Outside(format!("{}: {error}", path.display())))
         };
@@ -259,32 +334,29 @@ impl Export {
 
     fn report(&self, terminal: &Terminal, exported: &Exported) {
         let form = &exported.form;
-        let (double, single) = (form.layout.bytes(8), form.layout.bytes(4));
         let operations = c::operations(form);
         let single_precision = self
             .float
-            .then(|| c::single_precision_error("cc", &self.output, form));
+            .then(|| c::single_precision_error("cc", self.folder(), form));
         if terminal.format == Format::Json {
-            let facts = serde_json::json!({
-                "name": form.name,
-                "revision": form.revision,
-                "state_bytes": if self.float { single } else { double },
-                "operations": operations,
-                "rates": form.rates().iter().map(|(signal, ns)| (*signal, *ns as f64 / 1e9)).collect::<BTreeMap<_, _>>(),
-                "single_precision_error": single_precision.as_ref().and_then(|of| of.as_ref().ok()),
-                "single_precision_problem":
-                    single_precision.as_ref().and_then(|of| Some(of.as_ref().err()?.to_string())),
-            });
+            let mut facts = self.facts(form);
+            facts["single_precision_error"] =
+                json!(single_precision.as_ref().and_then(|of| of.as_ref().ok()));
+            facts["single_precision_problem"] = json!(
+                single_precision
+                    .as_ref()
+                    .and_then(|of| Some(of.as_ref().err()?.to_string()))
+            );
             println!("{facts:#}");
             return;
         }
         println!(
             "wrote {}: {} with {} inputs and {} outputs, {} bytes of state with {}, about {operations} operations a tick",
-            self.output.display(),
+            self.folder().display(),
             form.name,
             form.sources.len(),
             form.outputs.len(),
-            if self.float { single } else { double },
+            self.state_bytes(form),
             rates_of(form),
         );
         match single_precision {
@@ -298,6 +370,6 @@ impl Export {
             Some(Err(problem)) => terminal.warning(problem.to_string()),
             None => {}
         }
-        terminal.note(format!("next: make -C {} test", self.output.display()));
+        terminal.note(format!("next: make -C {} test", self.folder().display()));
     }
 }

@@ -1,6 +1,7 @@
 //! Writes a lowered plan as C99: the runtime as it is, the tables of the graph, its self test, an example and how all is built.
 
 mod example;
+mod flash;
 mod tables;
 
 use std::fmt::Write as _;
@@ -9,6 +10,7 @@ use std::path::Path;
 use std::process::Command;
 
 use athermal_features::slope::kernel::FEWEST_ROWS;
+pub use flash::{Flash, flash};
 use thiserror::Error;
 
 use crate::error::ExportError;

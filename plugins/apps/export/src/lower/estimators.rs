@@ -5,7 +5,7 @@ use athermal_core::engine::Engine;
 use athermal_core::node::Predictor;
 use serde::Deserialize;
 
-use super::{Lowering, Options, Refused, first, refuse, unfitted, unknown, unread};
+use super::{Lowering, Options, Refused, first, refuse, unfitted, unknown, ways};
 use crate::form::{Entry, Field, Record};
 
 /// How far a row is outside, as models hold it.
@@ -45,24 +45,29 @@ impl Lowering<'_> {
         else {
             return refuse("it is no estimator", "report this");
         };
-        if std_dev.is_some() {
-            unread(node, "std_dev")?;
+        if let Some(way) = ways::around_estimator(node) {
+            let why = format!("what `{}` is fitted to is no linear form", node.kind.name);
+            return refuse(why, way);
         }
-        if learning.is_some() && !options.frozen {
-            return refuse(
-                "it goes on learning while it runs",
-                "`--frozen` exports it as it was fitted",
-            );
+        if std_dev.is_some() {
+            self.unread(node, "std_dev");
         }
         let names = || fit.regressors.iter().map(|of| &of.name);
         let heeded = novelty.is_some() || *outside != Outside::Pass;
-        let (found, used) = match engine.fitted().get(&node.instance()) {
-            Some(predictor) => (
-                fitted(node, &**predictor, heeded)?,
-                predictor.uses().to_vec(),
-            ),
-            None => fixed(node, names().cloned().collect())?,
+        let predictor = engine.fitted().get(&node.instance());
+        let found = match predictor {
+            Some(predictor) => {
+                fitted(node, &**predictor, heeded).map(|fit| (fit, predictor.uses().to_vec()))
+            }
+            None => fixed(node, names().cloned().collect()),
         };
+        // Where its fit has no place either, something else has to take its own.
+        if learning.is_some() && !options.frozen && (found.is_ok() || predictor.is_none()) {
+            let why = "it goes on learning while it runs".to_owned();
+            let way = "`--frozen` exports it as it was fitted".to_owned();
+            self.also.push((why, way));
+        }
+        let (found, used) = found?;
         let mut all = Vec::new();
         for &gather in gathers {
             all.extend_from_slice(&self.gathers[gather].entries);

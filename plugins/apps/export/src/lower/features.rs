@@ -17,7 +17,7 @@ use athermal_features::{FirstOrder, FirstOrderOutput, Lag, Slope};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::{Lowering, Refused, SPARE, first, refuse, samples, unfitted, unknown, unread};
+use super::{Lowering, Refused, SPARE, first, refuse, samples, unfitted, unknown, ways};
 use crate::form::{Field, Record};
 
 /// Sums over a run of rows of each channel.
@@ -147,7 +147,9 @@ impl Lowering<'_> {
             ("athermal-control", "settled") => self.settled(&planned, &parameters(node)?),
             (package, kind) => refuse(
                 format!("the kind `{kind}` of {package} cannot be exported"),
-                "leave it out of what is exported, by a graph whose outputs do not need it, or run the graph with `athermal serve`",
+                ways::around(kind).unwrap_or(
+                    "leave it out of what is exported, by a graph whose outputs do not need it, or run the graph with `athermal serve`",
+                ),
             ),
         }
     }
@@ -201,7 +203,7 @@ impl Lowering<'_> {
     fn slope(&mut self, of: &Planned<'_>, spec: &Slope) -> Result<Record, Refused> {
         for (port, name) in ["stderr", "value", "r2"].iter().enumerate() {
             if of.wanted.get(port + 1).copied().unwrap_or(false) {
-                unread(of.node, name)?;
+                self.unread(of.node, name);
             }
         }
         let (channels, gather) = of.port("signal");

@@ -4,6 +4,7 @@ mod estimators;
 mod features;
 mod rates;
 mod votes;
+mod ways;
 
 use std::ops::Range;
 
@@ -48,11 +49,11 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
     let mut nodes = Vec::new();
     for node in &plan.nodes {
         places.push(nodes.len());
-        match lowering.node(engine, node, options) {
-            Ok(record) => nodes.push(record),
-            Err((why, way)) => {
-                Refusal::count(&mut refusals, &node.name, node.instance(), why, way);
-            }
+        let found = lowering.node(engine, node, options);
+        let mut all = std::mem::take(&mut lowering.also);
+        found.map_or_else(|why| all.push(why), |record| nodes.push(record));
+        for (why, way) in all {
+            Refusal::count(&mut refusals, &node.name, node.instance(), why, way);
         }
     }
     for source in plan.sources.iter().filter(|of| of.planned.is_some()) {
@@ -130,70 +131,19 @@ pub fn identifier(name: &str) -> String {
 }
 
 /// Headers that a compiler may read in place of its own where a graph has their name, and targets that a build has for itself.
-const TAKEN: [&str; 55] = [
-    "alloca",
-    "assert",
-    "complex",
-    "ctype",
-    "endian",
-    "errno",
-    "fcntl",
-    "features",
-    "fenv",
-    "float",
-    "inttypes",
-    "iso646",
-    "limits",
-    "locale",
-    "malloc",
-    "math",
-    "memory",
-    "poll",
-    "pthread",
-    "sched",
-    "semaphore",
-    "setjmp",
-    "signal",
-    "stdalign",
-    "stdarg",
-    "stdatomic",
-    "stdbit",
-    "stdbool",
-    "stdckdint",
-    "stddef",
-    "stdint",
-    "stdio",
-    "stdlib",
-    "stdnoreturn",
-    "string",
-    "strings",
-    "syslog",
-    "termios",
-    "tgmath",
-    "threads",
-    "time",
-    "uchar",
-    "unistd",
-    "values",
-    "wchar",
-    "wctype",
-    "all",
-    "clean",
-    "edit_cache",
-    "help",
-    "install",
-    "m",
-    "package",
-    "rebuild_cache",
-    "test",
-];
+const TAKEN: &str = "alloca assert complex ctype endian errno fcntl features fenv float inttypes iso646 limits locale malloc math \
+    memory poll pthread sched semaphore setjmp signal stdalign stdarg stdatomic stdbit stdbool stdckdint stddef \
+    stdint stdio stdlib stdnoreturn string strings syslog termios tgmath threads time uchar unistd values wchar \
+    wctype all clean edit_cache help install m package rebuild_cache test";
 
 /// Why files and functions cannot have a name.
 fn taken(name: &str) -> Option<&'static str> {
     match name {
         "athermal_rt" => Some("the file of the runtime has it"),
         _ if name == "at" || name.starts_with("at_") => Some("what the runtime has begins so"),
-        _ if TAKEN.contains(&name) => Some("a header of C or a target of the build has it"),
+        _ if TAKEN.split(' ').any(|of| of == name) => {
+            Some("a header of C or a target of the build has it")
+        }
         _ => None,
     }
 }
@@ -206,6 +156,8 @@ struct Lowering<'a> {
     histories: Vec<History>,
     recorded: usize,
     layout: Layout,
+    /// Why the node at hand is not exported, beside what ends its lowering: all of it is said at once.
+    also: Vec<Refused>,
 }
 
 impl<'a> Lowering<'a> {
@@ -216,6 +168,7 @@ impl<'a> Lowering<'a> {
             gathers: Vec::new(),
             histories: Vec::new(),
             recorded: 0,
+            also: Vec::new(),
             layout: Layout {
                 // The first eight are those of the tick.
                 ints: 8,
@@ -276,6 +229,12 @@ impl<'a> Lowering<'a> {
         let first = self.layout.reals;
         self.layout.reals = first.saturating_add(count);
         first
+    }
+
+    /// Refuses an output port that somebody reads.
+    fn unread(&mut self, node: &PlannedNode, port: &str) {
+        let why = format!("the port `{port}` of `{}` is read", node.kind.name);
+        self.also.push((why, "leave out what reads it".to_owned()));
     }
 
     /// Makes room for what is needed within a step.
@@ -352,14 +311,6 @@ fn unknown<T>(name: &str) -> Result<T, Refused> {
     refuse(
         format!("its fit uses `{name}`, which the graph does not have"),
         "fit it again",
-    )
-}
-
-/// Refuses an output port that somebody reads.
-fn unread(node: &PlannedNode, port: &str) -> Result<(), Refused> {
-    refuse(
-        format!("the port `{port}` of `{}` is read", node.kind.name),
-        "leave out what reads it",
     )
 }
 

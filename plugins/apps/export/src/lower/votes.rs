@@ -7,7 +7,7 @@ use athermal_core::node::Combiner;
 use athermal_core::time::Duration;
 
 use super::features::parameters;
-use super::{Lowering, Refused, SPARE, first, refuse, samples, unread};
+use super::{Lowering, Refused, SPARE, first, refuse, samples, ways};
 use crate::form::{BY_COUNT, BY_TIME, FADING, Field, GUARD, HEDGE, Record, STATE_GATE};
 
 /// What a vote follows, beside what it reads.
@@ -97,7 +97,9 @@ fn rule_of(node: &PlannedNode) -> Result<Rule, Refused> {
         }
         (package, kind) => refuse(
             format!("the kind `{kind}` of {package} cannot be exported"),
-            "use `auto_weighted`, `hedge`, `mean`, `median`, `trimmed`, `best`, `fallback`, `guard` or `state_gate`",
+            ways::around(kind).unwrap_or(
+                "use `auto_weighted`, `hedge`, `mean`, `median`, `trimmed`, `best`, `fallback`, `guard` or `state_gate`",
+            ),
         ),
     }
 }
@@ -127,7 +129,7 @@ impl Lowering<'_> {
         };
         let rule = rule_of(node)?;
         if beside.std_dev.is_some() {
-            unread(node, "std_dev")?;
+            self.unread(node, "std_dev");
         }
         let period = self.periods.of_votes(self.plan, *voters, *state);
         let rooms = self.rooms(&rule, truth.as_ref(), period);

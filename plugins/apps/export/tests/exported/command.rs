@@ -144,6 +144,7 @@ fn room_is_made_for_the_rate_of_the_data_of_the_fit_unless_another_is_given() {
     model.card = Some(card);
     let path = scratch.path("model.json");
     std::fs::write(&path, model.to_text().unwrap()).unwrap();
+    export(&["c", path.to_str().unwrap(), "--dry-run"]).unwrap();
     let folder = scratch.path("out");
     for (given, temperature, position) in [
         (&[][..], temperature, position),
@@ -166,6 +167,25 @@ fn room_is_made_for_the_rate_of_the_data_of_the_fit_unless_another_is_given() {
             assert!(readme.contains(&line), "{given:?}, {line}: {readme}");
         }
     }
+}
+
+#[test]
+fn a_dry_run_writes_nothing_and_needs_no_folder() {
+    let scratch = Scratch::new("command-dry");
+    let path = scratch.path("model.json");
+    model(&path);
+    for target in ["c", "fmu", "st", "onnx"] {
+        let words = [target, path.to_str().unwrap()];
+        let error = export(&words).unwrap_err();
+        assert!(error.contains("--output"), "{error}");
+        export(&[&words[..], &["--dry-run"]].concat()).unwrap();
+        let folder = scratch.path("out");
+        let more = ["--dry-run", "-o", folder.to_str().unwrap()];
+        export(&[&words[..], &more].concat()).unwrap();
+        assert!(!folder.exists());
+    }
+    let error = export(&["c", path.to_str().unwrap(), "--dry-run", "--name", "at"]).unwrap_err();
+    assert!(error.contains("`--name` calls them otherwise"), "{error}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use athermal_export::c::flash;
 use athermal_export::{Options, Rates};
 
 use crate::shipped::{exported_starter, second, shipped};
@@ -54,13 +55,25 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
             let said = ran(&mut on_cortex(&exhibit, cpu, &[]));
             println!("{name}, cortex-{cpu}\n{said}");
             assert_eq!(SelfTest::of(&said), SelfTest::of(&host), "{name}, {cpu}");
-            // The runtime comes first of the two.
-            let code = said
-                .lines()
-                .nth(1)
-                .and_then(|line| line.split_whitespace().next());
-            let code: usize = code.unwrap().parse().unwrap();
+            // The runtime comes first of the two, with code and constants in the first column.
+            let mut sizes = said.lines().skip(1).map_while(|line| {
+                let word = line.split_whitespace().next()?;
+                word.parse::<usize>().ok()
+            });
+            let (code, tables) = (sizes.next().unwrap(), sizes.next().unwrap());
             assert!(code <= 32_768, "{code} bytes of runtime");
+            let foreseen = flash(&exhibit.form);
+            println!("{foreseen:?} for {code} and {tables}");
+            for (foreseen, found) in [
+                (foreseen.runtime, code),
+                (foreseen.tables + foreseen.self_test, tables),
+            ] {
+                let off = foreseen as f64 / found as f64 - 1.0;
+                assert!(
+                    *cpu == "m7" || off.abs() < 0.1,
+                    "{name}, {cpu}: {foreseen} for {found}"
+                );
+            }
         }
         if cpus.len() == 1 {
             continue;

@@ -5,7 +5,7 @@ use athermal_core::prng::Prng;
 use athermal_core::time::Duration;
 use athermal_export::{ExportError, Options, Rates, export_c, lower};
 
-use crate::support::{made_up, plan};
+use crate::support::{made_up, plan, project};
 
 const GRAPH: &str = r#"schema = 1
 name = "7 of all"
@@ -57,6 +57,11 @@ inputs.truth = "drift"
 type = "slope"
 inputs.signal = "planned"
 windows = ["60s"]
+[nodes.filtered]
+type = "kalman"
+inputs.features = "warm"
+inputs.truth = "drift"
+ahead = "60s"
 [nodes.learner]
 type = "rls"
 inputs.features = "warm"
@@ -65,6 +70,8 @@ ahead = "60s"
 [outputs]
 smooth = "smooth"
 error = "warm:stderr"
+r2 = "warm:r2"
+filtered = "filtered"
 thermal = "thermal"
 watch = "watch"
 ahead = "ahead"
@@ -74,21 +81,33 @@ learner = "learner"
 #[test]
 fn all_nodes_that_cannot_be_exported_are_named_each_with_a_way() {
     let engine = Engine::new(plan(GRAPH), &Default::default()).unwrap();
-    let error = lower(&engine, &Options::default()).unwrap_err();
+    let options = Options {
+        name: Some("math".to_owned()),
+        ..Options::default()
+    };
+    let error = lower(&engine, &options).unwrap_err();
     let ExportError::Nodes(refusals) = &error else {
         panic!("{error}");
     };
     let nodes: Vec<&str> = refusals.iter().map(|of| &*of.node).collect();
     assert_eq!(
         nodes,
-        ["smooth", "warm", "thermal", "watch", "learner", "planned"]
+        [
+            "smooth", "warm", "warm", "thermal", "watch", "filtered", "learner", "learner",
+            "planned", "7 of all"
+        ]
     );
     let text = error.to_string();
     for part in [
-        "`smooth`: the kind `moving` of athermal-features cannot be exported; leave it out",
+        "`smooth`: the kind `moving` of athermal-features cannot be exported; put `first_order` with",
         "`warm`: the port `stderr` of `slope` is read; leave out what reads it",
         "`thermal`: it has not been fitted; fit the graph first",
-        "`watch` (3 instances): the kind `page_hinkley` of athermal-combiners cannot be exported; use `auto_weighted`",
+        "`watch` (3 instances): the kind `page_hinkley` of athermal-combiners cannot be exported; leave it out: errors are watched",
+        "`warm`: the port `r2` of `slope` is read",
+        "`filtered`: what `kalman` is fitted to is no linear form; put `linear` of the same features in its place",
+        // Two ways that lead there together.
+        "`learner`: it has not been fitted; fit the graph first",
+        "`7 of all`: its files and functions cannot be called `math`",
         "`planned` (2 instances): a signal that is known ahead cannot be exported; leave out `known_ahead`",
         "`learner`: it goes on learning while it runs; `--frozen` exports it as it was fitted",
     ] {
@@ -191,4 +210,58 @@ fn channels_whose_names_become_the_same_end_in_numbers() {
         let constant = format!("_IN_TEMPERATURE_{name} = {nth}");
         assert!(header.contains(&constant), "{constant}: {header}");
     }
+}
+
+#[test]
+fn of_every_shipped_graph_all_is_named_that_stands_in_the_way_and_ways_lead_to_graphs_that_are_exported()
+ {
+    let graphs = std::fs::read_dir(project().join("graphs")).unwrap();
+    let mut names: Vec<String> = (graphs.map(|file| file.unwrap().path()))
+        .filter(|path| path.extension().is_some_and(|of| of == "toml"))
+        .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect();
+    names.sort();
+    let found = names.iter().map(|name| {
+        let path = project().join(format!("graphs/{name}.toml"));
+        let plan = plan(&std::fs::read_to_string(path).unwrap());
+        let fitted = made_up(&plan, &mut Prng::stream(3, name));
+        // What is made up is no fit of what goes on learning.
+        let engine = Engine::new(plan.clone(), &fitted);
+        let engine = engine
+            .or_else(|_| Engine::new(plan, &Default::default()))
+            .unwrap();
+        (name, lower(&engine, &Options::default()))
+    });
+    let mut ways = String::new();
+    let mut refused = Vec::new();
+    for (name, found) in found {
+        match found {
+            Err(ExportError::Nodes(all)) => {
+                refused.push(name.clone());
+                all.iter().for_each(|of| ways.push_str(&of.way));
+            }
+            found => drop(found.unwrap()),
+        }
+    }
+    let named = names
+        .iter()
+        .filter(|name| ways.contains(&format!("`{name}`")));
+    let named: Vec<&String> = named.collect();
+    assert!(named.len() >= 3, "{ways}");
+    assert!(!named.iter().any(|name| refused.contains(name)), "{ways}");
+    // The page has the same graphs.
+    let page = std::fs::read_to_string(project().join("docs/src/export-c.md")).unwrap();
+    let (_, table) = page
+        .split_once("| graph | kinds that are not exported |")
+        .unwrap();
+    let rows = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
+    let first = rows.map(|row| row.split('|').nth(1).unwrap());
+    let mut of_page: Vec<&str> = first
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2))
+        .collect();
+    of_page.sort_unstable();
+    assert_eq!(refused, of_page);
 }

@@ -69,7 +69,9 @@ fn the_shipped_graphs_give_the_bits_of_the_engine() {
 
 /// A graph of the shape that `athermal init` writes, with its predictions as they stand there.
 pub fn starter() -> String {
-    let module = std::fs::read_to_string(project().join("src/starter/prediction.toml")).unwrap();
+    let module =
+        std::fs::read_to_string(project().join("plugins/work/starter/src/prediction.toml"))
+            .unwrap();
     let module = module.replace("MEMORY", "8min");
     let head = r#"schema = 1
 name = "starter"

@@ -53,7 +53,10 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
         }
         let mut used: Vec<String> = names.filter(|_| random.between(0.0, 1.0) < 0.8).collect();
         if used.is_empty() {
-            used.push(rows.fit.regressors[0].name.clone());
+            let Some(first) = rows.fit.regressors.first() else {
+                continue;
+            };
+            used.push(first.name.clone());
         }
         let mut all =
             |scale: f64| -> Vec<f64> { used.iter().map(|_| scale * random.normal()).collect() };
