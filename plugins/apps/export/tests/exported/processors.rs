@@ -3,8 +3,12 @@
 use std::path::Path;
 use std::process::Command;
 
+use athermal_core::engine::Engine;
 use athermal_export::c::flash;
-use athermal_export::{Options, Rates};
+use athermal_export::{Exported, Options, Rates, export_c};
+use athermal_files::Dataset;
+use athermal_run::fit::{FitOptions, fit};
+use athermal_run::model::Model;
 
 use crate::shipped::{exported_starter, second, shipped};
 use crate::support::{Exhibit, Scratch, SelfTest, has, project, ran};
@@ -22,6 +26,47 @@ fn on_cortex(exhibit: &Exhibit, cpu: &str, variables: &[&str]) -> Command {
     make
 }
 
+/// A shipped graph fitted on its data, with room for the samples of these: what `athermal fit` and `export c` write. None where there are no
+/// such data.
+fn fitted(name: &str) -> Option<(Engine, Exported)> {
+    let shared = std::env::var_os("ATHERMAL_SHARED")?;
+    let machine = ["die-tester", "linear-axis"]
+        .into_iter()
+        .find(|of| name.starts_with(of))?;
+    let file = Path::new(&shared)
+        .join("data")
+        .join(machine)
+        .join("train.csv");
+    let model = Model::load(project().join("graphs").join(name)).unwrap();
+    let data = Dataset::new(vec![file.exists().then_some(file)?], Default::default());
+    let (fitted, report) = fit(&model.plan, &data, &FitOptions::default(), &mut |_| {}).unwrap();
+    let engine = Engine::new(model.plan, &fitted).unwrap();
+    let options = Options {
+        rates: Rates::of_data(&report.rates).unwrap(),
+        ..Options::default()
+    };
+    let exported = export_c(&engine, &options, false).unwrap();
+    Some((engine, exported))
+}
+
+/// What the page lacks of figures of a graph, which are near within two hundredths.
+fn not_on_page(graph: &str, figures: &[usize]) -> Option<String> {
+    let page = std::fs::read_to_string(project().join("docs/src/export-c.md")).unwrap();
+    let begins = format!("| `{graph}` | ");
+    let row = page.lines().find(|line| line.starts_with(&begins));
+    let digits = |cell: &str| {
+        cell.chars()
+            .filter(char::is_ascii_digit)
+            .collect::<String>()
+    };
+    let cells = row.unwrap_or_default().split('|').skip(2);
+    let of_page: Vec<usize> = cells.filter_map(|cell| digits(cell).parse().ok()).collect();
+    let near = |(&is, &of_page): (&usize, &usize)| (is as f64 / of_page as f64 - 1.0).abs() < 0.02;
+    let is_there = of_page.len() == figures.len() && figures.iter().zip(&of_page).all(near);
+    let own: Vec<String> = figures.iter().map(usize::to_string).collect();
+    (!is_there).then(|| format!("\n{begins}{} |", own.join(" | ")))
+}
+
 #[test]
 fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
     let needed = ["gcc", "make", "arm-none-eabi-gcc", "qemu-system-arm"];
@@ -34,17 +79,24 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
         rates: rates(),
         ..Options::default()
     };
+    let mut missing = Vec::new();
     // Of the starter it is looked at the size of the runtime alone, where it is largest.
     for (name, cpus) in [
         ("die-tester.toml", &["m3", "m4", "m7"][..]),
-        ("die-tester-compensate.toml", &["m3", "m4", "m7"][..]),
-        ("die-tester-control.toml", &["m3", "m4", "m7"][..]),
+        ("die-tester-compensate.toml", &["m4", "m7"][..]),
+        ("die-tester-control.toml", &["m4", "m7"][..]),
+        ("die-tester-sensor.toml", &["m4", "m7"][..]),
+        ("linear-axis.toml", &["m4", "m7"][..]),
+        ("linear-axis-compensate.toml", &["m4", "m7"][..]),
         ("starter", &["m4"][..]),
     ] {
+        let of_data = (name != "starter").then(|| fitted(name)).flatten();
+        let is_of_data = of_data.is_some();
         let (_, exported) = match name {
             "starter" => exported_starter(&options),
-            _ => shipped(name, rates()),
+            _ => of_data.unwrap_or_else(|| shipped(name, rates())),
         };
+        let mut figures = vec![exported.form.layout.bytes(8)];
         let exhibit = Exhibit::new(&exported, &scratch.path(name));
         let host = ran(&mut Command::new(exhibit.built(
             "gcc",
@@ -62,6 +114,15 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
             });
             let (code, tables) = (sizes.next().unwrap(), sizes.next().unwrap());
             assert!(code <= 32_768, "{code} bytes of runtime");
+            let (_, worst) = said.split_once("instructions a tick, ").unwrap();
+            let worst = worst.split(' ').next().unwrap().parse().unwrap();
+            if *cpu != "m3" {
+                figures.extend(if figures.len() == 1 {
+                    vec![tables, code, worst]
+                } else {
+                    vec![code, worst]
+                });
+            }
             let foreseen = flash(&exhibit.form);
             println!("{foreseen:?} for {code} and {tables}");
             for (foreseen, found) in [
@@ -76,7 +137,17 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
             }
         }
         if cpus.len() == 1 {
+            let page = std::fs::read_to_string(project().join("docs/src/export-c.md")).unwrap();
+            let (_, of_page) = page
+                .split_once("`init` writes, the runtime takes ")
+                .unwrap();
+            let of_page = of_page.split(' ').next().unwrap().replace(',', "");
+            let off = figures[2] as f64 / of_page.parse::<f64>().unwrap() - 1.0;
+            assert!(off.abs() < 0.02, "{figures:?}, on the page {of_page}");
             continue;
+        }
+        if is_of_data {
+            missing.extend(not_on_page(name.trim_end_matches(".toml"), &figures));
         }
         let out = format!("OUT={}", exhibit.folder.join("fused").display());
         let fused = on_cortex(&exhibit, "m7", &["CONTRACT=fast", &out])
@@ -88,6 +159,7 @@ fn cortex_m3_m4_and_m7_give_the_hash_of_the_host_and_fused_products_are_seen() {
             "{said}"
         );
     }
+    assert!(missing.is_empty(), "the page lacks{}", missing.concat());
 }
 
 #[test]
