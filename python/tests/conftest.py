@@ -160,6 +160,48 @@ def check_fleet(fleet: Path, rows: list[dict[str, object]]) -> None:
             assert parts(model.decode()) == parts((fleet / "m1.json").read_text())
 
 
+def doubtful(fleet: Path) -> tuple[dict[str, object], object, dict[str, dict[str, int | None]]]:
+    """A graph of dates and a frame of pandas whose times are texts, in no order, with the faults of each machine and how often each is met.
+
+    The clock of `back` is put back by two minutes: texts of those that come twice are not in the order of time.
+    """
+    import pandas
+
+    tree = athermal.Graph(fleet / "graph.toml").to_dict()
+    tree["time"] = {"column": "when", "unit": "rfc3339"}
+    rows = pandas.read_parquet(fleet / "logs" / "machine=m1" / "log.parquet").iloc[:3000]
+    at = pandas.to_datetime(1_792_878_000 + rows.pop("time_s").round(), unit="s").dt.floor("s")
+    early = at < at[1200]
+    local = (at + pandas.to_timedelta(early.map({True: 120, False: 118}), unit="min")).dt.strftime("%Y-%m-%dT%H:%M:%S")
+    utc = at.dt.strftime("%Y-%m-%dT%H:%M:%SZ")
+    again = rows.iloc[[700]].assign(room_degC=21.0)
+    # The row of a text is left out where its instant is not after that of a row before it.
+    latest, before, same = at[0], 0, 0
+    back = local + early.map({True: "+02:00", False: "+01:58"})
+    for _, instant in sorted(zip(back, at))[1:]:
+        before, same, latest = before + (instant < latest), same + (instant == latest), max(instant, latest)
+    assert before > 5 and same == 0
+    machines = {
+        "back": rows.assign(when=back),
+        "naive": rows.assign(when=utc.str.removesuffix("Z")),
+        "twice": pandas.concat([rows.assign(when=utc), again.assign(when=utc[700])]),
+        "well": rows.assign(when=utc),
+    }
+    frame = pandas.concat([its.assign(machine=of) for of, its in machines.items()])
+    found = {"back": {"time_before": before}, "naive": {"no_zone": None}, "twice": {"time_again": 1}, "well": {}}
+    return tree, frame.sample(frac=1, random_state=1, ignore_index=True), found
+
+
+def check_doubts(rows: list[dict[str, object]], found: dict[str, dict[str, int | None]]) -> None:
+    """Machines have these doubts, each with its text and its count, and no others about their times."""
+    assert [(row["machine"], row["error"]) for row in rows] == [(of, None) for of in found]
+    words = {"time_before": "out of order", "time_again": "row before", "no_zone": "zone"}
+    for row in rows:
+        its = [of for of in row["doubts"] if of["channel"] is None]
+        assert {of["fault"]: of["count"] for of in its} == found[row["machine"]], row
+        assert all(words[of["fault"]] in of["text"] and row["machine"] in of["text"] for of in its), its
+
+
 def run_blocks(page: str, word: str, folder: Path) -> None:
     """Runs the blocks of Python on a page of the documentation that have a word in them, with `logs` of a folder."""
     path = Path(__file__).parents[2] / "docs" / "src" / page

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DATE, check_fleet, parts, run_blocks, with_a_node
+from conftest import DATE, check_doubts, check_fleet, doubtful, parts, run_blocks, with_a_node
 
 import athermal
 import athermal._fleet
@@ -87,6 +87,20 @@ def test_rows_without_a_machine_and_other_names_are_taken(fleet, client):
     found = athermal.dask.fit(rows, fleet / "graph.toml", by="unit", time="when", partitions=1).compute()
     assert found["error"].tolist() == [None, "these rows are of no machine: its name is null"]
     assert found["rows"].tolist()[0] == len(rows) - 100
+
+
+def test_what_is_left_out_of_rows_and_times_without_a_zone_are_doubts(fleet, client):
+    tree, frame, found = doubtful(fleet)
+    rows = dask.dataframe.from_pandas(frame, npartitions=3)
+    fitted = athermal.dask.fit(rows, athermal.Graph(tree)).compute().sort_values("machine")
+    check_doubts(fitted.to_dict("records"), found)
+
+    # Instants by a clock of which is not said where it stands, of seconds, in no order.
+    frame = frame[frame["machine"].isin(["naive", "twice"])]
+    frame = frame.assign(when=pandas.to_datetime(frame["when"].str.removesuffix("Z")))
+    rows = dask.dataframe.from_pandas(frame, npartitions=3)
+    fitted = athermal.dask.fit(rows, fleet / "graph.toml", time="when").compute().sort_values("machine")
+    check_doubts(fitted.to_dict("records"), {"naive": {"no_zone": None}, "twice": {"no_zone": None, "time_again": 1}})
 
 
 def test_what_is_missing_is_refused_before_anything_is_read(fleet, client):

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import DATE, MACHINES, check_fleet, parts, run_blocks, with_a_node
+from conftest import DATE, MACHINES, check_doubts, check_fleet, doubtful, parts, run_blocks, with_a_node
 
 import athermal
 import athermal._fleet
@@ -118,6 +118,19 @@ def test_a_time_of_another_name_and_type_and_a_machine_that_is_a_number_are_take
     assert fitted.schema["unit"].dataType.simpleString() == "int"
     [row] = fitted.select("unit", "error", "rows").collect()
     assert (row.unit, row.error) == (17, None) and row.rows > 8000
+
+
+def test_what_is_left_out_of_rows_and_times_without_a_zone_are_doubts(fleet, spark):
+    tree, frame, found = doubtful(fleet)
+    rows = spark.createDataFrame(frame)
+    fitted = athermal.spark.fit(rows, athermal.Graph(tree), partitions=2).orderBy("machine").collect()
+    check_doubts([row.asDict(recursive=True) for row in fitted], found)
+
+    # Instants by a clock of which is not said where it stands, of seconds, in no order.
+    rows = rows.filter("machine in ('naive', 'twice')").withColumn("when", functions.col("when").try_cast("timestamp_ntz"))
+    assert dict(rows.dtypes)["when"] == "timestamp_ntz"
+    fitted = athermal.spark.fit(rows, fleet / "graph.toml", time="when", partitions=2).orderBy("machine").collect()
+    check_doubts([row.asDict(recursive=True) for row in fitted], {"naive": {"no_zone": None}, "twice": {"no_zone": None, "time_again": 1}})
 
 
 def test_what_is_missing_is_refused_before_anything_is_read(fleet, spark):

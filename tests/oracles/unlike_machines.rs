@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use athermal::core::registry::find;
+use athermal::core::watch::Kept;
 use athermal::run::fit::FitOptions;
 use athermal::run::model::Model;
 use athermal::run::recording::{Event, Table};
@@ -63,13 +64,7 @@ fn traits(model: &Model, spread: &str, seed: u64, days: f64, kind: Kind) -> Trai
         }
         rows.push(*time, &values);
     }
-    let fit = fit_machine(
-        model,
-        &rows,
-        &FitOptions::default(),
-        None,
-        &athermal::core::watch::Kept::default(),
-    );
+    let fit = fit_machine(model, &rows, &FitOptions::default(), None, &Kept::default());
     traits_of(&fit.unwrap().model)
 }
 
