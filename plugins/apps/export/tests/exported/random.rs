@@ -226,7 +226,7 @@ fn after_a_restart_a_clock_that_begins_at_0_begins_a_segment_and_else_no_time_go
     let there = values.filter(|&&bits| !f64::from_bits(bits).is_nan());
     assert!(there.count() > 1_000);
     // In a run that goes on, a time that goes back is refused, and gives no outputs.
-    let (found, said) = exhibit.stepped(&program, &[&after[..], &after[..1]].concat());
+    let (found, said) = exhibit.stepped(&program, &[after, &after[..1]].concat());
     assert_eq!(said & 11, 1);
     let last = found.last().unwrap();
     assert!(last.iter().all(|&bits| f64::from_bits(bits).is_nan()));
