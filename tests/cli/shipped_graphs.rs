@@ -99,8 +99,12 @@ fn every_experiment_checks_and_those_that_are_wrong_on_purpose_are_warned_of() {
 #[test]
 fn every_kind_goes_through_the_conformance_kit() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let plugins = std::fs::read_dir(root.join("plugins")).unwrap();
-    let folders: Vec<_> = plugins.map(|entry| entry.unwrap().path()).collect();
+    let within = |folder: &std::path::Path| -> Vec<_> {
+        let all = std::fs::read_dir(folder).unwrap();
+        all.map(|entry| entry.unwrap().path()).collect()
+    };
+    let groups = within(&root.join("plugins"));
+    let folders: Vec<_> = groups.iter().flat_map(|group| within(group)).collect();
     for kind in all::<NodeKind>() {
         let named = format!("name = \"{}\"", kind.package);
         let of_package = |folder: &&std::path::PathBuf| {
