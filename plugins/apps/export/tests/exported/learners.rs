@@ -90,7 +90,7 @@ fn estimators_that_are_no_linear_form_are_refused_by_name() {
             panic!("{error}");
         };
         assert_eq!(refusals[0].node, "learner");
-        let why = format!("what `{kind}` was fitted to is no linear form");
+        let why = format!("what `{kind}` is fitted to is no linear form");
         assert!(error.to_string().contains(&why), "{error}");
     }
 }
