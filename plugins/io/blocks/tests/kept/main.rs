@@ -311,7 +311,7 @@ fn blocks_come_back_from_json_to_the_bit_and_each_knows_two_days_alone() {
             .err()
             .unwrap()
             .to_string()
-            .contains("not in the order of days")
+            .contains("not in the order of time")
     );
     let other = folder.model(&GRAPH.replace("\"20min\"", "\"30min\""));
     let stray = fit_from_blocks(&other.plan, &again.to_vec(), &options, &mut |_| {});
@@ -534,5 +534,5 @@ fn what_sums_do_not_suffice_is_named() {
         &mut |_| Ok(()),
     );
     let back = back.err().unwrap().to_string();
-    assert!(back.contains("the rows go back to day 0"), "{back}");
+    assert!(back.contains("the rows go back to block 0"), "{back}");
 }
