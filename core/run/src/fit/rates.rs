@@ -9,19 +9,22 @@ use crate::recording::Event;
 /// Steps of about one size: how many, and their sum in ns.
 type Bucket = (u64, u64);
 
+/// So many sizes there are.
+const SIZES: usize = 256;
+
 /// The steps between two samples of each measured channel, by their size: four sizes to each power of two.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Spacing {
     last: Vec<Option<i64>>,
-    sizes: Vec<BTreeMap<u32, Bucket>>,
+    sizes: Vec<Vec<Bucket>>,
 }
 
 /// The same as it is kept: of each channel sizes, counts and sums.
-pub(super) type Kept = Vec<Vec<(u32, u64, u64)>>;
+pub(super) type Kept = Vec<Vec<(usize, u64, u64)>>;
 
-fn size_of(step: u64) -> u32 {
+fn size_of(step: u64) -> usize {
     let power = step.max(4).ilog2();
-    4 * power + ((step.max(4) >> (power - 2)) & 3) as u32
+    4 * power as usize + ((step.max(4) >> (power - 2)) & 3) as usize
 }
 
 impl Spacing {
@@ -29,7 +32,7 @@ impl Spacing {
         let channels = plan.sources.len();
         Self {
             last: vec![None; channels],
-            sizes: vec![BTreeMap::new(); channels],
+            sizes: vec![vec![(0, 0); SIZES]; channels],
         }
     }
 
@@ -44,7 +47,7 @@ impl Spacing {
             }
             if let Some(last) = last.replace(now.as_ns()).filter(|_| counts) {
                 let step = u64::try_from(now.as_ns().saturating_sub(last)).unwrap_or(0);
-                let (count, sum) = self.sizes[nth].entry(size_of(step)).or_default();
+                let (count, sum) = &mut self.sizes[nth][size_of(step)];
                 (*count, *sum) = (*count + 1, sum.saturating_add(step));
             }
         }
@@ -52,8 +55,10 @@ impl Spacing {
 
     pub(super) fn kept(&self) -> Kept {
         let all = self.sizes.iter().map(|of| {
-            let sizes = of.iter().map(|(&size, &(count, sum))| (size, count, sum));
-            sizes.collect()
+            let sizes = of.iter().enumerate().filter(|(_, (count, _))| *count > 0);
+            sizes
+                .map(|(size, &(count, sum))| (size, count, sum))
+                .collect()
         });
         all.collect()
     }
@@ -62,8 +67,10 @@ impl Spacing {
     pub(super) fn add(&mut self, kept: &Kept) {
         for (sizes, kept) in self.sizes.iter_mut().zip(kept) {
             for &(size, more, of) in kept {
-                let (count, sum) = sizes.entry(size).or_default();
-                (*count, *sum) = (*count + more, sum.saturating_add(of));
+                // A block that was not written by this program may have any.
+                if let Some((count, sum)) = sizes.get_mut(size) {
+                    (*count, *sum) = (*count + more, sum.saturating_add(of));
+                }
             }
         }
     }
@@ -87,15 +94,15 @@ impl Spacing {
 
 /// The usual step, in seconds: but for jitter a quarter of all steps are shorter, since samples that come now fast, now slowly need the
 /// room of the fast ones.
-fn usual_of(sizes: &BTreeMap<u32, Bucket>) -> Option<f64> {
-    let all: u64 = sizes.values().map(|(count, _)| count).sum();
+fn usual_of(sizes: &[Bucket]) -> Option<f64> {
+    let all: u64 = sizes.iter().map(|(count, _)| count).sum();
     let mut before = 0;
-    let (&size, _) = sizes.iter().find(|(_, (count, _))| {
+    let size = sizes.iter().position(|(count, _)| {
         before += count;
-        4 * before >= all
+        *count > 0 && 4 * before >= all
     })?;
-    let near = sizes.range(size.saturating_sub(1)..=size + 1);
-    let (count, sum) = near.fold((0, 0_u64), |(count, sum), (_, of)| {
+    let near = &sizes[size.saturating_sub(1)..(size + 2).min(sizes.len())];
+    let (count, sum) = near.iter().fold((0, 0_u64), |(count, sum), of| {
         (count + of.0, sum.saturating_add(of.1))
     });
     // With three digits, and rather too short.
@@ -109,9 +116,9 @@ mod tests {
     use super::*;
 
     fn usual(steps_ms: &[(u64, usize)]) -> Option<f64> {
-        let mut sizes = BTreeMap::<u32, Bucket>::new();
+        let mut sizes = vec![(0, 0); SIZES];
         for &(ms, times) in steps_ms {
-            let bucket = sizes.entry(size_of(1_000_000 * ms)).or_default();
+            let bucket: &mut Bucket = &mut sizes[size_of(1_000_000 * ms)];
             bucket.0 += times as u64;
             bucket.1 += 1_000_000 * ms * times as u64;
         }

@@ -3,6 +3,7 @@
 
 use std::fmt::Display;
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 use athermal_core::diagnostic::{Diagnostics, Sources, names, nearest};
 use athermal_core::failure::Failure;
@@ -150,24 +151,40 @@ pub fn done<T: Job, R>(
     })
 }
 
-/// The options of a job as a program knows them: `lenient=True` is `--lenient`. One that the job lacks is that of another.
-struct Words(Vec<(String, String, bool)>);
+/// Options as a program knows them: `lenient=True` is `--lenient`. One that the job lacks is that of another. Looked up when a text first
+/// needs it.
+struct Words {
+    own: Value,
+    known: OnceLock<Known>,
+}
+
+/// The options, as flags, by their keys and whether they are switches; and the names of the jobs.
+type Known = (Vec<(String, String, bool)>, Vec<&'static str>);
 
 impl Words {
     fn of(schema: &Value) -> Self {
-        let of_all = schemas().into_iter().map(|(_, schema)| schema);
-        let all = std::iter::once(schema.clone()).chain(of_all);
-        let options = all.flat_map(|schema| {
-            let properties = schema["properties"]
-                .as_object()
-                .cloned()
-                .unwrap_or_default();
-            properties.into_iter().map(|(key, of)| {
+        Self {
+            own: schema.clone(),
+            known: OnceLock::new(),
+        }
+    }
+
+    fn known(&self) -> &Known {
+        self.known.get_or_init(|| {
+            let all = schemas();
+            let schemas = std::iter::once(&self.own).chain(all.iter().map(|(_, schema)| schema));
+            let keys = schemas
+                .flat_map(|schema| schema["properties"].as_object())
+                .flatten();
+            let option = |(key, of): (&String, &Value)| {
                 let flag = format!("--{}", key.replace('_', "-"));
-                (flag, key, of["type"] == "boolean")
-            })
-        });
-        Self(options.collect())
+                (flag, key.clone(), of["type"] == "boolean")
+            };
+            (
+                keys.map(option).collect(),
+                all.iter().map(|(name, _)| *name).collect(),
+            )
+        })
     }
 
     /// A text in which options of the command line, and its calls, are as a program writes them.
@@ -183,11 +200,12 @@ impl Words {
     /// A call of the command line as one of a function, where there is one: what it gives stands before the brackets there.
     fn call(&self, call: &str) -> Option<String> {
         let (name, rest) = call.split_once(' ').unwrap_or((call, ""));
-        schemas().iter().find(|(known, _)| *known == name)?;
-        let mut words = rest.split(' ').peekable();
+        let (options, jobs) = self.known();
+        jobs.iter().find(|known| **known == name)?;
+        let mut words = rest.split(' ');
         let mut given = Vec::new();
         while let Some(word) = words.next() {
-            if let Some((_, key, is_switch)) = self.0.iter().find(|(flag, ..)| flag == word) {
+            if let Some((_, key, is_switch)) = options.iter().find(|(flag, ..)| flag == word) {
                 let value = match is_switch {
                     true => "True",
                     false => words.next().unwrap_or("…"),
@@ -206,7 +224,7 @@ impl Words {
             let end = from.find(|c: char| !is_flag(c)).unwrap_or(from.len());
             let (flag, mut after) = from.split_at(end);
             made += before;
-            match self.0.iter().find(|(known, ..)| known == flag) {
+            match self.known().0.iter().find(|(known, ..)| known == flag) {
                 None => made += flag,
                 Some((_, key, true)) => made += &format!("{key}=True"),
                 Some((_, key, false)) => {

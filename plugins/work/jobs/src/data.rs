@@ -24,6 +24,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::RowsId;
+use crate::model::few;
 use crate::path::{quoted, recording};
 
 pub use reading::{Joining, Reading, Times};
@@ -38,7 +39,7 @@ pub struct Data {
     given: Vec<Given>,
     #[command(flatten)]
     #[serde(flatten)]
-    reading: Reading,
+    pub(crate) reading: Reading,
     #[arg(skip)]
     #[serde(skip)]
     thinned: OnceLock<Vec<ThinnedChannels>>,
@@ -121,7 +122,7 @@ impl Data {
             Some((file, _)) => Err(Failure::Request(format!(
                 "--offset {}: this is none of the files of the data, which are {}",
                 file.display(),
-                self.names().join(", ")
+                few(&self.names())
             ))),
             None => Ok(()),
         }
@@ -209,12 +210,6 @@ impl Data {
             (journal_of(path).is_none() && !self.tables.has(path)).then(|| path.to_owned())
         });
         files.collect()
-    }
-
-    /// How files are read, in words that differ where rows may.
-    #[must_use]
-    pub fn reading_words(&self) -> String {
-        format!("{:?}", self.reading)
     }
 
     /// A data set of some of the files, of which no rows outside of a stretch of time are needed.

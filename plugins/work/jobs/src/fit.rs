@@ -96,7 +96,7 @@ impl Fit {
                 let of = OfFiles {
                     cut,
                     files: self.data.files(),
-                    reading: self.data.reading_words(),
+                    reading: format!("{:?}", self.data.reading),
                     data: &|files, within| match files.is_empty() {
                         true => self.data.dataset(),
                         false => self.data.dataset_of(files, within),

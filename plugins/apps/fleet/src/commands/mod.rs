@@ -18,7 +18,7 @@ use clap::{Args, Subcommand};
 use crate::found::{Machines, machines_of};
 use crate::pool::Event;
 use crate::worker::{words, work};
-use athermal_jobs::data::Reading;
+use athermal_jobs::data::{Data, Reading};
 
 /// Fit, score and compare the machines of a fleet
 ///
@@ -79,7 +79,11 @@ pub(crate) struct Files {
 
 impl Files {
     fn machines(&self, given: &[String]) -> Result<Machines, Failure> {
-        machines_of(given, &self.by).map_err(|error| Failure::Request(format!("--data {error}")))
+        let machines = machines_of(given, &self.by)
+            .map_err(|error| Failure::Request(format!("--data {error}")))?;
+        let files = machines.values().flatten().cloned().collect();
+        Data::of(files, self.reading.clone()).check_offsets(&[])?;
+        Ok(machines)
     }
 }
 

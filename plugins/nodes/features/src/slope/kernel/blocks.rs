@@ -267,19 +267,13 @@ impl Blocks {
             self.wholes.resize(block + block / 4 + 1);
         }
         let (start, mut end) = (self.starts[block], self.starts[block + 1]);
-        let mut last = None;
+        self.wholes.clear(block, rows.time(end - 1));
         while end - start >= EACH {
-            let (row, place) = (end - EACH, self.place(end - EACH));
-            match last {
-                None => self.tails.clear(place, rows.time(end - 1)),
-                Some(last) => self.tails.repeat(place, last),
-            }
-            self.tails.add(place, rows, row..end, &self.origins);
-            (end, last) = (row, Some(place));
-        }
-        match last {
-            None => self.wholes.clear(block, rows.time(end - 1)),
-            Some(last) => self.wholes.set(block, &self.tails, last),
+            let row = end - EACH;
+            self.wholes.add(block, rows, row..end, &self.origins);
+            let place = self.place(row);
+            self.tails.set(place, &self.wholes, block);
+            end = row;
         }
         self.wholes.add(block, rows, start..end, &self.origins);
     }

@@ -358,21 +358,6 @@ impl Table {
         }
     }
 
-    /// Sets a run to another one.
-    #[inline(always)]
-    pub(super) fn repeat(&mut self, slot: usize, from: usize) {
-        self.common[slot] = self.common[from];
-        for group in &mut self.groups {
-            group.values[slot] = group.values[from];
-            if group.keeps_times {
-                group.times[slot] = group.times[from];
-            }
-            if group.keeps_squares {
-                group.squares[slot] = group.squares[from];
-            }
-        }
-    }
-
     /// Sets the first runs to the sums of as many of another table from the one at the same place on, about an origin; the run after
     /// them is an empty one.
     #[inline(always)]
