@@ -348,6 +348,22 @@ fn what_was_left_out_while_reading_is_reported_by_machine_and_a_fit_of_all_says_
 }
 
 #[test]
+fn an_offset_is_that_of_each_machine_and_one_of_no_file_is_refused() {
+    let fleet = Fleet::new("fleet-offsets", &["a", "b"]);
+    fleet
+        .fit(&["--offset", "nowhere.csv=1s"])
+        .ended(2)
+        .tells(&["--offset nowhere.csv: this is none of the files"]);
+    fleet.fit(&[]).ended(0);
+    let rows = |machine: &str| fleet.manifest()["machines"][machine]["rows"]["hash"].clone();
+    let before = [rows("a"), rows("b")];
+    let log = fleet.log("a");
+    let name = log.file_name().unwrap().to_str().unwrap();
+    fleet.fit(&["--offset", &format!("{name}=5s")]).ended(0);
+    assert_ne!(rows("a"), before[0]);
+}
+
+#[test]
 fn a_quiet_fit_that_ends_with_1_says_why() {
     let fleet = Fleet::new("fleet-quiet", &["a"]);
     let text = thermal().replace(
