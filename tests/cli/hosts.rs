@@ -79,7 +79,6 @@ fn of_the_command_line(text: &str) -> String {
             };
             text = text.replace(&by, &is);
         }
-        text = text.replace(&format!("`{name}()`"), &format!("`athermal {name}`"));
         text = text.replace(&format!("`{name}(--"), &format!("`athermal {name} --"));
     }
     text.replace(")`", "`")

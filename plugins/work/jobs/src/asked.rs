@@ -197,7 +197,7 @@ impl Words {
         self.options(&parts.collect::<Vec<_>>().join("`"))
     }
 
-    /// A call of the command line as one of a function, where there is one: what it gives stands before the brackets there.
+    /// A call of the command line as one of a function, where there is one and options say which; `athermal init` alone names the command.
     fn call(&self, call: &str) -> Option<String> {
         let (name, rest) = call.split_once(' ').unwrap_or((call, ""));
         let (options, jobs) = self.known();
@@ -213,7 +213,7 @@ impl Words {
                 given.push(format!("{key}={value}"));
             }
         }
-        Some(format!("{name}({})", given.join(", ")))
+        (!given.is_empty()).then(|| format!("{name}({})", given.join(", ")))
     }
 
     fn options(&self, text: &str) -> String {
@@ -396,6 +396,10 @@ mod tests {
                 "run `fit(data=FILE)` and use MODEL",
             ),
             ("raise `--memory`", "raise `memory`"),
+            (
+                "`athermal simulate` lists them",
+                "`athermal simulate` lists them",
+            ),
             ("see `athermal nodes slope`", "see `athermal nodes slope`"),
         ] {
             assert_eq!(words.put(text), own);

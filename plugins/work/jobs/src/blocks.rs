@@ -46,7 +46,7 @@ impl FromStr for Cut {
         if text == "day" {
             return Ok(Self(DAY));
         }
-        let length: Duration = text.parse().map_err(|error| format!("{error}"))?;
+        let length: Duration = text.parse().map_err(|error| format!("{error}; or `day`"))?;
         match length >= MINUTE && length.as_ns() % MINUTE.as_ns() == 0 {
             true => Ok(Self(length)),
             false => Err("expected `day`, or whole minutes such as `6h`".to_owned()),
