@@ -16,7 +16,7 @@
 //! This package links every built-in plugin: whoever uses it can load any graph that the command line can.
 //!
 //! The command line stands behind the default feature `cli`; diagnosis, charts and reports behind `analysis`, which `cli` implies.
-//! An embedder with `default-features = false` compiles neither: 132 crates instead of 202.
+//! An embedder with `default-features = false` compiles neither: 132 crates instead of 217.
 
 pub use athermal_core as core;
 pub use athermal_core::engine::{Engine, EngineError};
