@@ -1,7 +1,10 @@
 //! Rows of batches, one after the other, as a reader of recordings takes them.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::DataType;
+use athermal_core::diagnostic::panic_text;
 use athermal_files::{TypedRows, TypedTime, number};
 
 use crate::column::{self, Instants};
@@ -114,7 +117,9 @@ impl Rows {
     /// Takes the next batch that has rows; false where there is none.
     fn take_batch(&mut self) -> Result<bool, String> {
         let batch = loop {
-            match self.batches.next() {
+            // A damaged file makes the reader panic here and there.
+            let next = catch_unwind(AssertUnwindSafe(|| self.batches.next()));
+            match next.map_err(|panic| format!("it is damaged: {}", panic_text(&*panic)))? {
                 None => return Ok(false),
                 Some(batch) => {
                     let batch = batch.map_err(|error| error.to_string())?;

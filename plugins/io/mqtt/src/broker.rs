@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration as Wait;
 
-use athermal_core::node::Forms;
 use athermal_core::time::Duration;
 use athermal_serve::connector::ParameterRemark;
+use athermal_serve::deployment::Login;
 use schemars::JsonSchema;
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 
 use crate::client::Settings;
 
@@ -147,91 +146,20 @@ pub enum Version {
     Five,
 }
 
-/// A text that does not belong into a file that others read.
-#[derive(Debug, Clone, PartialEq, Eq, JsonSchema)]
-#[schemars(transparent)]
-pub struct Secret(SecretPlace);
-
-/// Where a text stands that does not belong into a file that others read.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct SecretPlace {
-    /// A file with it, relative to the machine file; blanks and line ends around it do not count.
-    #[serde(default)]
-    file: Option<PathBuf>,
-    /// A variable of the environment with it.
-    #[serde(default)]
-    env: Option<String>,
-}
-
-impl<'de> Deserialize<'de> for Secret {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let place = Forms::new("where it stands, { file = \"…\" } or { env = \"…\" }")
-            .text(|_: String| None)
-            .table(Some)
-            .read(deserializer)?;
-        place.map(Self).ok_or_else(|| {
-            D::Error::custom(
-                "a secret has no place in a file that others read: write `{ file = \"…\" }` with a file that has it, or \
-                 `{ env = \"…\" }` with a variable of the environment; only the name of a user may stand here, as `name`",
-            )
-        })
-    }
-}
-
-impl Secret {
-    fn read(&self, folder: &Path) -> Result<String, String> {
-        let SecretPlace { file, env } = &self.0;
-        match (file, env) {
-            (Some(file), None) => {
-                let path = folder.join(file);
-                let read = std::fs::read_to_string(&path);
-                let text =
-                    read.map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-                Ok(text.trim().to_owned())
-            }
-            (None, Some(name)) => std::env::var(name)
-                .map_err(|_| format!("the environment has no variable `{name}` for the login")),
-            _ => {
-                Err("a secret of `login` is either { file = \"…\" } or { env = \"…\" }".to_owned())
-            }
-        }
-    }
-}
-
-/// Who logs in.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Login {
-    /// The name of the user; without it `user` says where it stands.
-    #[serde(default)]
-    name: Option<String>,
-    /// Where the name of the user stands.
-    #[serde(default)]
-    user: Option<Secret>,
-    /// Where the password stands: { file = "…" } or { env = "…" }. It has no place in the machine file itself.
-    password: Secret,
-}
-
-impl Login {
-    fn read(&self, folder: &Path) -> Result<(String, String), String> {
-        let name = match (&self.name, &self.user) {
-            (Some(name), None) => name.clone(),
-            (None, Some(user)) => user.read(folder)?,
-            _ => return Err("`login` needs either `name` or `user`".to_owned()),
-        };
-        Ok((name, self.password.read(folder)?))
-    }
-}
-
 /// What is said of the way to a broker, by source and sink alike.
 #[derive(Debug, Clone)]
 pub struct Way<'a> {
+    /// Where it is.
     pub broker: &'a Broker,
+    /// The certificates that its own is judged by.
     pub authorities: Option<&'a PathBuf>,
+    /// By what it knows the client.
     pub identity: Option<&'a Identity>,
+    /// User and password.
     pub login: Option<&'a Login>,
+    /// The client id, if not the usual one.
     pub client_id: Option<&'a ClientId>,
+    /// After how long without a packet it is asked whether it is there.
     pub keep_alive: Duration,
 }
 
@@ -343,46 +271,5 @@ mod tests {
         for text in [String::new(), "a\0b".to_owned(), "a".repeat(65_536)] {
             assert!(of(text).is_err());
         }
-    }
-
-    #[test]
-    fn a_password_comes_from_a_file_or_the_environment_and_from_nowhere_else() {
-        let folder = std::env::temp_dir();
-        let secret = |file: Option<&str>, env: Option<&str>| {
-            Secret(SecretPlace {
-                file: file.map(PathBuf::from),
-                env: env.map(str::to_owned),
-            })
-        };
-        let name = format!("athermal-mqtt-secret-{}", std::process::id());
-        std::fs::write(folder.join(&name), " word \n").unwrap();
-        assert_eq!(
-            secret(Some(&name), None).read(&folder),
-            Ok("word".to_owned())
-        );
-        std::fs::remove_file(folder.join(&name)).unwrap();
-        assert!(secret(Some(&name), None).read(&folder).is_err());
-        let path = std::env::var("PATH").unwrap();
-        assert_eq!(secret(None, Some("PATH")).read(&folder), Ok(path));
-        assert!(secret(None, None).read(&folder).is_err());
-        assert!(secret(Some("a"), Some("b")).read(&folder).is_err());
-    }
-
-    #[test]
-    fn a_password_in_clear_is_refused_with_the_way_to_write_it_and_without_the_password() {
-        for text in [
-            "password = \"w0rd\"",
-            "user = \"w0rd\"\npassword = { env = \"P\" }",
-        ] {
-            let error = toml::from_str::<Login>(text).unwrap_err();
-            let error = error.message();
-            assert!(error.contains("{ file = \"…\" }"), "{error}");
-            assert!(error.contains("{ env = \"…\" }"), "{error}");
-            assert!(!error.contains("w0rd"), "{error}");
-        }
-        let login = "name = \"me\"\npassword = { env = \"P\" }";
-        assert!(toml::from_str::<Login>(login).is_ok());
-        let error = toml::from_str::<Login>("name = \"me\"\npassword = 7").unwrap_err();
-        assert!(error.message().contains("{ file = "), "{error}");
     }
 }

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::time::Duration as Wait;
 
-use athermal_command::{Answer, Command, Failure, Group, Terminal, print};
+use athermal_command::{Answer, Browsed, Failure, Terminal, print};
 use athermal_core::document::placeholders;
-use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use clap::Args;
 use serde_json::Value;
@@ -15,75 +14,49 @@ use crate::broker::{Broker, Identity, Version, keep_alive};
 use crate::client::Settings;
 use crate::listen::{Heard, listen};
 
-/// Listen to a broker, and write the source that takes what it publishes
-///
-/// Subscribes to all topics for a while and prints a `[sources.NAME]` table: the topics, where their values and times stand, and units as
-/// far as names say them. Rename its channels, and leave out what you do not need. Nothing on the broker is changed.
+/// Subscribes to all topics of a broker for a while: what it publishes is written as a source, with the topics, where their values and
+/// times stand, and units as far as names say them.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  athermal browse mqtt://localhost\n  athermal browse mqtt://plant:1883 --topic 'line7/#' --for 1min"
-)]
 pub struct Browse {
-    /// The broker: mqtt://HOST, or mqtt://HOST:PORT
-    broker: Broker,
-    /// How long to listen
-    #[arg(long = "for", value_name = "DURATION", default_value = "10s")]
-    patience: Duration,
-    /// The topics to listen to
+    /// Of MQTT: the topics to listen to
     #[arg(long, value_name = "TOPIC", default_value = "#")]
     topic: String,
-    /// The user to log in as
-    #[arg(long, value_name = "NAME", requires = "password_file")]
-    user: Option<String>,
-    /// A file with the password
-    #[arg(long, value_name = "FILE", requires = "user")]
-    password_file: Option<PathBuf>,
-    /// A file of certificates that the broker's own is judged by
+    /// Of MQTT: a file of certificates that the broker's own is judged by
     #[arg(long, value_name = "FILE")]
     authorities: Option<PathBuf>,
-    /// A file with the certificate by which the broker knows the client
+    /// Of MQTT: a file with the certificate by which the broker knows the client
     #[arg(long, value_name = "FILE", requires = "key")]
     certificate: Option<PathBuf>,
-    /// A file with the key of that certificate
+    /// Of MQTT: a file with the key of that certificate
     #[arg(long, value_name = "FILE", requires = "certificate")]
     key: Option<PathBuf>,
 }
 
-athermal_command::register_command!(Browse, "browse");
+athermal_command::register_scheme!(Browse, "mqtt", "mqtts");
 
-impl Command for Browse {
-    const GROUP: Group = Group::Service;
-    fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let mut broker = self.broker.clone();
+impl athermal_command::Browse for Browse {
+    fn run(&self, at: &Browsed, terminal: &Terminal) -> Result<Answer, Failure> {
+        let named: Broker = at.address.parse().map_err(Failure::Request)?;
+        let mut broker = named.clone();
         broker.authorities.clone_from(&self.authorities);
         let identity = self.certificate.clone().zip(self.key.clone());
         broker.identity = identity.map(|(certificate, key)| Identity { certificate, key });
-        let login = match (&self.user, &self.password_file) {
-            (Some(user), Some(path)) => {
-                let read = std::fs::read_to_string(path);
-                let failed =
-                    |error| Failure::Outside(format!("cannot read {}: {error}", path.display()));
-                Some((user.clone(), read.map_err(failed)?.trim().to_owned()))
-            }
-            _ => None,
-        };
         let settings = Settings {
             broker,
             version: Version::Five,
             client_id: "athermal-browse".to_owned(),
-            login,
+            login: at.login.clone(),
             keep_alive: Wait::from_secs(keep_alive().secs() as u64),
             receive_maximum: 500,
             keeps_session: false,
             last_will: None,
         };
         let mut topics = BTreeMap::new();
-        let patience = Wait::from_secs_f64(self.patience.secs().max(0.1));
         let mut refused = None;
         let ended = listen(
             settings,
             std::slice::from_ref(&self.topic),
-            patience,
+            at.wait(),
             |heard| {
                 match heard {
                     Heard::Answer(_, answer) => refused = answer.err(),
@@ -96,25 +69,25 @@ impl Command for Browse {
                 refused.is_some()
             },
         );
-        ended.map_err(|why| Failure::Outside(format!("{}: {why}", self.broker)))?;
+        ended.map_err(|why| Failure::Outside(format!("{named}: {why}")))?;
         if let Some(why) = refused {
             return Err(Failure::Outside(format!(
-                "{} refuses `{}`: {why}",
-                self.broker, self.topic
+                "{named} refuses `{}`: {why}",
+                self.topic
             )));
         }
         if topics.is_empty() {
             terminal.warning(format_args!(
                 "nothing came under `{}` in {}: listen for longer, as with `--for 1min`",
-                self.topic, self.patience
+                self.topic, at.patience
             ));
             return Ok(Answer::No);
         }
-        print!("{}", table(&self.broker, &topics));
+        print!("{}", table(&named, &topics));
         terminal.note(format_args!(
             "{} topics in {}; next: name the channels as your graph does, then `athermal check --live FILE`",
             topics.len(),
-            self.patience
+            at.patience
         ));
         Ok(Answer::Fine)
     }

@@ -34,15 +34,29 @@ pub struct Settings {
     pub receive_maximum: u16,
     /// Whether the broker is to keep what comes while the client is away.
     pub keeps_session: bool,
-    /// What the broker publishes where the client is gone: a topic and a payload.
-    pub last_will: Option<(String, String)>,
+    /// What the broker publishes where the client is gone without leave.
+    pub last_will: Option<Will>,
+}
+
+/// What a broker publishes for a client that is gone, once at least.
+#[derive(Debug, Clone)]
+pub struct Will {
+    /// Its topic.
+    pub topic: String,
+    /// What it says.
+    pub payload: Vec<u8>,
+    /// Whether the broker keeps it for whoever comes later.
+    pub is_retained: bool,
 }
 
 /// What comes of a connection.
 #[derive(Debug)]
 pub enum Event {
     /// The broker takes the client, and has its session or not.
-    Connected { session_present: bool },
+    Connected {
+        /// Whether the broker had kept the session.
+        session_present: bool,
+    },
     /// A message.
     Message(Message),
     /// Subscriptions were sent under this number…
@@ -87,16 +101,21 @@ pub enum Ended {
     Other(String),
 }
 
-/// A connection to a broker.
+/// A connection to a broker. It is polled by [`next`](Self::next) alone.
+#[allow(missing_debug_implementations)] // the crate has none of it
 pub enum Connection {
+    /// Of MQTT 3.1.1.
     Three(rumqttc::AsyncClient, Box<rumqttc::EventLoop>),
+    /// Of MQTT 5.
     Five(v5::AsyncClient, Box<v5::EventLoop>),
 }
 
 /// Sends on a connection, without waiting.
 #[derive(Debug, Clone)]
 pub enum Sender {
+    /// Of MQTT 3.1.1.
     Three(rumqttc::AsyncClient),
+    /// Of MQTT 5.
     Five(v5::AsyncClient),
 }
 
@@ -125,9 +144,18 @@ impl Connection {
         if let Some((name, password)) = &settings.login {
             options.set_credentials(name, password);
         }
-        if let Some((topic, payload)) = &settings.last_will {
-            let will =
-                rumqttc::LastWill::new(topic, payload.as_bytes(), three::QoS::AtLeastOnce, true);
+        if let Some(Will {
+            topic,
+            payload,
+            is_retained,
+        }) = &settings.last_will
+        {
+            let will = rumqttc::LastWill::new(
+                topic,
+                payload.as_slice(),
+                three::QoS::AtLeastOnce,
+                *is_retained,
+            );
             options.set_last_will(will);
         }
         if broker.is_secure {
@@ -161,9 +189,14 @@ impl Connection {
         if let Some((name, password)) = &settings.login {
             options.set_credentials(name, password);
         }
-        if let Some((topic, payload)) = &settings.last_will {
+        if let Some(Will {
+            topic,
+            payload,
+            is_retained,
+        }) = &settings.last_will
+        {
             let qos = v5::mqttbytes::QoS::AtLeastOnce;
-            let will = five::LastWill::new(topic, payload.as_bytes(), qos, true, None);
+            let will = five::LastWill::new(topic, payload.clone(), qos, *is_retained, None);
             options.set_last_will(will);
         }
         if broker.is_secure {

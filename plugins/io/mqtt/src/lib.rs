@@ -2,8 +2,8 @@
 //!
 //! | module | decides |
 //! |---|---|
-//! | `broker` | where a broker is, and how one logs in |
-//! | `client` | one connection, of either version; no other module knows the crate that speaks the protocol |
+//! | [`broker`] | where a broker is, and how one logs in |
+//! | [`client`] | one connection, of either version: will, topics, acknowledgements, for other crates too; no other module knows the crate that speaks the protocol |
 //! | `subscriptions` | what is asked of a broker, until it has answered |
 //! | `source`, `session` | all of it at work |
 //! | `sink`, `publisher`, `outgoing` | outputs as messages, stored and sent again |
@@ -13,10 +13,10 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod broker;
+pub mod broker;
 #[cfg(feature = "cli")]
 mod browse;
-mod client;
+pub mod client;
 mod listen;
 mod look;
 mod outgoing;

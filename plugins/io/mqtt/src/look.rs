@@ -7,7 +7,7 @@ use athermal_serve::connector::{Seen, WiredChannel};
 
 use crate::client::Settings;
 use crate::listen::{Heard, listen};
-use crate::session::{arrival, shown};
+use crate::session::shown;
 use crate::source::Route;
 use athermal_messages::payload::Values;
 
@@ -49,7 +49,7 @@ pub fn look(
                 }
             }
             Heard::Message(message) => {
-                let now = arrival();
+                let now = athermal_serve::host::time_of_day();
                 for route in routes.iter().filter(|of| of.topic.matches(&message.topic)) {
                     let read = route.form.read(&message.payload, now);
                     for of in read.given {

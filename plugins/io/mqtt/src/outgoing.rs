@@ -121,6 +121,7 @@ mod tests {
             is_beat: false,
             behind: Duration::from_ns(250_000_000),
             revision: 0xab,
+            is_degraded: false,
             outputs: &values,
         };
         form.messages(&row, &mut all);

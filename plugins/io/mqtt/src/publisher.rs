@@ -34,11 +34,13 @@ pub struct Manner {
     pub spool: u64,
     /// Whether what cannot be published at once is not published at all.
     pub is_command: bool,
-    /// Under which topic it says that it lives, and how often.
-    pub alive: String,
+    /// Under which topic it says that it lives, if it does, and how often.
+    pub alive: Option<String>,
     pub every: Duration,
     /// Whether the other version may be tried.
     pub is_version_open: bool,
+    /// The longest pause between two connections.
+    pub retry: Wait,
 }
 
 /// What waits, and how the connection is.
@@ -243,7 +245,7 @@ struct Work {
 
 impl Work {
     async fn run(&mut self) {
-        let mut back_off = BackOff::default();
+        let mut back_off = BackOff::up_to(self.manner.retry);
         while !self.stop.is_asked() {
             let mut connected = None;
             let ended = self.connection(&mut connected).await;
@@ -347,7 +349,9 @@ impl Work {
             }
         }
         // The last will is for those who do not take leave.
-        sender.publish(&self.manner.alive, true, true, b"{\"alive\":false}");
+        if let Some(topic) = &self.manner.alive {
+            sender.publish(topic, true, true, b"{\"alive\":false}");
+        }
         sender.disconnect();
         let leave = async { while connection.next().await.is_ok() {} };
         let _ = timeout(Wait::from_millis(300), leave).await;
@@ -389,6 +393,9 @@ impl Work {
 
     /// Says that it lives.
     fn beat(&mut self, sender: &Sender) -> bool {
+        let Some(topic) = &self.manner.alive else {
+            return false;
+        };
         self.count += 1;
         let (ticks, waiting) = {
             let spool = self.shared.lock();
@@ -396,11 +403,6 @@ impl Work {
         };
         let alive =
             json!({ "alive": true, "count": self.count, "ticks": ticks, "waiting": waiting });
-        sender.publish(
-            &self.manner.alive,
-            false,
-            true,
-            alive.to_string().as_bytes(),
-        )
+        sender.publish(topic, false, true, alive.to_string().as_bytes())
     }
 }

@@ -5,11 +5,12 @@ use std::collections::{HashMap, VecDeque};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration as Wait, SystemTime, UNIX_EPOCH};
+use std::time::Duration as Wait;
 
 use athermal_core::time::Instant;
 use athermal_serve::bell::Bell;
 use athermal_serve::connector::{Outflow, Stop};
+use athermal_serve::host::time_of_day;
 use tokio::sync::Notify;
 use tokio::time::{sleep, timeout};
 
@@ -167,7 +168,7 @@ impl<'a> Session<'a> {
                 let was_kept = subscriptions.has_asked;
                 subscriptions.connected(session_present, sender);
                 self.was_connected = true;
-                self.inlet.gaps.connected(arrival());
+                self.inlet.gaps.connected(time_of_day());
                 self.out.connected();
                 if was_kept && !session_present {
                     let (broker, id) =
@@ -233,7 +234,7 @@ impl<'a> Session<'a> {
                 .insert(topic.to_owned(), meant.map(|(nth, _)| nth).collect());
         }
         let meant = self.meant.get(topic).map_or(&[][..], Vec::as_slice);
-        let arrival = arrival();
+        let arrival = time_of_day();
         let read: Vec<_> = meant
             .iter()
             .map(|nth| (*nth, self.inlet.routes[*nth].form.read(payload, arrival)))
@@ -303,13 +304,6 @@ impl<'a> Session<'a> {
             self.waiting.pop_front();
         }
     }
-}
-
-/// The time of day, as it is stamped where a message has no time.
-pub(crate) fn arrival() -> Instant {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    let ns = since.map_or(0, |of| i64::try_from(of.as_nanos()).unwrap_or(i64::MAX));
-    Instant::from_ns(ns)
 }
 
 /// An instant for people: RFC 3339.

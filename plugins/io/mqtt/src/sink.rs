@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use athermal_core::time::Duration;
 use athermal_serve::connector::{
-    ConnectorError, Kept, OutRow, Outlet, ParameterRemark, Place, Purpose, Sink, SinkWiring,
+    ConnectorError, Kept, Messages, OpensMessages, OutRow, Outlet, ParameterRemark, Place, Purpose,
+    Sink, SinkWiring,
 };
-use athermal_serve::deployment::Size;
+use athermal_serve::deployment::{Login, Size};
 use athermal_serve::register_sink;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive};
-use crate::client::{Connection, Settings};
+use crate::broker::{Broker, ClientId, Identity, Version, Way, keep_alive};
+use crate::client::{Connection, Settings, Will};
 use crate::outgoing::{Form, Outgoing};
 use crate::publisher::{Manner, Publisher};
 use athermal_messages::topic;
@@ -81,6 +82,18 @@ const fn second() -> Duration {
 }
 
 impl MqttSink {
+    /// What a connection is made of, without a last will.
+    fn settings(&self, wiring: &SinkWiring) -> Result<Settings, ConnectorError> {
+        let way = self.way();
+        let settings = way.settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
+        Ok(Settings {
+            version: self.version.unwrap_or(Version::Five),
+            // What waits is kept here: nothing is left of a connection that has ended.
+            keeps_session: false,
+            ..settings.map_err(ConnectorError::new)?
+        })
+    }
+
     fn way(&self) -> Way<'_> {
         Way {
             broker: &self.broker,
@@ -125,25 +138,18 @@ impl Sink for MqttSink {
     }
 
     fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError> {
-        let settings = self
-            .way()
-            .settings(wiring.machine.as_deref(), &wiring.name, &wiring.folder);
-        let settings = settings.map_err(ConnectorError::new)?;
+        let mut settings = self.settings(&wiring)?;
         let alive = self.alive.clone();
         let alive = alive.unwrap_or_else(|| format!("{}/alive", settings.client_id));
         // A source may have the same name, and each has a session of its own.
-        let client_id = match self.client_id {
-            Some(_) => settings.client_id,
-            None => format!("{}-sink", settings.client_id),
-        };
-        let settings = Settings {
-            version: self.version.unwrap_or(Version::Five),
-            // What waits is kept here: nothing is left of a connection that has ended.
-            keeps_session: false,
-            client_id,
-            last_will: Some((alive.clone(), "{\"alive\":false}".to_owned())),
-            ..settings
-        };
+        if self.client_id.is_none() {
+            settings.client_id += "-sink";
+        }
+        settings.last_will = Some(Will {
+            topic: alive.clone(),
+            payload: b"{\"alive\":false}".to_vec(),
+            is_retained: true,
+        });
         Connection::new(&settings).map_err(ConnectorError::new)?;
         let is_command = self.purpose() == Purpose::Command;
         let manner = Manner {
@@ -151,15 +157,80 @@ impl Sink for MqttSink {
             is_retained: self.retain,
             spool: self.spool.0,
             is_command,
-            alive,
+            alive: Some(alive),
             every: self.every,
             is_version_open: self.version.is_none(),
+            retry: wiring.retry,
         };
         Ok(Box::new(MqttOutlet {
             form: Form::new(&self.topic, wiring.outputs),
             publisher: Publisher::start(settings, manner)?,
             messages: Vec::new(),
         }))
+    }
+
+    fn messages(&self) -> Option<&dyn OpensMessages> {
+        Some(self)
+    }
+}
+
+impl OpensMessages for MqttSink {
+    fn open(
+        &self,
+        wiring: &SinkWiring,
+        suffix: &str,
+        topic: &str,
+    ) -> Result<Box<dyn Messages>, ConnectorError> {
+        if let Some(words) = topic::mistake(topic) {
+            return Err(ConnectorError::new(format_args!(
+                "topic \"{topic}\": {words}"
+            )));
+        }
+        let mut settings = self.settings(wiring)?;
+        settings.client_id += suffix;
+        let manner = Manner {
+            is_safe: true,
+            is_retained: false,
+            spool: u64::MAX,
+            is_command: false,
+            alive: None,
+            every: self.every,
+            is_version_open: self.version.is_none(),
+            retry: wiring.retry,
+        };
+        Ok(Box::new(MqttMessages {
+            topic: topic.to_owned(),
+            publisher: Publisher::start(settings, manner)?,
+            waiting: None,
+        }))
+    }
+}
+
+/// Messages beside the rows, until the broker has each.
+struct MqttMessages {
+    topic: String,
+    publisher: Publisher,
+    /// What was put and may not be there yet.
+    waiting: Option<String>,
+}
+
+impl Messages for MqttMessages {
+    fn send(&mut self, text: &str) -> Result<(), ConnectorError> {
+        // The same text that is sent again waits already.
+        if self.waiting.as_deref() != Some(text) {
+            let message = Outgoing {
+                topic: self.topic.clone(),
+                payload: text.as_bytes().to_vec(),
+                ends_row: true,
+            };
+            self.publisher.put(&mut vec![message])?;
+            self.waiting = Some(text.to_owned());
+        }
+        if let Err(waits) = self.publisher.drained() {
+            return Err(self.publisher.state().err().unwrap_or(waits));
+        }
+        self.waiting = None;
+        Ok(())
     }
 }
 

@@ -10,12 +10,13 @@ use athermal_serve::connector::{
     ConnectorError, Inlet, Mapping, Outflow, ParameterRemark, Seen, Source, SourceWiring, Stop,
     WiredChannel,
 };
+use athermal_serve::deployment::Login;
 use athermal_serve::register_source;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use tokio::runtime::Builder;
 
-use crate::broker::{Broker, ClientId, Identity, Login, Version, Way, keep_alive};
+use crate::broker::{Broker, ClientId, Identity, Version, Way, keep_alive};
 use crate::client::{Ended, Settings};
 use crate::look::look;
 use crate::session::Session;
@@ -58,8 +59,8 @@ pub struct MqttSource {
     #[serde(default = "receive_maximum")]
     #[schemars(range(min = 1))]
     receive_maximum: u16,
-    /// When a message is acknowledged: once its values are "written" to the journal, so that they survive the end of the program, or
-    /// "synced", so that they survive a power cut.
+    /// When a message is acknowledged: once its values are "written" to the journal, which survives the end of the program, or "synced",
+    /// which survives a power cut.
     #[serde(default)]
     ack: Ack,
     /// What becomes of messages that the broker keeps for its topics: "ignore", since they are not fresh, or "take", if they have a time.

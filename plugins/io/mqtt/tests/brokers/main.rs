@@ -11,5 +11,6 @@ mod peer;
 mod secure;
 mod server;
 mod service;
+mod sessions;
 mod sinks;
 mod soak;

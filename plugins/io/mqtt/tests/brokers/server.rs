@@ -1,39 +1,23 @@
 //! Real brokers, each on a free port of loopback and in a folder of its own, and what stands between them and a client.
 
+#[path = "../../../../../tests/workbench/peers/folder.rs"]
+mod folder;
+#[path = "../../../../../tests/workbench/peers/line.rs"]
+mod line;
+
 use std::fs;
-use std::io::{Read, Write};
-use std::net::{Shutdown, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::net::TcpListener;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
+
+pub use folder::Folder;
+pub use line::Line;
 
 /// What is asked of Mosquitto in the guide.
 pub const SAFE: &str = "autosave_on_changes true\nautosave_interval 1\nmax_queued_messages 0\n";
 /// What Debian's configuration has.
 pub const DEBIAN: &str = "";
-
-/// A folder of its own, which goes with the test.
-pub struct Folder(pub PathBuf);
-
-impl Folder {
-    pub fn new(name: &str) -> Self {
-        static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let name = format!("athermal-mqtt-{name}-{}-{number}", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
 
 pub fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0")
@@ -164,57 +148,6 @@ impl Drop for Broker {
     fn drop(&mut self) {
         self.kill();
     }
-}
-
-/// A line that can be cut, so that nothing comes through, and neither end notices.
-pub struct Line {
-    pub port: u16,
-    is_cut: Arc<AtomicBool>,
-}
-
-impl Line {
-    pub fn to(port: u16) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let is_cut = Arc::new(AtomicBool::new(false));
-        let own = listener.local_addr().unwrap().port();
-        let cut = Arc::clone(&is_cut);
-        std::thread::spawn(move || {
-            for client in listener.incoming().flatten() {
-                let Ok(server) = TcpStream::connect(("127.0.0.1", port)) else {
-                    let _ = client.shutdown(Shutdown::Both);
-                    continue;
-                };
-                pass(
-                    client.try_clone().unwrap(),
-                    server.try_clone().unwrap(),
-                    &cut,
-                );
-                pass(server, client, &cut);
-            }
-        });
-        Self { port: own, is_cut }
-    }
-
-    pub fn cut(&self, is: bool) {
-        self.is_cut.store(is, Ordering::Relaxed);
-    }
-}
-
-fn pass(mut from: TcpStream, mut to: TcpStream, cut: &Arc<AtomicBool>) {
-    let cut = Arc::clone(cut);
-    std::thread::spawn(move || {
-        let mut piece = [0; 4096];
-        loop {
-            let count = from.read(&mut piece).unwrap_or(0);
-            while cut.load(Ordering::Relaxed) {
-                std::thread::sleep(Duration::from_millis(10));
-            }
-            if count == 0 || to.write_all(&piece[..count]).is_err() {
-                let _ = to.shutdown(Shutdown::Both);
-                return;
-            }
-        }
-    });
 }
 
 pub fn read(path: &Path) -> String {

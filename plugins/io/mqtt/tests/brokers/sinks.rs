@@ -23,7 +23,7 @@ fn json(of: &Received) -> Value {
 }
 
 /// Receives until something is true of all that came.
-fn receive(peer: &mut Peer, mut is: impl FnMut(&[Received]) -> bool) -> Vec<Received> {
+pub fn receive(peer: &mut Peer, mut is: impl FnMut(&[Received]) -> bool) -> Vec<Received> {
     let (mut all, began) = (Vec::new(), Instant::now());
     while !is(&all) {
         assert!(began.elapsed() < 30 * SECOND, "so far: {all:?}");

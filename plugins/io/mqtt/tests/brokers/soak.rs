@@ -238,11 +238,12 @@ fn a_thousand_ticks_a_second_for_a_minute_with_swaps_and_outages() {
             continue;
         }
         seconds += 1;
-        if matches!(seconds % 60, 13 | 38) && began.elapsed() < end {
+        // Two come before memory is looked at: each of them takes from the allocator what those after it find there.
+        if matches!(seconds % 60, 8 | 16 | 38) && began.elapsed() < end {
             // A moment before the end it may be slow already.
             let from = now(course).saturating_sub(100_000_000);
             match seconds % 60 {
-                13 => broker.terminate(),
+                8 => broker.terminate(),
                 _ => broker.kill(),
             }
             sleep(Duration::from_millis(300));
@@ -279,7 +280,7 @@ fn a_thousand_ticks_a_second_for_a_minute_with_swaps_and_outages() {
     }
     served.sort_unstable();
     bare.sort_unstable();
-    // `retain` is full, and there were swaps and an outage; in a long run so many that the allocator has all that they take.
+    // `retain` is full, and there were swaps and outages; in a long run so many that the allocator has all that they take.
     let begin = if minutes > 3 { 1800 } else { 240 };
     let at_the_end = memory.len() - 100;
     let (first, last) = memory.split_at_mut(at_the_end);
@@ -300,7 +301,7 @@ fn a_thousand_ticks_a_second_for_a_minute_with_swaps_and_outages() {
         );
     }
     assert_eq!(lost, 0, "{events:#?}");
-    assert_eq!(outages.len(), 2 * minutes);
+    assert_eq!(outages.len(), 3 * minutes);
     assert!(swaps >= 30 + 6 * (minutes - 1) + 3, "{swaps} swaps");
     assert!(
         !events.iter().any(|of| of.contains("gap from")),
