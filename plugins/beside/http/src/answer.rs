@@ -1,16 +1,23 @@
 //! What is answered, and why something is refused.
 
+use std::borrow::Cow;
 use std::convert::Infallible;
 
 use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt as _, Full};
 use hyper::body::Bytes;
-use hyper::header::{CACHE_CONTROL, CONTENT_TYPE, HeaderValue, X_CONTENT_TYPE_OPTIONS};
+use hyper::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderValue, REFERRER_POLICY,
+    RETRY_AFTER, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+};
 use hyper::{Response, StatusCode};
 use serde_json::{Value, json};
 
 /// What is answered: whole, or as it comes.
 pub type Answer = Response<UnsyncBoxBody<Bytes, Infallible>>;
+
+/// What a page may load: its own files, and nothing of others.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// Why something is refused.
 #[derive(Debug)]
@@ -37,12 +44,16 @@ pub fn json_of(status: StatusCode, body: &Value) -> Answer {
 }
 
 /// A text of a type.
-pub fn text(status: StatusCode, content_type: &'static str, text: String) -> Answer {
-    with_body(
-        status,
-        content_type,
-        Full::<Bytes>::from(text).boxed_unsync(),
-    )
+pub fn text(
+    status: StatusCode,
+    content_type: &'static str,
+    text: impl Into<Cow<'static, str>>,
+) -> Answer {
+    let bytes = match text.into() {
+        Cow::Borrowed(text) => Bytes::from_static(text.as_bytes()),
+        Cow::Owned(text) => Bytes::from(text),
+    };
+    with_body(status, content_type, Full::new(bytes).boxed_unsync())
 }
 
 /// A body of a type.
@@ -57,11 +68,22 @@ pub fn with_body(
     headers.insert(CONTENT_TYPE, HeaderValue::from_static(content_type));
     headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     answer
 }
 
 impl From<Refused> for Answer {
     fn from(refused: Refused) -> Self {
-        json_of(refused.status, &refused.body)
+        let mut answer = json_of(refused.status, &refused.body);
+        if refused.status == StatusCode::SERVICE_UNAVAILABLE {
+            let soon = HeaderValue::from_static("1");
+            answer.headers_mut().insert(RETRY_AFTER, soon);
+        }
+        if refused.status == StatusCode::UNAUTHORIZED {
+            let how = HeaderValue::from_static("Bearer");
+            answer.headers_mut().insert(WWW_AUTHENTICATE, how);
+        }
+        answer
     }
 }

@@ -25,6 +25,18 @@ const PATIENCE: Wait = Wait::from_secs(90);
 /// How large an answer may be.
 const LARGEST: u64 = 64 << 20;
 
+/// A name as it stands in a query.
+#[must_use]
+pub fn escaped(name: &str) -> String {
+    let escaped = name.bytes().map(|byte| match byte {
+        byte if byte.is_ascii_alphanumeric() || b"._-*".contains(&byte) => {
+            char::from(byte).to_string()
+        }
+        byte => format!("%{byte:02X}"),
+    });
+    escaped.collect()
+}
+
 /// Where a service is asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Address {

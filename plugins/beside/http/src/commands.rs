@@ -10,7 +10,7 @@ use athermal_serve::facts::{ChannelsFacts, Known as _, StatusFacts};
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::client::{Address, Reply};
+use crate::client::{Address, Reply, escaped};
 use crate::shown;
 
 /// Which service is asked.
@@ -120,14 +120,8 @@ impl Command for Tap {
     fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut path = "/v1/events?ticks=1".to_owned();
         for channel in &self.channel {
-            let escaped = channel.bytes().map(|byte| match byte {
-                byte if byte.is_ascii_alphanumeric() || b"._-*".contains(&byte) => {
-                    char::from(byte).to_string()
-                }
-                byte => format!("%{byte:02X}"),
-            });
             path += "&channel=";
-            path.extend(escaped);
+            path += &escaped(channel);
         }
         let (status, mut lines) = self.service.address()?.listen(&path)?;
         let outside = |error: io::Error| Failure::Outside(error.to_string());

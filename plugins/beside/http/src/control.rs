@@ -2,23 +2,26 @@
 
 use std::fs;
 use std::io;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration as Wait;
 
 use athermal_core::engine::fnv_1a;
 use athermal_serve::companion::{Beside, Companion};
 use athermal_serve::connector::ConnectorError;
 use athermal_serve::service::Service;
+#[cfg(feature = "tls")]
+use athermal_serve::service::ServiceEvent;
 
+use crate::guard::Guard;
 use crate::hub::{ControlFacts, Hub, Looker};
 use crate::routes::Routes;
-use crate::server::{Doors, Server};
-use crate::settings::Control;
-use crate::token::Token;
+use crate::server::{Doors, Server, TcpDoor};
+use crate::settings::{Control, Https};
+use crate::token::{ORDER, READ, Token};
 
 /// Where services have their sockets, by name.
 pub(crate) const RUN: &str = "/run/athermal";
@@ -31,18 +34,29 @@ const LONGEST: usize = 100;
 /// How long the service may take to let somebody look on.
 const PATIENCE: Wait = Wait::from_secs(10);
 
+athermal_core::events! {
+    /// A certificate that nobody has signed.
+    #[derive(Debug)]
+    #[cfg_attr(not(feature = "tls"), allow(dead_code))]
+    enum OwnCertificate {
+        /// The control interface was given no certificate, and shows its own.
+        InUse {
+            /// Its SHA-256.
+            fingerprint: String,
+        } => "own_certificate", note, { fingerprint: String = fingerprint },
+            format!("[control] https: nobody has signed the certificate in use; a browser should show this fingerprint (SHA-256): {fingerprint}");
+    }
+}
+
+athermal_serve::register_events!(OwnCertificate);
+
 impl Companion for Control {
     fn start(&self, beside: &Beside) -> Result<Box<dyn Send>, ConnectorError> {
         let failed = |what: String| {
             move |error: io::Error| ConnectorError::new(format!("[control] {what}: {error}"))
         };
         let (path, unix) = self.socket(beside)?;
-        let tcp = self.http.map(|of| {
-            let listener = TcpListener::bind(of.0).map_err(failed(of.0.to_string()))?;
-            let token = Token::of(&beside.state).map_err(failed("token".to_owned()))?;
-            Ok::<_, ConnectorError>((listener, token))
-        });
-        let tcp = tcp.transpose()?;
+        let tcp = self.tcp(beside)?;
         // Whoever asks finds the socket by the state folder, wherever it is, and that by the machine file. Where nothing can be written
         // it is looked for where it may be.
         let bytes = path.as_os_str().as_encoded_bytes();
@@ -64,6 +78,61 @@ impl Companion for Control {
 }
 
 impl Control {
+    /// The doors of TCP.
+    fn tcp(&self, beside: &Beside) -> Result<Vec<TcpDoor>, ConnectorError> {
+        let failed = |what: String| {
+            move |error: io::Error| ConnectorError::new(format!("[control] {what}: {error}"))
+        };
+        let token = |file| Token::of(&beside.state, file).map_err(failed(file.to_owned()));
+        let door = |at: SocketAddr, is_tls| {
+            Ok::<_, ConnectorError>(TcpDoor {
+                listener: TcpListener::bind(at).map_err(failed(at.to_string()))?,
+                guard: Arc::new(Guard {
+                    order: token(ORDER)?,
+                    read: token(READ)?,
+                    is_tls,
+                    origins: self.origins.clone(),
+                    wrong: Mutex::default(),
+                }),
+                #[cfg(feature = "tls")]
+                tls: None,
+            })
+        };
+        let mut doors = Vec::new();
+        doors.extend(self.http.map(|of| door(of.0, false)).transpose()?);
+        if let Some(https) = &self.https {
+            let mut over_tls = door(https.at, true)?;
+            self.encrypt(https, beside, &mut over_tls)?;
+            doors.push(over_tls);
+        }
+        Ok(doors)
+    }
+
+    #[cfg(feature = "tls")]
+    fn encrypt(
+        &self,
+        https: &Https,
+        beside: &Beside,
+        door: &mut TcpDoor,
+    ) -> Result<(), ConnectorError> {
+        let (acceptor, own) = crate::tls::acceptor(https, &beside.machine, &beside.state)
+            .map_err(|error| ConnectorError::new(format!("[control] https: {error}")))?;
+        door.tls = Some(acceptor);
+        if let Some(fingerprint) = own {
+            let event = ServiceEvent::Of(Box::new(OwnCertificate::InUse { fingerprint }));
+            let handle = beside.handle.clone();
+            std::thread::spawn(move || handle.ask(PATIENCE, |service| service.report(event)));
+        }
+        Ok(())
+    }
+
+    #[cfg(not(feature = "tls"))]
+    fn encrypt(&self, _: &Https, _: &Beside, _: &mut TcpDoor) -> Result<(), ConnectorError> {
+        Err(ConnectorError::new(
+            "[control] https: this program has no TLS; take one that was built with `--features tls`",
+        ))
+    }
+
     fn socket(&self, beside: &Beside) -> Result<(PathBuf, UnixListener), ConnectorError> {
         let mut path = match &self.socket {
             Some(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()),

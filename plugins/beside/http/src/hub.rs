@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
 
 use athermal_core::compile::Plan;
 use athermal_core::event::Event as _;
@@ -10,7 +9,7 @@ use athermal_core::time::Instant;
 use athermal_run::live::TickView;
 use athermal_serve::facts::EventFacts;
 use athermal_serve::service::{Observer, ServiceEvent};
-use athermal_serve::{facts, register_facts};
+use athermal_serve::{facts, host, register_facts};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
@@ -120,8 +119,7 @@ pub struct Looker(pub Arc<Hub>);
 
 impl Observer for Looker {
     fn event(&mut self, event: &ServiceEvent) {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-        let at_s = now.map_or(0.0, |of| of.as_secs_f64());
+        let at_s = host::time_of_day().as_ns() as f64 / 1e9;
         for (is_fault, message) in event.messages(false) {
             let of = || Item::Event(json!(EventFacts::read(is_fault, &message, at_s)));
             self.0.inner().send(of);

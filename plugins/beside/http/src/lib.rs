@@ -4,7 +4,8 @@
 //! |---|---|
 //! | [`settings`] | what `[control]` says |
 //! | `server` | connections: how many, how long, how large |
-//! | `guard` | who is heard: `Host`, `Origin`, token |
+//! | `guard` | who is heard: `Host`, `Origin`, tokens |
+//! | `tls` | certificates, behind the feature of that name |
 //! | [`Route`], `routes` | what a route is, and what is answered; [`mount!`] lets another crate answer too |
 //! | `stage` | how a file becomes a graph that can take over, or all of its mistakes |
 //! | `openapi`, `stream` | the description of it all, and what happens, for listeners |
@@ -29,6 +30,8 @@ pub mod settings;
 mod shown;
 mod stage;
 mod stream;
+#[cfg(feature = "tls")]
+mod tls;
 mod token;
 
 pub use answer::Refused;

@@ -33,7 +33,7 @@ pub(crate) fn running(beside: &Beside) -> Result<(Option<String>, Option<Model>)
 /// All mistakes of the file with their places, or why it cannot take over; what runs goes on.
 pub fn reload(beside: &Beside, by: &str) -> Result<Option<(String, Vec<NodeCarry>)>, String> {
     let (runs, model) = running(beside).map_err(|error| error.to_string())?;
-    let loaded = load(of_file(&beside.machine), model.as_ref());
+    let loaded = load(of_file(&beside.machine), &beside.machine, model.as_ref());
     let loaded = loaded.map_err(|refused| {
         let words = |key: &str| refused.body[key].as_str().map(str::to_owned);
         words("text").or(words("error")).unwrap_or_default()

@@ -1,5 +1,8 @@
 //! What a route is, and how a crate mounts one.
 
+use std::borrow::Cow;
+
+use athermal_serve::companion::Beside;
 use athermal_serve::service::Service;
 use hyper::StatusCode;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -26,6 +29,61 @@ pub struct Route {
     pub gives: Gives,
     /// How it is answered.
     pub answer: Answerer,
+    /// Whether anybody may see it, since it says nothing of the machine.
+    pub is_open: bool,
+}
+
+impl Route {
+    /// What is shown at a path.
+    #[must_use]
+    pub const fn get(
+        path: &'static str,
+        help: &'static str,
+        gives: Gives,
+        answer: Answerer,
+    ) -> Self {
+        Self {
+            method: "GET",
+            path,
+            help,
+            query: &[],
+            body: None,
+            gives,
+            answer,
+            is_open: false,
+        }
+    }
+
+    /// An order at a path, with the schema of its body.
+    #[must_use]
+    pub const fn post(
+        path: &'static str,
+        help: &'static str,
+        body: SchemaOf,
+        gives: Gives,
+        answer: Answerer,
+    ) -> Self {
+        Self {
+            method: "POST",
+            body: Some(body),
+            ..Self::get(path, help, gives, answer)
+        }
+    }
+
+    /// The same with what a query may have, and what that means.
+    #[must_use]
+    pub const fn asked_with(self, query: &'static [(&'static str, &'static str)]) -> Self {
+        Self { query, ..self }
+    }
+
+    /// The same for anybody to see.
+    #[must_use]
+    pub const fn open(self) -> Self {
+        Self {
+            is_open: true,
+            ..self
+        }
+    }
 }
 
 /// A schema, among those of a description.
@@ -53,6 +111,8 @@ impl Gives {
 pub enum Answerer {
     /// On the thread that owns the service, which must not wait.
     Service(fn(&mut Service, &Asked) -> Result<Reply, Refused>),
+    /// On a thread that may wait, by what companions [share](Beside#structfield.shared).
+    Beside(fn(&Beside, &Asked) -> Result<Reply, Refused>),
     /// By this crate: with a stream of what happens.
     #[doc(hidden)]
     Events,
@@ -86,6 +146,22 @@ impl Asked {
         serde_json::from_slice(body)
             .map_err(|error| Refused::not_understood(&format!("the body: {error}")))
     }
+
+    /// The parts of the query, without their escapes.
+    ///
+    /// # Errors
+    /// When one is no `KEY=VALUE`, or its escapes are not right.
+    pub fn parts(&self) -> Result<Vec<(&str, String)>, Refused> {
+        let parts = self.query.split('&').filter(|part| !part.is_empty());
+        parts
+            .map(|part| {
+                let (key, value) = part
+                    .split_once('=')
+                    .ok_or_else(|| Refused::not_understood("a query is made of KEY=VALUE"))?;
+                Ok((key, crate::routes::decoded(value)?))
+            })
+            .collect()
+    }
 }
 
 /// What is answered.
@@ -94,14 +170,17 @@ pub struct Reply {
     /// Its type.
     pub content_type: &'static str,
     /// It.
-    pub text: String,
+    pub text: Cow<'static, str>,
 }
 
 impl Reply {
     /// A text of a type, such as `text/html; charset=utf-8`.
     #[must_use]
-    pub fn text(content_type: &'static str, text: String) -> Self {
-        Self { content_type, text }
+    pub fn text(content_type: &'static str, text: impl Into<Cow<'static, str>>) -> Self {
+        Self {
+            content_type,
+            text: text.into(),
+        }
     }
 
     /// JSON.
@@ -116,6 +195,12 @@ impl Refused {
     #[must_use]
     pub fn not_understood(words: &str) -> Self {
         Self::new(StatusCode::BAD_REQUEST, words)
+    }
+
+    /// There is nothing of the kind here.
+    #[must_use]
+    pub fn nothing_here(words: &str) -> Self {
+        Self::new(StatusCode::NOT_FOUND, words)
     }
 
     /// It cannot be done now; what runs is untouched.
@@ -152,17 +237,17 @@ pub fn routes() -> impl Iterator<Item = &'static Route> {
 /// ```
 #[macro_export]
 macro_rules! mount {
+    ($route:expr) => {
+        $crate::__private::inventory::submit! { $crate::Mounted($route) }
+    };
     ($path:literal, $help:literal, $gives:expr, $answer:path) => {
         $crate::__private::inventory::submit! {
-            $crate::Mounted($crate::Route {
-                method: "GET",
-                path: $path,
-                help: $help,
-                query: &[],
-                body: None,
-                gives: $gives,
-                answer: $crate::Answerer::Service($answer),
-            })
+            $crate::Mounted($crate::Route::get(
+                $path,
+                $help,
+                $gives,
+                $crate::Answerer::Service($answer),
+            ))
         }
     };
 }

@@ -10,7 +10,7 @@ use athermal_serve::companion::Beside;
 use athermal_serve::facts::{
     ChannelsFacts, Look, Metrics, NodesFacts, OutputsFacts, StatusFacts, TicksFacts, metrics,
 };
-use athermal_serve::service::{CommitError, NoAnswer, Service};
+use athermal_serve::service::{CommitError, NoAnswer, Service, ServiceEvent};
 use http_body_util::{BodyExt as _, Limited};
 use hyper::body::Incoming;
 use hyper::header::{ALLOW, HeaderValue};
@@ -19,11 +19,12 @@ use schemars::{JsonSchema, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::answer::{Answer, Refused, text, with_body};
-use crate::guard::Peer;
+use crate::guard::{Peer, meant_for};
 use crate::hub::Hub;
 use crate::openapi::openapi;
 use crate::reload::running;
 use crate::route::{Answerer, Asked, Gives, Reply, Route, routes};
+use crate::server::Crowd;
 use crate::stage::{Given, load, of_file};
 use crate::stream::{Life, Stream, Wanted};
 
@@ -103,6 +104,7 @@ macro_rules! routes {
             body: routes!(@body $($body)?),
             gives: $gives,
             answer: $answer,
+            is_open: false,
         }),*];
     };
 }
@@ -218,15 +220,15 @@ impl Routes {
     pub async fn answer(
         &self,
         request: Request<Incoming>,
-        peer: &Peer,
+        (peer, crowd): (&Peer, &Crowd),
         life: &Life,
     ) -> Result<Answer, Refused> {
         let (parts, body) = request.into_parts();
-        peer.check(&parts.method, &parts.headers)?;
         let path = parts.uri.path();
-        let route = routes()
-            .find(|of| of.path == path)
-            .ok_or_else(nothing_here)?;
+        let route = routes().find(|of| of.path == path);
+        let is_open = route.is_some_and(|of| of.is_open);
+        peer.check(&parts.method, &parts.headers, is_open).await?;
+        let route = route.ok_or_else(nothing_here)?;
         if parts.method.as_str() != route.method {
             let words = format!("this takes {}", route.method);
             let mut answer = Answer::from(Refused::new(StatusCode::METHOD_NOT_ALLOWED, &words));
@@ -240,24 +242,49 @@ impl Routes {
             body: Vec::new(),
             by: peer.name(),
         };
+        let meant_for = match parts.method == Method::GET {
+            true => None,
+            false => meant_for(&parts.headers)?,
+        };
+        let crowded = |what: &str| {
+            self.hub.turned_away();
+            let words = format!("there are too many {what}; try again soon");
+            Refused::new(StatusCode::SERVICE_UNAVAILABLE, &words)
+        };
+        if matches!(route.answer, Answerer::Events) {
+            let place = crowd.stream().ok_or_else(|| crowded("streams"))?;
+            let wanted = wanted(&asked)?;
+            let stream = Stream::new(self.hub.listen(), wanted, life.clone(), place);
+            let body = stream.boxed_unsync();
+            return Ok(with_body(StatusCode::OK, "text/event-stream", body));
+        }
+        let _place = crowd.request().ok_or_else(|| crowded("requests"))?;
         if parts.method != Method::GET {
             asked.body = whole(body).await?;
         }
         let reply = match route.answer {
-            Answerer::Events => {
-                let wanted = wanted(&asked.query)?;
-                let stream = Stream::new(self.hub.listen(), wanted, life.clone());
-                let body = stream.boxed_unsync();
-                return Ok(with_body(StatusCode::OK, "text/event-stream", body));
+            Answerer::Events | Answerer::Stage => self.stage(asked, meant_for).await?,
+            Answerer::Beside(answer) => {
+                let beside = self.beside.clone();
+                blocking(move || answer(&beside, &asked)).await??
             }
-            Answerer::Stage => self.stage(asked).await?,
-            Answerer::Service(answer) => self.ask(move |service| answer(service, &asked)).await??,
+            Answerer::Service(answer) => {
+                let work = move |service: &mut Service| {
+                    is_meant(service, meant_for.as_deref())?;
+                    let reply = answer(service, &asked)?;
+                    if route.method == "POST" {
+                        ordered(service, &asked.by, route.path);
+                    }
+                    Ok::<_, Refused>(reply)
+                };
+                self.ask(work).await??
+            }
         };
         Ok(text(StatusCode::OK, reply.content_type, reply.text))
     }
 
     /// Stages what is given: it is read beside the service, so that nothing waits for a file.
-    async fn stage(&self, asked: Asked) -> Result<Reply, Refused> {
+    async fn stage(&self, asked: Asked, meant_for: Option<String>) -> Result<Reply, Refused> {
         let given = match asked.body.is_empty() {
             // What the machine file has now.
             true => of_file(&self.beside.machine),
@@ -266,10 +293,14 @@ impl Routes {
         let beside = self.beside.clone();
         let runs = blocking(move || running(&beside)).await;
         let (_, running) = runs.ok().and_then(Result::ok).unwrap_or_default();
-        let loaded = blocking(move || load(given, running.as_ref())).await??;
+        let machine = self.beside.machine.clone();
+        let loaded = blocking(move || load(given, &machine, running.as_ref())).await??;
         let staged = self.ask(move |service| {
+            is_meant(service, meant_for.as_deref())?;
             let staged = service.stage(&loaded.model, &asked.by).map_err(not_now)?;
-            Ok(Reply::json(&report(staged, loaded.doubts)))
+            let reply = Reply::json(&report(staged, loaded.doubts));
+            ordered(service, &asked.by, "/v1/stage");
+            Ok(reply)
         });
         staged.await?
     }
@@ -287,6 +318,44 @@ impl Routes {
             };
             Refused::new(status, &error.to_string())
         })
+    }
+}
+
+athermal_core::events! {
+    /// What somebody ordered.
+    #[derive(Debug)]
+    enum Order {
+        /// Somebody gave an order, which was taken.
+        Taken {
+            /// Who.
+            by: String,
+            /// Which.
+            order: String,
+        } => "ordered", note, { by: String = by, order: String = order }, format!("{by}: {order}");
+    }
+}
+
+athermal_serve::register_events!(Order);
+
+/// Reports an order, for whoever asks who did what.
+fn ordered(service: &mut Service, by: &str, path: &str) {
+    let order = path.rsplit('/').next().unwrap_or(path).to_owned();
+    let by = by.to_owned();
+    service.report(ServiceEvent::Of(Box::new(Order::Taken { by, order })));
+}
+
+/// Refuses an order that is meant for another graph than the one that runs.
+fn is_meant(service: &Service, revision: Option<&str>) -> Result<(), Refused> {
+    let Some(meant) = revision else {
+        return Ok(());
+    };
+    let runs = service.running().map(|of| of.revision);
+    match runs == Some(meant) {
+        true => Ok(()),
+        false => Err(Refused::not_now(&format!(
+            "the order is meant for revision {meant}, and {} runs; look again",
+            runs.unwrap_or("one that is not known")
+        ))),
     }
 }
 
@@ -319,14 +388,14 @@ async fn blocking<T: Send + 'static>(
 }
 
 /// `ticks=1`, `channel=NAME` as often as there are channels.
-fn wanted(query: &str) -> Result<Wanted, Refused> {
+fn wanted(asked: &Asked) -> Result<Wanted, Refused> {
     let mut wanted = Wanted::default();
-    for part in query.split('&').filter(|part| !part.is_empty()) {
-        match part.split_once('=') {
-            Some(("ticks", "1")) => wanted.ticks = true,
-            Some(("channel", name)) if wanted.channels.len() < 256 => {
+    for part in asked.parts()? {
+        match part {
+            ("ticks", one) if one == "1" => wanted.ticks = true,
+            ("channel", name) if wanted.channels.len() < 256 => {
                 wanted.ticks = true;
-                wanted.channels.push(decoded(name)?);
+                wanted.channels.push(name);
             }
             _ => {
                 return Err(Refused::not_understood(
@@ -339,7 +408,7 @@ fn wanted(query: &str) -> Result<Wanted, Refused> {
 }
 
 /// A part of a query without its escapes.
-fn decoded(text: &str) -> Result<String, Refused> {
+pub fn decoded(text: &str) -> Result<String, Refused> {
     let (mut bytes, mut rest) = (Vec::new(), text.as_bytes());
     while let Some((byte, after)) = rest.split_first() {
         rest = after;

@@ -20,13 +20,15 @@ use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt as _};
 use tokio::sync::watch;
 
 use crate::answer::Answer;
-use crate::guard::Peer;
+use crate::guard::{Guard, Peer};
 use crate::routes::Routes;
 use crate::stream::Life;
-use crate::token::Token;
 
 /// Connections of each door; one more is answered that there are too many.
-const CONNECTIONS: usize = 16;
+const CONNECTIONS: usize = 256;
+/// Streams of each door, and requests that are under way besides.
+const STREAMS: usize = 64;
+const REQUESTS: usize = 64;
 /// How long headers may take, and how long a connection may wait for its next request.
 const HEADERS: Duration = Duration::from_secs(5);
 /// How long a connection may last that is no stream.
@@ -39,9 +41,37 @@ const ENDS: Duration = Duration::from_millis(500);
 /// Where a server listens.
 pub struct Doors {
     pub unix: UnixListener,
-    pub tcp: Option<(TcpListener, Token)>,
+    pub tcp: Vec<TcpDoor>,
     /// The path of the Unix socket, which is removed at the end.
     pub path: PathBuf,
+}
+
+/// A door of TCP.
+pub struct TcpDoor {
+    pub listener: TcpListener,
+    pub guard: Arc<Guard>,
+    #[cfg(feature = "tls")]
+    pub tls: Option<tokio_rustls::TlsAcceptor>,
+}
+
+/// How many are at a door.
+#[derive(Clone, Default)]
+pub struct Crowd {
+    connections: Arc<AtomicUsize>,
+    streams: Arc<AtomicUsize>,
+    requests: Arc<AtomicUsize>,
+}
+
+impl Crowd {
+    /// A place for a stream, if there is one.
+    pub fn stream(&self) -> Option<Place> {
+        Place::of(&self.streams, STREAMS)
+    }
+
+    /// A place for a request that ends, if there is one.
+    pub fn request(&self) -> Option<Place> {
+        Place::of(&self.requests, REQUESTS)
+    }
 }
 
 /// The thread that serves, until this is dropped.
@@ -56,8 +86,8 @@ impl Server {
     pub fn start(doors: Doors, routes: Routes) -> io::Result<Self> {
         let Doors { unix, tcp, path } = doors;
         unix.set_nonblocking(true)?;
-        if let Some((tcp, _)) = &tcp {
-            tcp.set_nonblocking(true)?;
+        for door in &tcp {
+            door.listener.set_nonblocking(true)?;
         }
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
@@ -90,32 +120,28 @@ impl Drop for Server {
 
 async fn serve(
     unix: UnixListener,
-    tcp: Option<(TcpListener, Token)>,
+    tcp: Vec<TcpDoor>,
     routes: Routes,
     mut ended: watch::Receiver<bool>,
 ) {
     let Ok(unix) = tokio::net::UnixListener::from_std(unix) else {
         return;
     };
-    let tcp = tcp.and_then(|(tcp, token)| {
-        let tcp = tokio::net::TcpListener::from_std(tcp).ok()?;
-        Some((tcp, token))
-    });
     let routes = Arc::new(routes);
-    let doors = [Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0))];
+    let crowd = Crowd::default();
+    let mut crowds = vec![crowd.clone()];
+    for door in tcp {
+        let crowd = Crowd::default();
+        crowds.push(crowd.clone());
+        tokio::spawn(of_tcp(door, crowd, Arc::clone(&routes), ended.clone()));
+    }
     loop {
         tokio::select! {
             _ = ended.changed() => break,
             accepted = unix.accept() => match accepted {
                 Ok((stream, _)) => {
                     let uid = stream.peer_cred().ok().map(|of| of.uid());
-                    open(stream, Peer::Socket { uid }, &doors[0], &routes, &ended);
-                }
-                Err(_) => pause().await,
-            },
-            accepted = accept(tcp.as_ref()) => match accepted {
-                Ok((stream, token)) => {
-                    open(stream, Peer::Loopback { token }, &doors[1], &routes, &ended);
+                    open(async { Some(stream) }, Peer::Socket { uid }, &crowd, &routes, &ended);
                 }
                 Err(_) => pause().await,
             },
@@ -123,8 +149,41 @@ async fn serve(
     }
     // Who was answered that the service ends is to read it.
     let began = Clock::now();
-    while doors.iter().any(|door| door.load(Ordering::Relaxed) > 0) && began.elapsed() < ENDS {
+    let busy = |of: &Crowd| of.connections.load(Ordering::Relaxed) > 0;
+    while crowds.iter().any(busy) && began.elapsed() < ENDS {
         tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+/// Accepts what comes to a door of TCP.
+async fn of_tcp(
+    door: TcpDoor,
+    crowd: Crowd,
+    routes: Arc<Routes>,
+    mut ended: watch::Receiver<bool>,
+) {
+    let Ok(listener) = tokio::net::TcpListener::from_std(door.listener) else {
+        return;
+    };
+    loop {
+        tokio::select! {
+            _ = ended.changed() => return,
+            accepted = listener.accept() => match accepted {
+                Ok((stream, from)) => {
+                    let (guard, address) = (Arc::clone(&door.guard), from.ip());
+                    let peer = Peer::Tcp { guard, address };
+                    #[cfg(feature = "tls")]
+                    if let Some(tls) = &door.tls {
+                        let greeted = tokio::time::timeout(HEADERS, tls.accept(stream));
+                        let greeted = async { greeted.await.ok()?.ok() };
+                        open(greeted, peer, &crowd, &routes, &ended);
+                        continue;
+                    }
+                    open(async { Some(stream) }, peer, &crowd, &routes, &ended);
+                }
+                Err(_) => pause().await,
+            },
+        }
     }
 }
 
@@ -133,42 +192,34 @@ async fn pause() {
     tokio::time::sleep(Duration::from_millis(20)).await;
 }
 
-async fn accept(
-    tcp: Option<&(tokio::net::TcpListener, Token)>,
-) -> io::Result<(tokio::net::TcpStream, Token)> {
-    match tcp {
-        Some((tcp, token)) => Ok((tcp.accept().await?.0, token.clone())),
-        None => std::future::pending().await,
-    }
-}
-
 /// Serves a connection beside the others, where there is room for it.
 fn open<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
-    mut stream: S,
+    stream: impl Future<Output = Option<S>> + Send + 'static,
     peer: Peer,
-    door: &Arc<AtomicUsize>,
+    crowd: &Crowd,
     routes: &Arc<Routes>,
     ended: &watch::Receiver<bool>,
 ) {
-    if door.load(Ordering::Relaxed) >= CONNECTIONS {
+    let Some(place) = Place::of(&crowd.connections, CONNECTIONS) else {
         routes.hub().turned_away();
         let refusal = async move {
-            let text = "HTTP/1.1 503 Service Unavailable\r\ncontent-length: 0\r\nconnection: close\r\n\r\n";
-            let _ = stream.write_all(text.as_bytes()).await;
+            let text = "HTTP/1.1 503 Service Unavailable\r\ncontent-length: 0\r\nretry-after: 1\r\nconnection: close\r\n\r\n";
+            if let Some(mut stream) = stream.await {
+                let _ = stream.write_all(text.as_bytes()).await;
+            }
         };
         // It fits the buffer of any socket; whoever does not take it is not waited for.
         tokio::spawn(async move {
             let _ = tokio::time::timeout(Duration::from_millis(100), refusal).await;
         });
         return;
-    }
-    door.fetch_add(1, Ordering::Relaxed);
-    let place = Place(Arc::clone(door));
-    let (routes, mut ended) = (Arc::clone(routes), ended.clone());
+    };
+    let (routes, mut ended, crowd) = (Arc::clone(routes), ended.clone(), crowd.clone());
     tokio::spawn(async move {
         let _place = place;
+        let Some(stream) = stream.await else { return };
         let life = Life::default();
-        let connection = connection(stream, peer, routes, life.clone());
+        let connection = connection(stream, (peer, crowd), routes, life.clone());
         tokio::select! {
             () = connection => {}
             () = outlived(&life) => {}
@@ -200,14 +251,14 @@ async fn outlived(life: &Life) {
 
 fn connection<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
     stream: S,
-    peer: Peer,
+    from: (Peer, Crowd),
     routes: Arc<Routes>,
     life: Life,
 ) -> impl Future<Output = ()> {
     let service = service_fn(move |request: Request<Incoming>| {
-        let (peer, routes, life) = (peer.clone(), Arc::clone(&routes), life.clone());
+        let ((peer, crowd), routes, life) = (from.clone(), Arc::clone(&routes), life.clone());
         async move {
-            let answered = routes.answer(request, &peer, &life).await;
+            let answered = routes.answer(request, (&peer, &crowd), &life).await;
             Ok::<Answer, Infallible>(answered.unwrap_or_else(Answer::from))
         }
     });
@@ -222,8 +273,20 @@ fn connection<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
     }
 }
 
-/// A connection's place at its door.
-struct Place(Arc<AtomicUsize>);
+/// A place at a door.
+#[derive(Debug)]
+pub struct Place(Arc<AtomicUsize>);
+
+impl Place {
+    fn of(taken: &Arc<AtomicUsize>, most: usize) -> Option<Self> {
+        // One thread serves them all.
+        let is_free = taken.load(Ordering::Relaxed) < most;
+        is_free.then(|| {
+            taken.fetch_add(1, Ordering::Relaxed);
+            Self(Arc::clone(taken))
+        })
+    }
+}
 
 impl Drop for Place {
     fn drop(&mut self) {

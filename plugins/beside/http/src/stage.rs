@@ -21,6 +21,8 @@ pub struct Given {
     pub path: Option<PathBuf>,
     /// The text of a model.
     pub model: Option<String>,
+    /// The text of a graph, read as if it stood beside the machine file.
+    pub graph: Option<String>,
 }
 
 /// A graph with all its fits, and what is doubtful in it.
@@ -30,12 +32,13 @@ pub struct Loaded {
 }
 
 /// Reads what is given. What is not fitted in it and means the same in what runs takes that fit.
-pub fn load(given: Given, running: Option<&Model>) -> Result<Loaded, Refused> {
+pub fn load(given: Given, machine: &Path, running: Option<&Model>) -> Result<Loaded, Refused> {
     let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
     let (name, read) = match given {
         Given {
             path: Some(path),
             model: None,
+            graph: None,
         } if path.is_absolute() => {
             let read = Model::load_from(&path, Wanted::default(), &mut sources, &mut doubts);
             (path, read)
@@ -43,15 +46,25 @@ pub fn load(given: Given, running: Option<&Model>) -> Result<Loaded, Refused> {
         Given {
             path: None,
             model: Some(text),
+            graph: None,
         } => {
             let name = PathBuf::from("model");
             let read = Model::from_text(&name, text);
             (name, read)
         }
+        Given {
+            path: None,
+            model: None,
+            graph: Some(text),
+        } => {
+            let name = machine.with_file_name("graph.toml");
+            let read = Model::load_text(&name, &text, &mut sources, &mut doubts);
+            (name, read)
+        }
         _ => {
             return Err(Refused::new(
                 StatusCode::BAD_REQUEST,
-                "give either `path`, from the root on, or `model`",
+                "give `path`, from the root on, or `model`, or `graph`",
             ));
         }
     };
@@ -80,6 +93,7 @@ pub fn of_file(path: &Path) -> Given {
     Given {
         path: Some(path.to_owned()),
         model: None,
+        graph: None,
     }
 }
 

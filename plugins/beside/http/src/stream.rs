@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 use tokio::time::{Interval, MissedTickBehavior};
 
 use crate::hub::{Item, Listener, Tick};
+use crate::server::Place;
 
 /// How often a stream without news says that it lives.
 const ALIVE: Duration = Duration::from_secs(5);
@@ -69,11 +70,12 @@ pub struct Stream {
     life: Life,
     alive: Interval,
     dropped: u64,
+    _place: Place,
 }
 
 impl Stream {
     /// What a listener is given, of what it wants.
-    pub fn new(listener: Listener, wanted: Wanted, life: Life) -> Self {
+    pub fn new(listener: Listener, wanted: Wanted, life: Life, place: Place) -> Self {
         life.is_read();
         let mut alive = tokio::time::interval(ALIVE);
         alive.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -83,6 +85,7 @@ impl Stream {
             life,
             alive,
             dropped: 0,
+            _place: place,
         }
     }
 

@@ -7,20 +7,22 @@ use std::path::Path;
 
 use athermal_serve::folder::may_pass;
 
-/// The name of the file in the state folder.
-pub const FILE: &str = "token";
+/// The name of the file in the state folder: what orders need.
+pub const ORDER: &str = "token";
+/// That of what it takes to look, where that takes something.
+pub const READ: &str = "token-read";
 
 /// A secret that is compared in a time that does not depend on where it differs.
 #[derive(Clone)]
 pub struct Token(String);
 
 impl Token {
-    /// The token of a state folder; it is made where there is none.
+    /// A token of a state folder, by the name of its file; it is made where there is none.
     ///
     /// # Errors
     /// When others can read it, or it cannot be read or made.
-    pub fn of(state: &Path) -> io::Result<Self> {
-        let path = state.join(FILE);
+    pub fn of(state: &Path, file: &str) -> io::Result<Self> {
+        let path = state.join(file);
         match File::open(&path) {
             Ok(mut file) => {
                 let mode = file.metadata()?.permissions().mode();
@@ -49,10 +51,7 @@ impl Token {
         let mut bytes = [0; 32];
         File::open("/dev/urandom")?.read_exact(&mut bytes)?;
         let text: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        let mut options = OpenOptions::new();
-        let file = options.write(true).create_new(true).mode(0o600).open(path);
-        let written = file.and_then(|mut file| writeln!(file, "{text}"));
-        match written {
+        match write_private(path, &text) {
             Err(error) if !may_pass(&error) => return Err(error),
             Err(_) => drop(std::fs::remove_file(path)),
             Ok(()) => {}
@@ -67,4 +66,11 @@ impl Token {
         let difference = pairs.fold(0, |all, (a, b)| all | (a ^ b));
         difference == 0 && own.len() == given.len()
     }
+}
+
+/// Writes a file that its owner alone reads, and that is not there yet.
+pub fn write_private(path: &Path, text: &str) -> io::Result<()> {
+    let mut options = OpenOptions::new();
+    let file = options.write(true).create_new(true).mode(0o600).open(path);
+    file.and_then(|mut file| writeln!(file, "{}", text.trim_end()))
 }

@@ -19,8 +19,8 @@ use crate::shelf;
 
 /// Fit the graph of a running service anew on its own journal, and propose the fit to it
 ///
-/// The fit is proposed if no sensor is broken in the data, if there are enough of them, and if it is no worse on their last fifth, which
-/// it is judged on without having seen it. Then it runs in the shadow of what runs. With `--commit` it takes over if it is no worse
+/// The fit is proposed if no sensor is broken in the data, if there are enough of them, and if it is no worse on their last fifth. It
+/// is judged on that without having seen it. Then it runs in the shadow of what runs. With `--commit` it takes over if it is no worse
 /// there either; otherwise `athermal commit` lets it.
 #[derive(Debug, Args)]
 #[command(

@@ -1,10 +1,10 @@
 //! How long a row takes through a service, from its source to its sink, in quiet and under attack.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_core::time::Instant;
@@ -23,9 +23,14 @@ use crate::client::Address;
 static SENT: Mutex<Vec<Clock>> = Mutex::new(Vec::new());
 static TOOK: Mutex<Vec<Wait>> = Mutex::new(Vec::new());
 
-/// A row each two milliseconds.
+/// The two tests here measure in turns.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// A row each so many milliseconds.
 #[derive(Debug, Deserialize, JsonSchema)]
-struct Pulse {}
+struct Pulse {
+    every_ms: u64,
+}
 
 register_source!(Pulse, "pulse");
 
@@ -35,18 +40,18 @@ impl Source for Pulse {
     }
 
     fn open(&self, wiring: SourceWiring) -> Result<Box<dyn Inlet>, ConnectorError> {
-        Ok(Box::new(Pulsing(wiring.channels.len())))
+        Ok(Box::new(Pulsing(wiring.channels.len(), self.every_ms)))
     }
 }
 
-struct Pulsing(usize);
+struct Pulsing(usize, u64);
 
 impl Inlet for Pulsing {
     fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError> {
         out.connected();
         let mut nth = 0_i64;
         while !stop.is_asked() {
-            std::thread::sleep(Wait::from_millis(2));
+            std::thread::sleep(Wait::from_millis(self.1));
             let values: Vec<_> = (0..self.0)
                 .map(|of| 20.0 + (nth as usize * 7 + of) as f64 % 3.0)
                 .collect();
@@ -89,6 +94,7 @@ wait = "0 s"
 settle = "0 s"
 [sources.log]
 type = "pulse"
+every_ms = EVERY
 [sinks.out]
 type = "watch"
 "#;
@@ -134,10 +140,103 @@ fn attack(path: &Path, over: &AtomicBool) -> u64 {
     count
 }
 
+/// A service with a row each so many milliseconds.
+fn bench(every_ms: u64) -> Bench {
+    SENT.lock().unwrap().clear();
+    Bench::start_with(
+        super::GRAPH,
+        &MACHINE.replace("EVERY", &every_ms.to_string()),
+    )
+}
+
+/// Seconds of processor that this process has taken, and bytes of memory that it has.
+fn taken() -> (f64, f64) {
+    let read = |of: &str| std::fs::read_to_string(of).unwrap();
+    let stat = read("/proc/self/stat");
+    let fields: Vec<f64> = stat
+        .rsplit(')')
+        .next()
+        .unwrap()
+        .split_whitespace()
+        .map(|of| of.parse().unwrap_or(0.0))
+        .collect();
+    let pages: f64 = read("/proc/self/statm")
+        .split(' ')
+        .nth(1)
+        .unwrap()
+        .parse()
+        .unwrap();
+    ((fields[11] + fields[12]) / 100.0, pages * 4096.0)
+}
+
+#[test]
+fn rows_are_no_later_with_fifty_pages_open_and_one_that_reads_nothing() {
+    let _turn = TURN.lock().unwrap_or_else(|of| of.into_inner());
+    let bench = bench(10);
+    let Address::Socket(path) = bench.address() else {
+        panic!("it is a socket")
+    };
+    let (mut alone, mut looked_at) = (Vec::new(), Vec::new());
+    let (mut costs, mut bytes) = (Vec::new(), Vec::new());
+    for _ in 0..2 {
+        let before = taken();
+        alone.extend(measured(6));
+        let between = taken();
+        let over = AtomicBool::new(false);
+        let open = || {
+            let mut stream = UnixStream::connect(&path).unwrap();
+            let ask = b"GET /v1/events?ticks=1&channel=* HTTP/1.1\r\nHost: x\r\n\r\n";
+            stream.write_all(ask).unwrap();
+            stream.set_nonblocking(true).unwrap();
+            stream
+        };
+        let deaf = open();
+        let read = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let mut pages: Vec<_> = (0..50).map(|_| open()).collect();
+                let mut part = [0; 65_536];
+                while !over.load(Ordering::Relaxed) {
+                    for page in &mut pages {
+                        read.fetch_add(page.read(&mut part).unwrap_or(0), Ordering::Relaxed);
+                    }
+                    std::thread::sleep(Wait::from_millis(20));
+                }
+            });
+            looked_at.extend(measured(6));
+            let after = taken();
+            costs.push([(between.0 - before.0) / 6.0, (after.0 - between.0) / 6.0]);
+            bytes.push([between.1, after.1]);
+            over.store(true, Ordering::Relaxed);
+        });
+        drop(deaf);
+        assert!(
+            read.load(Ordering::Relaxed) > 50 * 100_000,
+            "{read:?} bytes were read"
+        );
+    }
+    let (alone, looked_at) = (figures(alone), figures(looked_at));
+    println!("median and 99.9 %: {alone:?} alone, {looked_at:?} with 51 streams at 100 Hz");
+    println!(
+        "cores without and with them, readers too: {costs:.2?}; MB: {:.1?}",
+        bytes
+            .iter()
+            .map(|of| of.map(|of| of / 1e6))
+            .collect::<Vec<_>>()
+    );
+    let limit = 3 * alone.1 + Wait::from_millis(10);
+    assert!(looked_at.1 < limit, "{looked_at:?} against {alone:?}");
+    assert!(
+        bytes.iter().all(|[without, with]| with - without < 64e6),
+        "{bytes:?}"
+    );
+}
+
 #[test]
 fn rows_are_no_later_under_attack() {
     let is_long = std::env::var_os("ATHERMAL_LONG").is_some();
-    let bench = Bench::start_with(super::GRAPH, MACHINE);
+    let _turn = TURN.lock().unwrap_or_else(|of| of.into_inner());
+    let bench = bench(2);
     let Address::Socket(path) = bench.address() else {
         panic!("it is a socket")
     };

@@ -65,7 +65,6 @@ fn promtool_finds_nothing_wrong_with_the_metrics() {
         "athermal_undecided_samples",
         "athermal_warnings_total",
         "athermal_no_output",
-        "athermal_fed_back_channels",
         "athermal_sink_spooled_rows",
         "athermal_sink_superseded_commands_total",
         "athermal_journal_records_total",
@@ -223,7 +222,10 @@ fn a_prometheus_scrapes_a_service() {
         return;
     }
     let (port, own) = (free_port(), free_port());
-    let bench = Bench::start(GRAPH, &format!("[control]\nhttp = \"127.0.0.1:{port}\"\n"));
+    let bench = Bench::start(
+        &ranged(),
+        &format!("[control]\nhttp = \"127.0.0.1:{port}\"\n"),
+    );
     let config = format!(
         "global: {{ scrape_interval: 1s }}\nscrape_configs:\n- job_name: athermal\n  static_configs:\n  - targets: ['127.0.0.1:{port}']\n"
     );
@@ -240,22 +242,43 @@ fn a_prometheus_scrapes_a_service() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let began = Clock::now();
-    let query = format!(
-        "GET /api/v1/query?query=athermal_ticks_total HTTP/1.1\r\nHost: 127.0.0.1:{own}\r\nConnection: close\r\n\r\n"
-    );
-    let found = loop {
-        std::thread::sleep(Wait::from_millis(200));
-        let answer = std::net::TcpStream::connect(("127.0.0.1", own))
-            .map(|stream| exchange(stream, query.as_bytes()))
+    // What the dashboard asks, as Grafana does.
+    let dashboard = include_str!("../../../../../docs/grafana/prometheus.json");
+    let dashboard: serde_json::Value = serde_json::from_str(dashboard).unwrap();
+    let panels = dashboard["panels"].as_array().unwrap().iter();
+    let panels = panels.map(|of| of["targets"][0]["expr"].as_str().unwrap());
+    let mut queries: Vec<String> = panels
+        .map(|of| {
+            of.replace("$machine", "line")
+                .replace("$__rate_interval", "10s")
+        })
+        .collect();
+    assert_eq!(queries.len(), 8);
+    queries.push("count by (machine) (athermal_ticks_total)".to_owned());
+    let (began, mut answer) = (Clock::now(), String::new());
+    while let Some(query) = queries.last() {
+        let escaped = |of: u8| match of {
+            b if b.is_ascii_alphanumeric() || b"_-.".contains(&b) => char::from(b).to_string(),
+            b => format!("%{b:02x}"),
+        };
+        let escaped: String = query.bytes().map(escaped).collect();
+        let get = format!(
+            "GET /api/v1/query?query={escaped} HTTP/1.1\r\nHost: 127.0.0.1:{own}\r\nConnection: close\r\n\r\n"
+        );
+        answer = std::net::TcpStream::connect(("127.0.0.1", own))
+            .map(|stream| exchange(stream, get.as_bytes()))
             .unwrap_or_default();
-        if answer.contains("\"machine\":\"line\"") || began.elapsed() > Wait::from_secs(40) {
-            break answer;
+        if answer.contains("\"value\":[") {
+            queries.pop();
+        } else if began.elapsed() > Wait::from_secs(40) {
+            break;
+        } else {
+            std::thread::sleep(Wait::from_millis(200));
         }
-    };
+    }
     prometheus.kill().unwrap();
     prometheus.wait().unwrap();
-    assert!(found.contains("\"machine\":\"line\""), "{found}");
+    assert!(queries.is_empty(), "{:?}: {answer}", queries.last());
     // The same by hand.
     let mut stream = tcp(port);
     stream

@@ -2,6 +2,7 @@
 
 mod attacks;
 mod declared;
+mod doors;
 mod latency;
 mod metrics;
 mod openapi;
