@@ -147,6 +147,16 @@ impl Agreement {
         }
         sum / self.usual
     }
+
+    /// How much a signal would have in it of which one column alone were off, by the square of how far.
+    #[must_use]
+    pub fn share_of_one(&self, column: usize, square: f64, look: &Look) -> f64 {
+        let (own, scale) = (
+            look.matrix[column * self.means.len() + column],
+            self.scales[column],
+        );
+        own * (square / (scale * scale)) / self.usual
+    }
 }
 
 /// Takes a column out of a symmetric form: it is then whatever makes the form smallest.

@@ -75,8 +75,8 @@ pub use forward_regression::{ErrorReduction, ForwardModel, ForwardRegression};
 pub use gram::Gram;
 pub use huber::{Huber, HuberFit};
 pub use kalman::{
-    Followed, Forecast, Innovation, Kalman, Movement, Passage, Series, Structural, follow,
-    most_likely,
+    Followed, Forecast, Innovation, Kalman, Movement, Passage, Resetting, Series, Structural,
+    follow, most_likely,
 };
 pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
@@ -92,7 +92,7 @@ pub use prediction_error::{
 pub use prediction_variance::PredictionVariance;
 pub use prior::{CoefficientPrior, Known, PriorFit, Pull};
 pub use quiet_folds::quiet_folds;
-pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
+pub use rls::{Learned, Rls, RlsFit, information_of};
 pub use robust::{median, robust_deviation};
 pub use scaler::{Standardization, Standardizer};
 pub use selection::{

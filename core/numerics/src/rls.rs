@@ -1,156 +1,139 @@
-//! Recursive least squares with forgetting. Decides one step and what keeps it sound over millions of them; does not decide
-//! how regressors are scaled (they should be standardised), nor which rows are learned from.
+//! Recursive least squares that goes back to its fit. Decides one step; does not decide how regressors are scaled (they should be
+//! standardised), nor which rows are learned from.
 
 use crate::checks::{check_length, check_parameter};
 use crate::dot::dot;
 use crate::scratch::Scratch;
 use crate::{Gram, NumericsError};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-/// How fast the past is forgotten.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Forgetting {
-    /// A row counts `factor` times as much as the one after it; 1 forgets nothing.
-    Constant {
-        /// Above 0, at most 1.
-        factor: f64,
-    },
-    /// As much as each row surprises, so that what is known stays constant (Fortescue, Kershenbaum and Ydstie 1981):
-    /// `λ = 1 − e² (1 − xᵀK) / (memory · noise²)`, the gain `K` taken with `λ = 1`, and never below `lowest`.
-    Variable {
-        /// Over how many rows of ordinary noise the past counts, above 1.
-        memory: f64,
-        /// The standard deviation of the ordinary noise, in the unit of the target, above 0.
-        noise: f64,
-        /// The smallest factor, above 0, at most 1.
-        lowest: f64,
-    },
-}
-
-/// How a recursion runs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RlsOptions {
-    /// How fast the past is forgotten.
-    pub forgetting: Forgetting,
-    /// The largest trace of the covariance, in units of the noise variance: nothing is forgotten by a row that would exceed
-    /// it, or long quiet stretches would make the next disturbance arbitrarily costly ("wind-up"). Infinite for the textbook.
-    pub most_trace: f64,
-}
-
-/// Recursive least squares (Ljung 1999, eq. 11.12): the minimiser of `Σ λ^(n−i) (y_i − x_iᵀθ)²` with a start that is
-/// forgotten likewise, row by row.
-///
-/// An intercept is a regressor that is 1 throughout. The covariance stays symmetric to the last bit, which keeps rounding
-/// errors from growing (Verhaegen 1989) as long as it is not singular but for rounding: a row in whose direction it has become
-/// negative tells nothing any more, and is passed over.
+/// What a fit knows: where a recursion begins, and what it goes back to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Saved")]
-pub struct Rls {
-    options: RlsOptions,
-    coefficients: Vec<f64>,
-    /// Row by row, in units of the noise variance.
-    covariance: Vec<f64>,
-    /// Covariance times row.
-    #[serde(skip)]
-    projected: Scratch,
-    seen: u64,
-}
-
-/// A recursion as it is read, before it is known whether its parts fit together.
-#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Saved {
-    options: RlsOptions,
-    coefficients: Vec<f64>,
-    covariance: Vec<f64>,
-    seen: u64,
+pub struct RlsFit {
+    /// In how many seconds what was learned fades to `1/e`; infinite where nothing does.
+    #[serde(with = "memory")]
+    pub memory_s: f64,
+    /// The share `β` of the fit that what has faded goes back to, 0 to 1.
+    pub share: f64,
+    /// `θ₀`.
+    pub coefficients: Vec<f64>,
+    /// `R₀`, the inverse of their covariance in units of the noise variance: the lower triangle, row by row.
+    pub information: Vec<f64>,
+    /// How many rows that counts as.
+    pub rows: f64,
+    /// The variance of the noise.
+    pub variance: f64,
 }
 
-impl TryFrom<Saved> for Rls {
+/// What was learned since: all that a recursion goes on from, beside its fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Learned {
+    /// `R`, as of the fit.
+    pub information: Vec<f64>,
+    /// `θ₀`, to which it goes back: the fit's, moved with what has leapt.
+    pub start: Vec<f64>,
+    /// `c = b − Rθ₀`, by which the rows draw away from there.
+    pub pull: Vec<f64>,
+    /// How many rows it counts as.
+    pub rows: f64,
+    /// The squares of their errors.
+    pub squares: f64,
+}
+
+/// A memory as JSON has it, which knows no infinity.
+mod memory {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(of: &f64, to: S) -> Result<S::Ok, S::Error> {
+        match of.is_finite() {
+            true => to.serialize_some(of),
+            false => to.serialize_none(),
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+    }
+}
+
+/// Recursive least squares whose past fades to a share of the fit (exponential resetting and forgetting: Salgado, Goodwin and
+/// Middleton 1988; Kulhavý and Zarrop 1993): with `λ = exp(−Δt / memory)`
+///
+/// `R ← λR + (1 − λ)βR₀ + xxᵀ`, `b ← λb + (1 − λ)βR₀θ₀ + xy`, `θ = R⁻¹b`,
+///
+/// so that `P = R⁻¹ ≤ P₀/β` in every direction, and `θ` is `θ₀` where nothing was learned. `c = b − Rθ₀` is kept in the place of
+/// `b`: `c ← λc + x(y − xᵀθ₀)`, `θ = θ₀ + R⁻¹c`. An intercept is a regressor that is 1 throughout.
+///
+/// Each row costs a Cholesky factor and its inverse: there is no rank-one form, since all of `R` goes back to `R₀`. What is serialised is
+/// the fit; what was learned is [`Rls::learned`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "RlsFit", into = "RlsFit")]
+pub struct Rls {
+    fit: RlsFit,
+    learned: Learned,
+    coefficients: Vec<f64>,
+    /// `W = L⁻¹` of `R = LLᵀ`, so that `P = WᵀW`: the lower triangle, row by row; and the same of the fit.
+    root: Vec<f64>,
+    root_of_fit: Vec<f64>,
+    /// Room for a row.
+    row: Scratch,
+}
+
+impl From<Rls> for RlsFit {
+    fn from(rls: Rls) -> Self {
+        rls.fit
+    }
+}
+
+impl TryFrom<RlsFit> for Rls {
     type Error = NumericsError;
 
-    fn try_from(saved: Saved) -> Result<Self, NumericsError> {
-        let Saved {
-            options,
-            coefficients,
-            covariance,
-            seen,
-        } = saved;
-        options.check()?;
-        let width = coefficients.len();
-        check_length("coefficients", width.max(1), width)?;
-        check_length("covariance", width * width, covariance.len())?;
-        // Its diagonal may be what rounding left of 0, where a row determined all of it.
-        if !finite_and_symmetric(&coefficients, &covariance) {
+    fn try_from(fit: RlsFit) -> Result<Self, NumericsError> {
+        let order = fit.coefficients.len();
+        let fine = |value: f64| value > 0.0 && value.is_finite();
+        check_parameter("memory_s", fit.memory_s, fit.memory_s > 0.0, "above 0")?;
+        let share = (0.0..=1.0).contains(&fit.share);
+        check_parameter("share", fit.share, share, "from 0 to 1")?;
+        check_parameter("rows", fit.rows, fine(fit.rows), "above 0")?;
+        check_parameter("variance", fit.variance, fine(fit.variance), "above 0")?;
+        check_length("coefficients", order.max(1), order)?;
+        let cells = order * (order + 1) / 2;
+        check_length("information", cells, fit.information.len())?;
+        let mut rls = Self {
+            learned: Learned::of(&fit),
+            coefficients: fit.coefficients.clone(),
+            root: vec![0.0; cells],
+            root_of_fit: Vec::new(),
+            row: Scratch(vec![0.0; order]),
+            fit,
+        };
+        if !(rls.solve() && rls.fit.coefficients.iter().all(|value| value.is_finite())) {
             return Err(NumericsError::NotFinite);
         }
-        Ok(Self {
-            options,
-            projected: Scratch(vec![0.0; width]),
-            coefficients,
-            covariance,
-            seen,
-        })
+        rls.root_of_fit.clone_from(&rls.root);
+        Ok(rls)
     }
 }
 
-/// Of a covariance with a row and a column per coefficient.
-fn finite_and_symmetric(coefficients: &[f64], covariance: &[f64]) -> bool {
-    let width = coefficients.len();
-    let symmetric = |i: usize, j: usize| covariance[i * width + j] == covariance[j * width + i];
-    let mut numbers = coefficients.iter().chain(covariance);
-    numbers.all(|value| value.is_finite()) && (0..width).all(|i| (0..i).all(|j| symmetric(i, j)))
-}
-
-impl RlsOptions {
-    fn check(self) -> Result<(), NumericsError> {
-        self.forgetting.check()?;
-        let most = self.most_trace;
-        check_parameter("most_trace", most, most > 0.0, "above 0")
-    }
-}
-
-impl Forgetting {
-    fn check(self) -> Result<(), NumericsError> {
-        let factor = |name, value: f64| {
-            let fine = value > 0.0 && value <= 1.0;
-            check_parameter(name, value, fine, "above 0 and at most 1")
-        };
-        match self {
-            Self::Constant { factor: constant } => factor("factor", constant),
-            Self::Variable {
-                memory,
-                noise,
-                lowest,
-            } => {
-                let fine = memory > 1.0 && memory.is_finite();
-                check_parameter("memory", memory, fine, "above 1")?;
-                let fine = noise > 0.0 && noise.is_finite();
-                check_parameter("noise", noise, fine, "above 0")?;
-                factor("lowest", lowest)
-            }
+impl Learned {
+    /// Nothing yet.
+    fn of(fit: &RlsFit) -> Self {
+        Self {
+            information: fit.information.clone(),
+            start: fit.coefficients.clone(),
+            pull: vec![0.0; fit.coefficients.len()],
+            rows: fit.rows,
+            squares: fit.rows * fit.variance,
         }
     }
+}
 
-    /// The factor of a row with this error before learning, whose share of the prediction's variance is `spread`.
-    fn factor(self, error: f64, spread: f64) -> f64 {
-        match self {
-            Self::Constant { factor } => factor,
-            Self::Variable {
-                memory,
-                noise,
-                lowest,
-            } => {
-                let surprise = error * error / (1.0 + spread) / (memory * noise * noise);
-                (1.0 - surprise).max(lowest)
-            }
-        }
-    }
+/// Where a row of a triangle begins.
+pub(crate) const fn row_at(row: usize) -> usize {
+    row * (row + 1) / 2
 }
 
 /// A step for the widest vectors that the processor has: no sum is taken in another order, and no product fused with one, so that
@@ -159,6 +142,7 @@ struct Step<'a> {
     rls: &'a mut Rls,
     x: &'a [f64],
     y: f64,
+    after_s: f64,
 }
 
 impl WithSimd for Step<'_> {
@@ -166,147 +150,139 @@ impl WithSimd for Step<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> f64 {
-        self.rls.step_here(self.x, self.y)
+        self.rls.step_here(self.x, self.y, self.after_s)
     }
 }
 
 impl Rls {
-    /// Starts from coefficients and their covariance, row by row, in units of the noise variance.
-    ///
-    /// # Errors
-    /// [`NumericsError::Parameter`] for options out of range, [`NumericsError::NotFinite`] for numbers that are not finite,
-    /// or a covariance that is not symmetric and of positive diagonal.
-    pub fn starting_at(
-        coefficients: Vec<f64>,
-        covariance: Vec<f64>,
-        options: RlsOptions,
-    ) -> Result<Self, NumericsError> {
-        options.check()?;
-        let width = coefficients.len();
-        let sound = covariance.len() == width * width
-            && finite_and_symmetric(&coefficients, &covariance)
-            && (0..width).all(|i| covariance[i * width + i] > 0.0);
-        if !sound {
-            return Err(NumericsError::NotFinite);
-        }
-        Ok(Self {
-            options,
-            projected: Scratch(vec![0.0; width]),
-            coefficients,
-            covariance,
-            seen: 0,
-        })
-    }
-
-    /// Starts from zero coefficients, each known no better than `variance` times the noise variance.
-    ///
-    /// # Errors
-    /// As [`Rls::starting_at`].
-    pub fn new(width: usize, variance: f64, options: RlsOptions) -> Result<Self, NumericsError> {
-        let mut covariance = vec![0.0; width * width];
-        covariance
-            .iter_mut()
-            .step_by(width + 1)
-            .for_each(|diagonal| *diagonal = variance);
-        Self::starting_at(vec![0.0; width], covariance, options)
-    }
-
     /// The model's value.
     ///
     /// # Panics
     /// When `x` has not one value per coefficient.
     #[must_use]
-    #[inline]
     pub fn predict(&self, x: &[f64]) -> f64 {
-        assert_eq!(
-            x.len(),
-            self.coefficients.len(),
-            "a row has a value per coefficient"
-        );
+        assert_eq!(x.len(), self.coefficients.len(), "a value per coefficient");
         dot(&self.coefficients, x)
     }
 
-    /// The variance of the model's value, in units of the noise variance: `xᵀPx`, what is not known of the coefficients.
+    /// The variance of the model's value in units of the noise variance, `xᵀPx`: what is not known of the coefficients.
     /// `x(i)` is the value of regressor `i`.
     #[must_use]
     pub fn spread(&self, x: impl Fn(usize) -> f64) -> f64 {
-        let rows = self.covariance.chunks_exact(self.coefficients.len().max(1));
-        let spread = rows.enumerate().map(|(i, row)| {
-            let below: f64 = (0..i).map(|j| row[j] * x(j)).sum();
-            x(i) * (2.0 * below + row[i] * x(i))
-        });
-        spread.sum::<f64>().max(0.0)
+        spread(&self.root, self.coefficients.len(), x)
     }
 
-    /// Learns from one row, without allocating: its error before. A row after which the coefficients would not be finite is
-    /// ignored.
+    /// The same of the fit, `xᵀP₀x`.
+    #[must_use]
+    pub fn spread_of_fit(&self, x: impl Fn(usize) -> f64) -> f64 {
+        spread(&self.root_of_fit, self.coefficients.len(), x)
+    }
+
+    /// Learns from one row that comes so many seconds after the one before, without allocating: its error before. A row
+    /// that is not finite, or too large to be squared, is ignored.
     ///
     /// # Panics
     /// When `x` has not one value per coefficient.
-    pub fn step(&mut self, x: &[f64], y: f64) -> f64 {
-        Arch::new().dispatch(Step { rls: self, x, y })
+    pub fn step(&mut self, x: &[f64], y: f64, after_s: f64) -> f64 {
+        Arch::new().dispatch(Step {
+            rls: self,
+            x,
+            y,
+            after_s,
+        })
     }
 
     #[inline(always)]
-    fn step_here(&mut self, x: &[f64], y: f64) -> f64 {
+    fn step_here(&mut self, x: &[f64], y: f64, after_s: f64) -> f64 {
         let error = y - self.predict(x);
-        let width = x.len();
-        let rows = self.covariance.chunks_exact(width.max(1));
-        let projected = &mut self.projected.0;
-        for (projected, row) in projected.iter_mut().zip(rows) {
-            *projected = dot(row, x);
-        }
-        let spread = dot(projected, x);
-        let mut factor = self.options.forgetting.factor(error, spread);
-        let trace: f64 = self.covariance.iter().step_by(width + 1).sum();
-        if trace > factor * self.options.most_trace {
-            factor = 1.0;
-        }
-        let total = factor + spread;
-        let pull = error / total;
-        // Written so that NaN fails. A negative spread is what rounding leaves where nothing is left to learn.
-        if !(spread >= 0.0 && pull.is_finite() && spread.is_finite()) {
+        let of_start = y - dot(&self.learned.start, x);
+        let square = error * error / (1.0 + self.spread(|i| x[i]));
+        // Written so that NaN fails.
+        if !(square < f64::INFINITY && of_start.is_finite() && after_s >= 0.0) {
             return error;
         }
-        self.seen += 1;
-        for (coefficient, projected) in self.coefficients.iter_mut().zip(&*projected) {
-            *coefficient += projected * pull;
-        }
-        let root = total.sqrt().recip();
-        projected.iter_mut().for_each(|value| *value *= root);
-        let grow = factor.recip();
-        let rows = self.covariance.chunks_exact_mut(width.max(1));
-        for (row, &left) in rows.zip(&*projected) {
-            for (value, &right) in row.iter_mut().zip(&*projected) {
-                *value = (*value - left * right) * grow;
+        let left = libm::exp(-after_s / self.fit.memory_s);
+        let back = (1.0 - left) * self.fit.share;
+        let (fit, learned) = (&self.fit, &mut self.learned);
+        for (i, &of_row) in x.iter().enumerate() {
+            let cells = row_at(i)..=row_at(i) + i;
+            let start = &fit.information[cells.clone()];
+            let row = learned.information[cells].iter_mut();
+            for ((cell, start), x) in row.zip(start).zip(x) {
+                *cell = left * *cell + back * start + of_row * x;
             }
+            learned.pull[i] = left * learned.pull[i] + of_row * of_start;
         }
+        learned.rows = left * learned.rows + back * fit.rows + 1.0;
+        learned.squares = left * learned.squares + back * (fit.rows * fit.variance) + square;
+        self.solve_or_begin_again();
         error
     }
 
-    /// Moves a coefficient without a row, and makes it more uncertain by a variance of its own in units of the noise variance.
+    /// Moves a coefficient, and what it goes back to, without a row, after which it is known as by one row alone.
     ///
     /// # Panics
-    /// When there is no such coefficient, or a number is not finite, or the variance negative.
-    pub fn shift(&mut self, coefficient: usize, by: f64, variance: f64) {
-        let fine = by.is_finite() && variance >= 0.0 && variance.is_finite();
-        assert!(fine, "a shift and its variance are finite");
-        let width = self.coefficients.len();
+    /// When there is no such coefficient.
+    pub fn shift(&mut self, coefficient: usize, by: f64) {
         self.coefficients[coefficient] += by;
-        self.covariance[coefficient * (width + 1)] += variance;
+        self.learned.start[coefficient] += by;
+        let order = self.coefficients.len();
+        let row = &mut self.row.0;
+        let information = &mut self.learned.information;
+        for (j, cell) in row.iter_mut().enumerate() {
+            *cell = information[row_at(coefficient.max(j)) + coefficient.min(j)];
+        }
+        let known = row[coefficient];
+        if known > 1.0 {
+            let less = (1.0 - 1.0 / known) / known;
+            for i in 0..order {
+                for (j, right) in row[..=i].iter().enumerate() {
+                    let cell = &mut information[row_at(i) + j];
+                    *cell = match (i == coefficient, j == coefficient) {
+                        (true, true) => 1.0,
+                        (true, false) => *right / known,
+                        (false, true) => row[i] / known,
+                        (false, false) => *cell - row[i] * right * less,
+                    };
+                }
+            }
+        }
+        for (i, pull) in self.learned.pull.iter_mut().enumerate() {
+            let both = self.coefficients.iter().zip(&self.learned.start);
+            let parts = both
+                .enumerate()
+                .map(|(j, (now, start))| information[row_at(i.max(j)) + i.min(j)] * (now - start));
+            *pull = parts.sum();
+        }
+        self.solve_or_begin_again();
     }
 
-    /// Goes on with other options.
-    #[must_use]
-    pub fn with(mut self, options: RlsOptions) -> Self {
-        self.options = options;
-        self
+    /// What cannot be solved any more begins again from the fit.
+    #[inline(always)]
+    fn solve_or_begin_again(&mut self) {
+        if !self.solve() {
+            self.learned = Learned::of(&self.fit);
+            self.root.clone_from(&self.root_of_fit);
+            self.coefficients.clone_from(&self.fit.coefficients);
+        }
     }
 
-    /// How the recursion runs.
+    /// Finds root and coefficients from what was learned; false where the information is not positive, or a number not finite.
+    #[inline(always)]
+    fn solve(&mut self) -> bool {
+        self.root.copy_from_slice(&self.learned.information);
+        if !invert_root(&mut self.root, &mut self.row.0) {
+            return false;
+        }
+        self.coefficients.copy_from_slice(&self.learned.start);
+        add_product(&self.root, &self.learned.pull, &mut self.coefficients);
+        self.coefficients.iter().all(|value| value.is_finite())
+    }
+
+    /// The variance of the noise, as far as it is remembered.
     #[must_use]
-    pub fn options(&self) -> RlsOptions {
-        self.options
+    pub fn variance(&self) -> f64 {
+        self.learned.squares / self.learned.rows
     }
 
     /// The coefficients, one per regressor.
@@ -315,60 +291,134 @@ impl Rls {
         &self.coefficients
     }
 
-    /// Their covariance, row by row, in units of the noise variance.
+    /// `W`, the lower triangle row by row, so that `P = WᵀW`.
     #[must_use]
-    pub fn covariance(&self) -> &[f64] {
-        &self.covariance
+    pub fn root(&self) -> &[f64] {
+        &self.root
     }
 
-    /// How many rows were used.
+    /// Where it began.
     #[must_use]
-    pub fn seen(&self) -> u64 {
-        self.seen
+    pub fn fit(&self) -> &RlsFit {
+        &self.fit
+    }
+
+    /// What was learned since.
+    #[must_use]
+    pub fn learned(&self) -> &Learned {
+        &self.learned
+    }
+
+    /// Goes on from what was learned from the same fit, with the same bits; whether that can be.
+    #[must_use]
+    pub fn resume(&mut self, learned: &Learned) -> bool {
+        let lengths = |of: &Learned| [&of.information, &of.start, &of.pull].map(Vec::len);
+        let fine = |value: f64| value > 0.0 && value.is_finite();
+        let sound = lengths(learned) == lengths(&self.learned)
+            && fine(learned.rows)
+            && fine(learned.squares);
+        if sound {
+            self.learned.clone_from(learned);
+            if self.solve() {
+                return true;
+            }
+            self.solve_or_begin_again();
+        }
+        false
     }
 }
 
-/// The covariance of the standardised columns' coefficients and, last, the intercept's, in units of the noise variance, when
-/// the rows in `gram` count as if there were `rows` of them: `(rows/n · ZᵀZ + αI)⁻¹`. A start for [`Rls::starting_at`].
-///
-/// # Errors
-/// [`NumericsError::NoConvergence`] when that cannot be inverted.
-pub fn covariance_of(
+/// Puts `W = L⁻¹` in the place of a matrix `LLᵀ`, the lower triangle row by row, so that `WᵀW` is its inverse; false where it is not positive.
+/// There is room for a row beside.
+#[inline(always)]
+pub(crate) fn invert_root(root: &mut [f64], room: &mut [f64]) -> bool {
+    let order = room.len();
+    // Cholesky's factor, column by column, each taken off the rest at once: rows lie together, so that vectors are wide.
+    for k in 0..order {
+        let pivot = root[row_at(k) + k].sqrt();
+        if !(pivot > 0.0 && pivot < f64::INFINITY) {
+            return false;
+        }
+        root[row_at(k) + k] = pivot;
+        for i in k + 1..order {
+            root[row_at(i) + k] /= pivot;
+            room[i] = root[row_at(i) + k];
+        }
+        for i in k + 1..order {
+            let of_row = room[i];
+            let cells = root[row_at(i) + k + 1..=row_at(i) + i].iter_mut();
+            for (cell, of_column) in cells.zip(&room[k + 1..=i]) {
+                *cell -= of_row * of_column;
+            }
+        }
+    }
+    // Its inverse, row by row.
+    for i in 0..order {
+        let (done, rest) = root.split_at_mut(row_at(i));
+        let row = &mut rest[..=i];
+        let (pivot, room) = (row[i], &mut room[..i]);
+        room.copy_from_slice(&row[..i]);
+        row.fill(0.0);
+        for (k, of_row) in room.iter().enumerate() {
+            for (cell, of) in row.iter_mut().zip(&done[row_at(k)..=row_at(k) + k]) {
+                *cell -= of_row * of;
+            }
+        }
+        row[i] = 1.0;
+        row.iter_mut().for_each(|cell| *cell /= pivot);
+    }
+    true
+}
+
+/// Adds `WᵀWx`.
+#[inline(always)]
+pub(crate) fn add_product(root: &[f64], x: &[f64], to: &mut [f64]) {
+    for i in 0..x.len() {
+        let row = &root[row_at(i)..=row_at(i) + i];
+        let along = dot(row, &x[..=i]);
+        for (sum, of_row) in to.iter_mut().zip(row) {
+            *sum += along * of_row;
+        }
+    }
+}
+
+/// `Σ (Wx)²`.
+fn spread(root: &[f64], order: usize, x: impl Fn(usize) -> f64) -> f64 {
+    let rows = (0..order).map(|i| {
+        let row = &root[row_at(i)..=row_at(i) + i];
+        let along: f64 = row.iter().enumerate().map(|(j, of)| of * x(j)).sum();
+        along * along
+    });
+    rows.sum()
+}
+
+/// The information that rows give about the coefficients of the standardised columns and, last, the intercept's, in units of the
+/// noise variance, when the rows in `gram` count as if there were `rows` of them: the lower triangle of `rows/n · ZᵀZ + αI`.
+#[must_use]
+pub fn information_of(
     gram: &Gram,
     columns: &[usize],
     scales: &[f64],
     alpha: f64,
     rows: f64,
-) -> Result<Vec<f64>, NumericsError> {
+) -> Vec<f64> {
     let moments = gram.moments();
     let share = rows / gram.weight();
-    // What the rows do not determine at all must not make the whole unsolvable, nor so wide that the recursion's differences lose
-    // their sign within some 10⁵ rows.
+    // What the rows do not determine at all must not make the whole unsolvable.
     let alpha = alpha.max(1e-7 * rows);
-    let order = columns.len() + 1;
-    let known = Mat::from_fn(order, order, |i, j| {
-        match (columns.get(i), columns.get(j)) {
-            (Some(&a), Some(&b)) => {
-                let penalty = if i == j { alpha } else { 0.0 };
-                share * moments[(a, b)] / (scales[a] * scales[b]) + penalty
-            }
-            (None, None) => rows,
-            _ => 0.0,
+    let cell = |i: usize, j: usize| match (columns.get(i), columns.get(j)) {
+        (Some(&a), Some(&b)) => {
+            let penalty = if i == j { alpha } else { 0.0 };
+            share * moments[(a, b)] / (scales[a] * scales[b]) + penalty
         }
-    });
-    let factor = known
-        .llt(Side::Lower)
-        .map_err(|_| NumericsError::NoConvergence)?;
-    let inverse = factor.solve(Mat::<f64>::identity(order, order));
-    let lower = |i: usize, j: usize| inverse[(i.max(j), i.min(j))];
-    let whole: Vec<f64> = (0..order * order)
-        .map(|at| lower(at / order, at % order))
-        .collect();
-    if whole.iter().all(|value| value.is_finite()) {
-        Ok(whole)
-    } else {
-        Err(NumericsError::NoConvergence)
-    }
+        (None, None) => rows,
+        _ => 0.0,
+    };
+    let order = columns.len() + 1;
+    (0..order)
+        .flat_map(|i| (0..=i).map(move |j| (i, j)))
+        .map(|(i, j)| cell(i, j))
+        .collect()
 }
 
 #[cfg(test)]

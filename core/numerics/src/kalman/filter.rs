@@ -206,6 +206,11 @@ impl Kalman {
         &self.covariance
     }
 
+    /// Both, to be changed together.
+    pub(super) fn parts_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        (&mut self.state, &mut self.covariance)
+    }
+
     /// Whether there is a state of which nothing is known.
     #[must_use]
     pub fn is_diffuse(&self) -> bool {

@@ -7,6 +7,7 @@ mod filter;
 mod likelihood;
 mod matrix;
 mod model;
+mod resetting;
 mod simplex;
 #[cfg(test)]
 mod tests;
@@ -14,3 +15,4 @@ mod tests;
 pub use filter::{Forecast, Innovation, Kalman};
 pub use likelihood::{Followed, Series, follow, most_likely};
 pub use model::{Movement, Passage, Structural};
+pub use resetting::Resetting;

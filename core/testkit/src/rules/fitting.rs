@@ -199,7 +199,7 @@ fn through_a_model(subject: &Subject<'_>, fitted: &Fitted) -> Result<Fitted, Str
 /// The text of a model of what was fitted.
 pub(super) fn text_of(subject: &Subject<'_>, fitted: &Fitted) -> Result<String, String> {
     let model = Model {
-        graph: subject.fixture.graph.clone(),
+        graph: subject.fixture.graph.clone().into(),
         plan: subject.fixture.plan.clone(),
         fitted: fitted.clone(),
         card: None,

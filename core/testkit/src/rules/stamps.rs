@@ -16,7 +16,7 @@ pub(super) fn stamps(subject: &Subject<'_>) -> Result<(), String> {
     }
     // Where the values of other ports say when, these are of their time.
     let reach = |port: &str| match feature.reach(port) {
-        Reach::First => Reach::Own,
+        Reach::First(_) => Reach::Own,
         reach => reach,
     };
     let made_of = made_of(subject, reach);

@@ -2,7 +2,7 @@
 
 use std::cell::{RefCell, RefMut};
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Kept, Mistake, Votes};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,24 +18,24 @@ use crate::share::{raise, shrink};
 /// others that are there; if none of these has any, all weights are equal. A voter without a prediction drops out and the rest are
 /// renormalised, so that the vote goes on when a sensor dies. The port `weights` shows them.
 ///
-/// Recent errors are few and tell of the voters only roughly: `shrinkage` draws the weights towards equal ones (after Stock and Watson
-/// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
-/// much, at the cost of the larger ones.
+/// Recent errors are few and rank the voters only roughly. So `shrinkage` draws the weights towards equal ones (after
+/// Stock and Watson 2004): `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there. Then `floor` lifts
+/// every weight to at least that much, at the cost of the larger ones.
 ///
-/// A voter that steps outside of its fit loses its vote at once: where its `novelty` is above 1, its weight is divided by the square
-/// of that, and the port `novelty` is the mean of the voters' by their weights.
+/// A voter that steps outside of its fit loses its vote at once: where its `novelty` is above 1, its weight is
+/// divided by the square of that. The port `novelty` is the mean of the voters' by their weights.
 ///
-/// Where all voters have a standard deviation, the port `std_dev` is that of
-/// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
-/// small, since it takes one of the voters to be right.
+/// Where all voters have a standard deviation, the port `std_dev` is that of their mixture,
+/// `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999). It is rather too large than too small,
+/// since it takes one of the voters to be right.
 ///
 /// After Mandelli, Dankwart and Napoli, section 3.4, whose printed formula `(RMSE_i / Σ RMSE_j)²` favours the worst voter;
 /// it is there for comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AutoWeighted {
-    /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
-    /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives: a voter without a newer one has none.
+    /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"` or `{ truths = 12 }`.
+    /// With `{ half_life = "15min" }` it counts ever less, and not at all after ten half-lives: a voter without a newer one has none.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub memory: Memory,
     /// How strongly errors count: 0 not at all, 2, which is the default, as inverse variances do; at most 16.
@@ -110,6 +110,10 @@ impl Combiner for AutoWeighted {
 
     fn memory(&self) -> Duration {
         self.memory.longest()
+    }
+
+    fn keeps(&self, voters: usize, every: Duration) -> Vec<Kept> {
+        self.memory.keeps(voters, every)
     }
 
     fn is_endless(&self) -> bool {

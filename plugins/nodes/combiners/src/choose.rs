@@ -1,6 +1,6 @@
 //! Combiners that pass one vote on: the best of late, or the first that is there.
 
-use athermal_core::node::{Combine, Combiner, Duty, InputPort, KindFacts, Votes};
+use athermal_core::node::{Combine, Combiner, Duty, InputPort, Kept, KindFacts, Votes};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,10 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 
 /// The vote of the voter with the smallest recent root mean square error.
 ///
-/// A voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose vote it is,
-/// and the port `std_dev` its standard deviation where all voters have one. The error of a voter whose `novelty` is above 1 counts as
-/// so many times as large.
+/// `ŷ = ŷ_k`, with `k` the voter whose `RMSE_k = √(Σ (y − ŷ_k)² / n)` over the truths in memory is the smallest. A
+/// voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose
+/// vote it is, and the port `std_dev` its standard deviation where all voters have one. The error of a voter whose
+/// `novelty` is above 1 counts as so many times as large.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Best {
@@ -24,8 +25,10 @@ pub struct Best {
     pub memory: Memory,
 }
 
-/// The first vote that is there, in the order of the voters. The port `weights` shows whose it is, and the port
-/// `std_dev` its standard deviation where all voters have one.
+/// The first vote that is there, in the order of the voters.
+///
+/// `ŷ = ŷ_k`, with `k` the first voter that has one. The port `weights` shows whose it is, and the port `std_dev` its
+/// standard deviation where all voters have one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fallback {}
@@ -50,6 +53,10 @@ impl Combiner for Best {
 
     fn memory(&self) -> Duration {
         self.memory.longest()
+    }
+
+    fn keeps(&self, voters: usize, every: Duration) -> Vec<Kept> {
+        self.memory.keeps(voters, every)
     }
 
     fn is_endless(&self) -> bool {

@@ -11,18 +11,20 @@ use crate::mean::mean;
 
 /// Adaptive conformal inference: intervals about any prediction, calibrated by its recent errors.
 ///
-/// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
-/// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
-/// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
-/// As there, `α` may fall below 0 and rise above 1, the farther the more intervals were given before a truth comes: what was missed
-/// is made up for. So the share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep
-/// outgrowing all that are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
+/// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk,
+/// Gammerman and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by
+/// `gain · (1 − coverage − miss)` (Gibbs and Candès 2021, equation 2). `miss` is 1 where the truth lay outside of the
+/// interval that was given for it, and 0 where not. As there, `α` may fall below 0 and rise above 1, the farther the
+/// more intervals were given before a truth comes: what was missed is made up for. So the share of truths within
+/// comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing all that are in
+/// memory. It is a share over time, not at each instant. Only truths that the embargo lets through count.
 ///
-/// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
-/// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths. Where more is asked for than any error in
-/// memory, the interval reaches as far as the largest, and not to infinity as in the source: what is missed then is not all made
-/// up for. A miss of an interval that reaches as far as that takes `α` no lower than `min(α, −gain)`, and a truth on one that is only
-/// the prediction takes it no higher than `max(α, 1 + gain)`. `athermal evaluate` shows how often intervals held.
+/// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends.
+/// They have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths. Where more is asked for than
+/// any error in memory, the interval reaches as far as the largest, and not to infinity as in the source. What is
+/// missed then is not all made up for. A miss of an interval that reaches as far as that takes `α` no lower than
+/// `min(α, −gain)`. A truth on an interval that is only the prediction takes it no higher than `max(α, 1 + gain)`.
+/// `athermal evaluate` shows how often intervals held.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Conformal {

@@ -94,30 +94,68 @@ impl<R: Rule> Combine for ByErrors<R> {
 
 /// The recent squared errors of several voters, oldest first.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(into = "ByVoter", from = "ByVoter")]
 pub(crate) struct Errors {
     memory: Memory,
-    /// For each voter the arrival and square of its errors; of a memory that fades, of the last one.
-    squares: Vec<VecDeque<(Instant, f64)>>,
-    /// Their sums, oldest first, so that one more is only added.
-    #[serde(skip)]
+    /// When truths arrived, and for each the squares of the errors of all voters, NaN where one has none in memory; of a memory that fades
+    /// the last one of each voter.
+    arrivals: VecDeque<Instant>,
+    squares: Vec<f64>,
+    /// For each voter how many there are, and their sum, oldest first, so that one more is only added.
+    lens: Vec<usize>,
     sums: Vec<f64>,
     /// For each voter the mean of what is in memory.
     means: Vec<Option<f64>>,
     /// For each voter how many errors a memory that fades comes to.
-    #[serde(default)]
     counts: Vec<f64>,
     /// How often the means have changed, so that what follows from them is worked out only then.
-    #[serde(skip)]
     changes: u64,
     /// What each voter counts by how far it is outside of its fit at present: 1 inside; empty where that is not known of any.
-    #[serde(skip)]
     trust: Vec<f64>,
     /// Up to when truths have been let through.
-    #[serde(skip, default = "long_ago")]
     newest: Instant,
     /// Up to when nothing in memory is to be forgotten.
-    #[serde(skip, default = "long_ago")]
     kept_until: Instant,
+}
+
+/// Errors as they are written.
+#[derive(Serialize, Deserialize)]
+struct ByVoter {
+    memory: Memory,
+    /// For each voter the arrival and square of its errors.
+    squares: Vec<Vec<(Instant, f64)>>,
+    means: Vec<Option<f64>>,
+    #[serde(default)]
+    counts: Vec<f64>,
+}
+
+impl From<Errors> for ByVoter {
+    fn from(errors: Errors) -> Self {
+        let voters = 0..errors.means.len();
+        Self {
+            memory: errors.memory,
+            squares: voters.map(|voter| errors.of(voter).collect()).collect(),
+            means: errors.means,
+            counts: errors.counts,
+        }
+    }
+}
+
+impl From<ByVoter> for Errors {
+    fn from(written: ByVoter) -> Self {
+        let mut errors = Self::new(written.squares.len(), written.memory);
+        let all = written.squares.into_iter().enumerate();
+        let mut all: Vec<_> = all
+            .flat_map(|(voter, of)| of.into_iter().map(move |(at, square)| (at, voter, square)))
+            .filter(|(.., square)| !square.is_nan())
+            .collect();
+        all.sort_by_key(|(at, ..)| *at);
+        for (arrived, voter, square) in all {
+            errors.put(voter, arrived, square);
+        }
+        (errors.means, errors.counts) = (written.means, written.counts);
+        errors
+    }
 }
 
 fn long_ago() -> Instant {
@@ -128,7 +166,9 @@ impl Errors {
     pub(crate) fn new(voters: usize, memory: Memory) -> Self {
         Self {
             memory,
-            squares: vec![VecDeque::new(); voters],
+            arrivals: VecDeque::new(),
+            squares: Vec::new(),
+            lens: vec![0; voters],
             sums: vec![0.0; voters],
             means: vec![None; voters],
             counts: vec![0.0; voters],
@@ -168,13 +208,13 @@ impl Errors {
     pub(crate) fn count(&self, voter: usize) -> f64 {
         match self.memory {
             Memory::HalfLife(fading) => {
-                let last = self.squares[voter].front().map(|&(arrived, _)| arrived);
+                let last = self.of(voter).next().map(|(arrived, _)| arrived);
                 let idle = last.map_or(Duration::ZERO, |last| {
                     (self.newest - last).max(Duration::ZERO)
                 });
                 self.counts[voter] * fading.left(idle)
             }
-            Memory::Time(_) | Memory::Truths(_) => self.squares[voter].len() as f64,
+            Memory::Time(_) | Memory::Truths(_) => self.lens[voter] as f64,
         }
     }
 
@@ -201,25 +241,72 @@ impl Errors {
         }
     }
 
+    /// The arrival and square of each error of a voter.
+    fn of(&self, voter: usize) -> impl Iterator<Item = (Instant, f64)> {
+        let all = self.arrivals.iter().copied().zip(self.squares_of(voter));
+        all.filter(|(_, square)| !square.is_nan())
+    }
+
+    /// By truth the square of the error of a voter, NaN where it has none.
+    fn squares_of(&self, voter: usize) -> impl Iterator<Item = f64> {
+        let from_first = self.squares.get(voter..).unwrap_or_default();
+        let voters = self.lens.len().max(1);
+        from_first.iter().copied().step_by(voters)
+    }
+
+    /// Adds an error. Those of several voters that arrived together stand together.
+    fn put(&mut self, voter: usize, arrived: Instant, square: f64) {
+        let voters = self.lens.len();
+        let last = self.squares.len().checked_sub(voters);
+        let is_free = last.is_some_and(|last| self.squares[last + voter].is_nan());
+        if !is_free || self.arrivals.back() != Some(&arrived) {
+            if self.arrivals.len() == self.arrivals.capacity() {
+                let more = (self.arrivals.len() / 16).max(4);
+                self.arrivals.reserve_exact(more);
+                self.squares.reserve_exact(more * voters);
+            }
+            self.arrivals.push_back(arrived);
+            self.squares.extend(std::iter::repeat_n(f64::NAN, voters));
+        }
+        let last = self.squares.len() - voters + voter;
+        self.squares[last] = square;
+        self.lens[voter] += 1;
+    }
+
+    /// Forgets the oldest error of a voter, and gives when it arrived.
+    fn forget_oldest(&mut self, voter: usize) -> Option<Instant> {
+        let voters = self.lens.len();
+        let mut places = (voter..self.squares.len()).step_by(voters);
+        let place = places.find(|&place| !self.squares[place].is_nan())?;
+        let arrived = self.arrivals[place / voters];
+        self.squares[place] = f64::NAN;
+        self.lens[voter] -= 1;
+        let truth = place - voter..place - voter + voters;
+        if self.squares[truth.clone()].iter().all(|of| of.is_nan()) {
+            self.squares.drain(truth);
+            self.arrivals.remove(place / voters);
+        }
+        Some(arrived)
+    }
+
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
         self.changes += 1;
         self.kept_until = self.kept_until.min(arrived + self.memory.longest());
-        let squares = &mut self.squares[voter];
         match self.memory {
-            Memory::Truths(last) if squares.len() >= last.truths => {
-                squares.pop_front();
-                squares.push_back((arrived, square));
+            Memory::Truths(last) if self.lens[voter] >= last.truths => {
+                self.forget_oldest(voter);
+                self.put(voter, arrived, square);
                 self.refresh(voter);
             }
             Memory::Time(_) | Memory::Truths(_) => {
-                squares.push_back((arrived, square));
+                self.put(voter, arrived, square);
                 self.sums[voter] += square;
-                self.means[voter] = Some(self.sums[voter] / squares.len() as f64);
+                self.means[voter] = Some(self.sums[voter] / self.lens[voter] as f64);
             }
             Memory::HalfLife(fading) => {
-                let last = squares.pop_front();
-                squares.push_back((arrived, square));
-                let left = last.map_or(0.0, |(last, _)| fading.left(arrived - last));
+                let last = self.forget_oldest(voter);
+                self.put(voter, arrived, square);
+                let left = last.map_or(0.0, |last| fading.left(arrived - last));
                 let count = &mut self.counts[voter];
                 *count = *count * left + 1.0;
                 let mean = self.means[voter].unwrap_or(square);
@@ -235,27 +322,26 @@ impl Errors {
             return;
         }
         let forgotten = newest - self.memory.longest();
-        for voter in 0..self.squares.len() {
-            let squares = &mut self.squares[voter];
-            let before = squares.len();
-            while squares
-                .front()
-                .is_some_and(|&(arrived, _)| arrived <= forgotten)
+        for voter in 0..self.lens.len() {
+            let before = self.lens[voter];
+            while self
+                .of(voter)
+                .next()
+                .is_some_and(|(arrived, _)| arrived <= forgotten)
             {
-                squares.pop_front();
+                self.forget_oldest(voter);
             }
-            if squares.len() < before {
+            if self.lens[voter] < before {
                 self.refresh(voter);
             }
         }
-        let fronts = self.squares.iter().filter_map(VecDeque::front);
-        let oldest = fronts.map(|&(arrived, _)| arrived).min();
-        self.kept_until = oldest.map_or(Instant::MAX, |oldest| oldest + self.memory.longest());
+        let oldest = self.arrivals.front();
+        self.kept_until = oldest.map_or(Instant::MAX, |oldest| *oldest + self.memory.longest());
     }
 
     /// Moves what is remembered to the clock of another segment.
     pub(crate) fn shift(&mut self, shift: Duration) {
-        for (arrived, _) in self.squares.iter_mut().flatten() {
+        for arrived in &mut self.arrivals {
             *arrived = *arrived + shift;
         }
         self.newest = long_ago();
@@ -268,17 +354,17 @@ impl Errors {
             Ok(known) => known,
             Err(cold) => return cold,
         };
-        let voters = self.squares.len();
+        let voters = self.lens.len();
         self.changes += 1;
         self.kept_until = long_ago();
-        if known.squares.len() != voters || known.means.len() != voters {
+        if known.lens.len() != voters || known.means.len() != voters {
             return Restored::cold("the number of voters differs");
         }
         match (known.memory, self.memory) {
             (Memory::HalfLife(_), Memory::HalfLife(_)) => {
-                (self.squares, self.means, self.counts) =
-                    (known.squares, known.means, known.counts);
-                self.counts.resize(self.squares.len(), 0.0);
+                self.take(&known);
+                (self.means, self.counts) = (known.means, known.counts);
+                self.counts.resize(voters, 0.0);
             }
             (Memory::HalfLife(_), _) => {
                 return Restored::cold("of errors that fade only the sum is known, not each");
@@ -288,34 +374,46 @@ impl Errors {
                     changes: self.changes,
                     ..Self::new(voters, self.memory)
                 };
-                for (voter, squares) in known.squares.into_iter().enumerate() {
-                    for (arrived, square) in squares {
+                for voter in 0..voters {
+                    for (arrived, square) in known.of(voter) {
                         self.remember(voter, arrived, square);
                     }
                 }
             }
             (_, memory) => {
-                self.squares = known.squares;
-                for squares in &mut self.squares {
+                self.take(&known);
+                for voter in 0..voters {
                     if let Memory::Truths(last) = memory {
-                        squares.drain(..squares.len().saturating_sub(last.truths));
+                        while self.lens[voter] > last.truths {
+                            self.forget_oldest(voter);
+                        }
                     }
-                    // Whoever steps from here on must not have to make room.
-                    squares.reserve(squares.len().max(32));
+                    self.refresh(voter);
                 }
-                (0..self.squares.len()).for_each(|voter| self.refresh(voter));
             }
         }
         Restored::Accepted
     }
 
+    /// Takes the errors of others.
+    fn take(&mut self, known: &Self) {
+        self.arrivals.clone_from(&known.arrivals);
+        self.squares.clone_from(&known.squares);
+        self.lens.clone_from(&known.lens);
+        // Whoever steps from here on must not have to make room.
+        let more = self.arrivals.len().max(32);
+        self.arrivals.reserve(more);
+        self.squares.reserve(more * self.lens.len());
+    }
+
     /// Takes the mean of what is in memory afresh, so that an error of 10⁹ leaves no trace once it is forgotten.
     fn refresh(&mut self, voter: usize) {
         self.changes += 1;
-        let squares = &self.squares[voter];
-        let sum: f64 = squares.iter().map(|(_, square)| square).sum();
+        let squares = self.squares_of(voter).filter(|square| !square.is_nan());
+        let sum: f64 = squares.sum();
         self.sums[voter] = sum;
-        self.means[voter] = (!squares.is_empty()).then(|| sum / squares.len() as f64);
+        let len = self.lens[voter];
+        self.means[voter] = (len > 0).then(|| sum / len as f64);
         self.counts[voter] = 0.0;
     }
 }

@@ -1,6 +1,6 @@
 //! A combiner that does no harm.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Kept, Mistake, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,11 +12,13 @@ use crate::share::trust;
 
 /// Passes a prediction on only while it does no harm: while its recent error is below that of predicting zero.
 ///
-/// Otherwise it predicts zero, which is what a machine without a model does. Before `min_truths` truths have been compared,
-/// nothing is known to do harm and the prediction passes. One from far outside of its fit is held back before its truth comes: where
-/// its `novelty` is above `most_novel`. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
-/// passes since too little is known, 3 it is held back as it is too novel. The port `weights` says 0 while it is held back. Of several predictions the mean of those that are
-/// there is guarded, and held back when one of them does harm on the truths that it predicted. Where all have a standard deviation, the port `std_dev` passes it on, or that of
+/// It passes while `Σ (y − ŷ)² < Σ y²` over the truths in memory. Otherwise it predicts zero, which is what a machine
+/// without a model does. Before `min_truths` truths have been compared, nothing is known to do harm and the prediction
+/// passes. One from far outside of its fit is held back before its truth comes: where its `novelty` is above
+/// `most_novel`. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back. 2 is that it passes
+/// since too little is known, 3 that it is held back as it is too novel. The port `weights` says 0 while it is held
+/// back. Of several predictions the mean of those that are there is guarded, and held back when one of them does harm
+/// on the truths that it predicted. Where all have a standard deviation, the port `std_dev` passes it on, or that of
 /// their mixture; while the prediction is held back there is none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -89,6 +91,10 @@ impl Combiner for Guard {
 
     fn memory(&self) -> Duration {
         self.memory.longest()
+    }
+
+    fn keeps(&self, voters: usize, every: Duration) -> Vec<Kept> {
+        self.memory.keeps(2 * voters, every)
     }
 
     fn is_endless(&self) -> bool {

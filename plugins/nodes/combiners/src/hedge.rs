@@ -16,12 +16,13 @@ use crate::share::{raise, trust};
 /// `auto_weighted` follows the last quarter of an hour, `hedge` goes by all that it has seen, and soon gives most weight to the voter that
 /// is best over all.
 ///
-/// Without `rate` the rate is found on the way (AdaHedge: de Rooij, van Erven, Grünwald and Koolen 2014): `η = ln n / Δ`, with `Δ` the sum
-/// of what the weighted mean of the errors has lost to `−ln(Σ w_i exp(−η ℓ_i)) / η`. It needs no scale: errors in nm or in mm give the same
-/// weights. After `T` truths the squared errors of the vote add up to no more than those of the best of `n` voters and
-/// `2 √(V ln n) + S (4/3 ln n + 2)`, where `S` is the largest difference between squared errors at any one truth and `V`, at most `T S² / 4`,
-/// sums up their variance under the weights (their theorem 6). That holds where each truth is known before the next vote; a horizon or embargo
-/// that holds back `d` truths multiplies it by about `d + 1` (Joulani, György and Szepesvári 2013).
+/// Without `rate` the rate is found on the way: `η = ln n / Δ` (AdaHedge: de Rooij, van Erven, Grünwald and Koolen
+/// 2014). `Δ` is the sum of what the weighted mean of the errors has lost to `−ln(Σ w_i exp(−η ℓ_i)) / η`. It needs
+/// no scale: errors in nm or in mm give the same weights. After `T` truths the squared errors of the vote add up to
+/// no more than those of the best of `n` voters and `2 √(V ln n) + S (4/3 ln n + 2)`. `S` is the largest difference
+/// between squared errors at any one truth. `V`, at most `T S² / 4`, sums up their variance under the weights (their
+/// theorem 6). That holds where each truth is known before the next vote; a horizon or embargo that holds back `d`
+/// truths multiplies it by about `d + 1` (Joulani, György and Szepesvári 2013).
 ///
 /// With `rate`, `η = rate / S`: errors are scaled by their own size so far, and the bound is `S ln n / rate + rate · T S / 8` once that has shown
 /// (Cesa-Bianchi and Lugosi 2006, theorem 2.2).
@@ -45,7 +46,7 @@ pub struct Hedge {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub half_life: Option<Duration>,
-    /// The least weight of a voter that is there, 0 to 1, so that one that was bad can come back quickly; where that is more than an equal
+    /// The least weight of a voter that is there, 0 to 1, so that one that was bad can come back quickly. Where that is more than an equal
     /// share, all weights are equal.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// The mean of the votes that are there. The port `weights` shows an equal one for each of them.
 ///
-/// Where all voters have a standard deviation, the port `std_dev` is that of their mixture, as of `auto_weighted`.
+/// `ŷ = Σ ŷ_i / n`. Where all voters have a standard deviation, the port `std_dev` is that of their mixture, as of
+/// `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {}

@@ -8,16 +8,18 @@ use serde::{Deserialize, Serialize};
 
 /// The median of the votes that are there: half of the voters may be wrong without doing harm.
 ///
-/// Of an even number of votes it is the mean of the two in the middle. The port `weights` shows which votes it is made of.
-/// Where all voters have a standard deviation, the port `std_dev` is that of the mixture of those, as of `auto_weighted`.
+/// `ŷ = median ŷ_i`. Of an even number of votes it is the mean of the two in the middle. The port `weights` shows which
+/// votes it is made of. Where all voters have a standard deviation, the port `std_dev` is that of the mixture of those,
+/// as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Median {}
 
 /// The mean of the votes that are left when the largest and smallest ones are taken away.
 ///
-/// Of `n` votes `⌊share · n⌋` are taken away at either end (Tukey and McLaughlin 1963). The port `weights` shows which are left.
-/// Where all voters have a standard deviation, the port `std_dev` is that of the mixture of those, as of `auto_weighted`.
+/// `ŷ = Σ ŷ_i / (n − 2k)` of those that are left. Of `n` votes `k = ⌊share · n⌋` are taken away at either end (Tukey
+/// and McLaughlin 1963). The port `weights` shows which are left. Where all voters have a standard deviation, the port
+/// `std_dev` is that of the mixture of those, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trimmed {

@@ -1,13 +1,13 @@
 //! Decides how long errors count: for a time, for so many truths, or ever less.
 
-use athermal_core::node::Forms;
+use athermal_core::node::{Forms, Kept};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// How long an error is remembered, counted from when the embargo lets its truth through.
 ///
-/// `"15min"` forgets at once what was let through 15 minutes ago or earlier, `{ truths = 12 }` what came before the last twelve, and
+/// `"15min"` forgets at once what was let through 15 minutes ago or earlier, `{ truths = 12 }` what came before the last twelve.
 /// `{ half_life = "15min" }` counts an error half after that time, a quarter after twice that, and not at all after ten times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
@@ -88,6 +88,18 @@ impl Memory {
             Self::Truths(_) => Duration::ZERO,
             Self::HalfLife(fading) => fading.longest(),
         }
+    }
+
+    /// What errors of so many voters take in memory, where truths come each `every`.
+    pub(crate) fn keeps(&self, voters: usize, every: Duration) -> Vec<Kept> {
+        let back = match *self {
+            Self::Time(time) => time,
+            Self::Truths(last) => {
+                Duration::from_ns(every.as_ns().saturating_mul(last.truths as i64 - 1))
+            }
+            Self::HalfLife(_) => Duration::ZERO,
+        };
+        Kept::in_parts(back, every, 8 + 8 * voters)
     }
 }
 

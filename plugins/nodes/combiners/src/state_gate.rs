@@ -9,11 +9,12 @@ use crate::choose::all_on;
 
 /// Passes on the voter that is meant for the present state of stability: the first voter for state 0, the second for state 1, and so on.
 ///
-/// The input `state` is the number that a `stability` node gives: with `inputs.voters = ["thermal", "both", "motion"]` temperatures
-/// speak while the machine is stable, both in between, and its own past in a transient (Mandelli, Dankwart and Napoli,
-/// section 3.4). States beyond the last voter belong to that one; numbers between are rounded, and what is below zero or absent is a
-/// state that is not known. The state and the `dwell` are watched at every tick. Against going to and fro, the `stability` node has `hysteresis` and
-/// `dwell`; a `dwell` here is for this gate alone.
+/// `ŷ = ŷ_s`, with `s` the state. The input `state` is the number that a `stability` node gives. With
+/// `inputs.voters = ["thermal", "both", "motion"]` temperatures speak while the machine is stable, both in between, and
+/// its own past in a transient (Mandelli, Dankwart and Napoli, section 3.4). States beyond the last voter belong to
+/// that one; numbers between are rounded, and what is below zero or absent is a state that is not known. The state and
+/// the `dwell` are watched at every tick. Against going to and fro, the `stability` node has `hysteresis` and `dwell`;
+/// a `dwell` here is for this gate alone.
 ///
 /// Where the voter of the state is absent, the next one in order that has a vote speaks, then those before it; where the state is not known, the first. The port
 /// `reason` says: 0 the voter of the state speaks, 1 another since that one is absent, 2 the state is not known. The port `weights` shows whose

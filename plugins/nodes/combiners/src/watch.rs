@@ -17,8 +17,8 @@ use usual::{Taken, Usual};
 /// What both kinds document of their answers.
 macro_rules! reasons {
     () => {
-        "The port `reason`, written `watch:reason` of a node `watch` (in a node with `each`, `watch:reason.{axis}` is that of its\n\
-         member), says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched.\n\
+        "The port `reason` says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. Of a node `watch` it is\n\
+         written `watch:reason`; in a node with `each`, `watch:reason.{axis}` is that of its member. An alarm stands for `hold`. Of several predictions the mean is watched.\n\
          The port `std_dev` passes the standard deviation of the prediction on, where it has one. The port `weights` shows an\n\
          equal one for each of several."
     };
@@ -26,26 +26,28 @@ macro_rules! reasons {
 
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
-/// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the usual error:
-/// `g_t = max(0, φ g_{t−1} ± (x_t − x̄_t) − δ)`, and an alarm where `g_t` is above `λ` (Page 1954; Hinkley 1971); `x̄_t` is the mean
-/// since the test began. After an alarm it begins anew. The usual error is the root mean
-/// square of all that have been taken, the present one among them; one that is larger than five times that counts as five
-/// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves. Among the `first`
-/// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this. All exactly 0, as of a machine
-/// that stands still, they say nothing of those to come and are passed over. Where more than half of the newest, as many as `first`
-/// and at most 100, are larger than five times the usual error, what was usual is no more: they tell anew what is, and the test
-/// begins anew. Of sizes that is an alarm; of errors with a sign it takes a quarter of those on either side, since more on one
-/// are a bias, which the test tells.
+/// The series `x_t` is the error, truth minus prediction, of each truth that the embargo lets through, in multiples
+/// of the usual error. It makes `g_t = max(0, φ g_{t−1} ± (x_t − x̄_t) − δ)`, and an alarm where `g_t` is above `λ`
+/// (Page 1954; Hinkley 1971). `x̄_t` is the mean since the test began. After an alarm it begins anew. The usual error
+/// is the root mean square of all that have been taken, the present one among them. One that is larger than five
+/// times that counts as five (Huber 1981). So neither a glitch nor the minutes after a change of set point are an
+/// alarm by themselves. Among the `first` errors, at most 100, 1.4826 times the median of their sizes stands for the
+/// usual error in this. All exactly 0, as of a machine that stands still, they say nothing of those to come and are
+/// passed over. Of the newest errors, as many as `first` and at most 100, more than half may be larger than five
+/// times the usual error. Then what was usual is no more: they say anew what is, and the test begins anew. Of sizes
+/// that is an alarm. Of errors with a sign it takes a quarter of those on either side, since more on one are a bias,
+/// which the test reports.
 ///
-/// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in no fewer with a
-/// `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much
-/// room: a bias as large as the usual error is found in some hours, one of half that size hardly ever.
+/// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in
+/// no fewer with a `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see
+/// `every`, and the defaults leave much room. A bias as large as the usual error is found in some hours, one of half
+/// that size hardly ever.
 ///
-/// What is usual goes on being learned, the course of a day too, so that a change that comes soon after the start, or after an alarm,
-/// is taken for usual. The mean takes a bias `b` in as it grows: of `n` truths before it `g` comes to no more than
-/// `n (b ln(b/δ) − b + δ)`, and less as the usual error grows with it. With the defaults a bias as large as the usual error is found
-/// from a day of truths on, one of 2.5 times that from half a day on. Where it matters sooner, `adwin` compares the truths with
-/// each other and tells more of them.
+/// What is usual goes on being learned, the course of a day too. So a change that comes soon after the start, or
+/// after an alarm, is taken for usual. The mean takes a bias `b` in as it grows. Of `n` truths before it `g` comes to
+/// no more than `n (b ln(b/δ) − b + δ)`, and less as the usual error grows with it. With the defaults a bias as large
+/// as the usual error is found from a day of truths on, one of 2.5 times that from half a day on. Where it matters
+/// sooner, `adwin` compares the truths with each other and tells more of them.
 ///
 #[doc = reasons!()]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -81,12 +83,14 @@ pub struct PageHinkley {
 
 /// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
 ///
-/// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
-/// root mean square of all that have been taken, of which one larger than five times that counts as five (among the `first`, at
-/// most 100, five times 1.4826 times the median of their sizes), and which begins anew where errors are none at first or unusual
-/// for long, as in `page_hinkley`. There is an alarm, and the window begins anew, where it has two
-/// sides with means that are farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m = 1/(n₁ − s + 1) + 1/(n₂ − s + 1)`
-/// of the sides' lengths with `s` for `shortest` (Bifet and Gavaldà 2007, ADWIN2, where `s` is 1; with the others as river has it). It takes the errors for independent; those of truths that overlap are not, so let it take
+/// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual
+/// error. That is the root mean square of all that have been taken, where one larger than five times that counts as
+/// five. Among the `first`, at most 100, it counts as five times 1.4826 times the median of their sizes. The usual
+/// error begins anew where errors are none at first or unusual for long, as in `page_hinkley`. There is an alarm, and
+/// the window begins anew, where its two sides have means that are farther apart than chance allows:
+/// `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`. Here `1/m = 1/(n₁ − s + 1) + 1/(n₂ − s + 1)` of the
+/// sides' lengths, with `s` for `shortest`. That is ADWIN2 of Bifet and Gavaldà (2007), where `s` is 1; with the
+/// others as river has it. It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
 #[doc = reasons!()]
@@ -196,35 +200,6 @@ impl PageHinkley {
     }
 }
 
-impl Combiner for PageHinkley {
-    fn inputs() -> &'static [InputPort] {
-        INPUTS
-    }
-
-    fn has_weights(&self) -> bool {
-        true
-    }
-
-    fn has_reason(&self) -> bool {
-        true
-    }
-
-    fn is_endless(&self) -> bool {
-        // What was seen last counts until a change is found.
-        true
-    }
-
-    fn build(&self, _voters: usize) -> Box<dyn Combine> {
-        let test = numerics::PageHinkley::new(self.options())
-            .expect("a graph with parameters out of range is not compiled");
-        Box::new(Watching::new(
-            self.watch, self.first, self.every, self.hold, test,
-        ))
-    }
-}
-
-athermal_core::register!(PageHinkley, Combiner, "page_hinkley");
-
 impl Adwin {
     fn options(&self) -> AdwinOptions {
         AdwinOptions {
@@ -236,34 +211,42 @@ impl Adwin {
     }
 }
 
-impl Combiner for Adwin {
-    fn inputs() -> &'static [InputPort] {
-        INPUTS
-    }
+/// Both watch errors alike; they differ in what finds a change.
+macro_rules! watches {
+    ($node:ident, $kind:literal) => {
+        impl Combiner for $node {
+            fn inputs() -> &'static [InputPort] {
+                INPUTS
+            }
 
-    fn has_weights(&self) -> bool {
-        true
-    }
+            fn has_weights(&self) -> bool {
+                true
+            }
 
-    fn has_reason(&self) -> bool {
-        true
-    }
+            fn has_reason(&self) -> bool {
+                true
+            }
 
-    fn is_endless(&self) -> bool {
-        // What was seen last counts until a change is found.
-        true
-    }
+            fn is_endless(&self) -> bool {
+                // What was seen last counts until a change is found.
+                true
+            }
 
-    fn build(&self, _voters: usize) -> Box<dyn Combine> {
-        let window = numerics::Adwin::new(self.options())
-            .expect("a graph with parameters out of range is not compiled");
-        Box::new(Watching::new(
-            self.watch, self.first, self.every, self.hold, window,
-        ))
-    }
+            fn build(&self, _voters: usize) -> Box<dyn Combine> {
+                let detector = numerics::$node::new(self.options())
+                    .expect("a graph with parameters out of range is not compiled");
+                Box::new(Watching::new(
+                    self.watch, self.first, self.every, self.hold, detector,
+                ))
+            }
+        }
+
+        athermal_core::register!($node, Combiner, $kind);
+    };
 }
 
-athermal_core::register!(Adwin, Combiner, "adwin");
+watches!(PageHinkley, "page_hinkley");
+watches!(Adwin, "adwin");
 
 /// What tells whether the mean of a series has changed.
 trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeOwned + 'static {

@@ -21,19 +21,22 @@ use crate::stability::StabilityState;
 /// are cut, those below `deadband` are taken as none. The integral stops at `± range` and leaves it at once when the rate turns
 /// (no windup). What is put out follows the integral by at most `max_slew`.
 ///
-/// A slope over a trailing window tells the rate in the middle of it, so the prediction should look ahead by half
-/// the span of the truth; other horizons are warned of (Mandelli, Dankwart and Napoli integrate without, which lags by half a window).
+/// A slope over a trailing window is the rate in the middle of it. So the prediction should look ahead by half the
+/// span of the truth; other horizons are warned of. (Mandelli, Dankwart and Napoli integrate without, which lags by
+/// half a window.)
 ///
 /// The correction stops in the states named by `stop_in` of a `stability` node, and where the predicted rate stays
-/// below `stop.below` until it exceeds `stop.above`. A fresh value of `realigned` other than 0 says that the machine has measured and
-/// removed the drift itself: the correction starts again from 0 at once, which is no motion but a new reference. When the graph is
-/// replaced, the correction goes on from where it stands, whatever predicts the rate then.
+/// below `stop.below` until it exceeds `stop.above`. A fresh value of `realigned` other than 0 says that the machine
+/// has measured and removed the drift itself. The correction then starts again from 0 at once, which is no motion but
+/// a new reference. When the graph is replaced, the correction goes on from where it stands, whatever predicts the
+/// rate then.
 ///
-/// A correction moves the positions that are measured. What predicts the rate and goes by past positions, with lags, by votes or as it
-/// learns, must not take that for drift: an `uncorrected` node between position and drift puts it back.
+/// A correction moves the positions that are measured. A predictor of the rate that goes by past positions, with
+/// lags, by votes or as it learns, must not take that for drift. An `uncorrected` node between position and drift
+/// puts it back.
 ///
-/// The port `why` says what held it back: 0 nothing, 1 no valid prediction, 2 stable, 3 below the deadband, 4 rate cut,
-/// 5 at the end of the range, 6 slewing. Runs at every tick.
+/// The port `why` says what held it back: 0 nothing, 1 no valid prediction, 2 stable, 3 below the deadband. 4 is a
+/// rate that was cut, 5 the end of the range, 6 slewing. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compensate {

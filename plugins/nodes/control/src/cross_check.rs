@@ -4,7 +4,7 @@ use athermal_core::channel::ABSENT;
 use athermal_core::diagnostic::counted;
 use athermal_core::node::{
     Duty, Encoder, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
-    PortSummary, Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError,
+    Pace, PortSummary, Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
 use athermal_core::time::{Duration, Instant};
@@ -16,18 +16,28 @@ use crate::limit;
 
 /// Learns in the fit how sensors go together, and lets through only those that still do.
 ///
-/// A sensor that comes loose, ages, is moved or swapped for another reads what is possible, and what the others do not. Its channel is
+/// A sensor that comes loose, or is moved or swapped while it reads, gives what is possible, and what the others do not. Its channel is
 /// then absent, as that of a sensor that is dead, and estimators on other sensors go on. The port `reason` says why: 0 it agrees,
 /// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass.
 ///
-/// The fit keeps the covariance of all channels, now and `lag` ago, at the instants of the truth, whatever that is. Of a row it is
-/// looked at what lies in directions that the fit hardly took, and in which sensor that is: the one without which nothing of it is left
-/// (the contribution by reconstruction of Alcala and Qin 2009). Where it is more than `limit` times what is usual in the fit, for as
-/// long as `after`, and falls below that without the sensor, the sensor contradicts the others. Where two are wrong at once, or the
-/// machine itself has changed so that no sensor alone explains it, none is named; a fast machine moves all that hang together.
+/// `d = zᵀMz` with `M = 10⁻⁶ (ZᵀZ / n + 10⁻⁶ I)⁻¹`, over its 99.9 % quantile in the fit, is compared with `limit`. `z`
+/// are the standardised channels, now and `lag` ago, and `Z` those of the `n` rows of the fit, at the instants of the
+/// truth, whatever that is. Of each row it takes the part in directions that the fit hardly took. It finds the sensor
+/// without which nothing of that part is left (the contribution by reconstruction of Alcala and Qin 2009). Where it is
+/// more than `limit` times what is usual in the fit, for as long as `after`, and falls below that without the sensor,
+/// the sensor contradicts the others. Where two are wrong at once, or the machine itself has changed so that no sensor
+/// alone explains it, none is named; a fast machine moves all that hang together.
 ///
-/// Sensors are told apart only as far as others know of them: of two that see nothing in common, neither contradicts the other. The
-/// rows of the fit must reach over 30 times `lag`, 5 hours, or nothing is learned.
+/// A load that the fit never saw makes the sensor nearest to its heat contradict the others too, and that sensor is right. Heat comes
+/// and goes slowly; a sensor that comes off leaps, and in air it is restless. So a tenth of a contradiction has to be sudden:
+/// `m s² ≥ d / 10`, with `s² = Σ (x - 2x₁ + x₂)²` over its standardised samples, faded over `lag`, and `m` its own element of `M`.
+/// What contradicts the others slowly, or from the first sample on, passes, and so does a sensor with less than a sample each `lag`.
+///
+/// One sensor is left out at a time, and only while half of all channels stay, since others have to go on. It is given back when it
+/// agrees again, and after `longest` in any case.
+///
+/// A sensor can be named only as far as others know of it: of two that see nothing in common, neither contradicts the
+/// other. The rows of the fit must reach over 30 times `lag`, 5 hours, or nothing is learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrossCheck {
@@ -35,8 +45,8 @@ pub struct CrossCheck {
     #[serde(default = "ten_minutes")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub lag: Duration,
-    /// How many times as far apart as is usual in the fit, 1 or more: the square of a distance, of which one row of a thousand has more
-    /// than 1.
+    /// How many times as far apart as is usual in the fit, 1 or more. It is the square of a distance, of which one row of a thousand
+    /// has more than 1.
     #[serde(default = "six")]
     #[schemars(range(min = 1.0))]
     pub limit: f64,
@@ -46,6 +56,10 @@ pub struct CrossCheck {
     /// For how long it must have agreed with them again. Below `lag` its past may still contradict.
     #[serde(default = "ten_minutes")]
     pub recover: Duration,
+    /// For how long a sensor is left out at most. After that it is left out anew only where it leaps again.
+    #[serde(default = "day")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub longest: Duration,
 }
 
 fn ten_minutes() -> Duration {
@@ -56,12 +70,19 @@ fn minute() -> Duration {
     Duration::from_ns(60_000_000_000)
 }
 
+fn day() -> Duration {
+    Duration::from_ns(86_400_000_000_000)
+}
+
 fn six() -> f64 {
     6.0
 }
 
 /// So many times the lag the rows of a fit must reach over.
 const LEAST_LAGS: i64 = 30;
+
+/// A contradiction is no heat where what was sudden, so many times, has as much in it.
+const SUDDEN: f64 = 10.0;
 
 /// The numbers of the port `reason`.
 mod reason {
@@ -73,7 +94,7 @@ mod reason {
 
 impl Feature for CrossCheck {
     fn facts() -> KindFacts {
-        KindFacts::of(Duty::Compare)
+        KindFacts::of(Duty::Compare).pace(Pace::Passes)
     }
 
     fn inputs() -> &'static [InputPort] {
@@ -273,22 +294,14 @@ impl Known {
         }
     }
 
-    /// How far values are apart without some of the channels.
-    fn apart(&mut self, values: &[f64], is_out: impl Fn(usize) -> bool) -> f64 {
-        let count = self.columns.len();
-        let column = |nth: usize| {
-            let place = self.places[nth];
-            if is_out(place % count) {
-                f64::NAN
-            } else {
-                values[place]
-            }
-        };
+    /// How far values are apart.
+    fn apart(&mut self, values: &[f64]) -> f64 {
+        let column = |nth: usize| values[self.places[nth]];
         self.agreement.apart(column, &mut self.look)
     }
 
-    /// The channel that alone makes values that are so far apart be so, by a limit.
-    fn alone(&self, apart: f64, limit: f64) -> Option<usize> {
+    /// The channel that alone, and suddenly, makes values that are so far apart be so, by a limit.
+    fn alone(&self, apart: f64, limit: f64, sensors: &[Sensor]) -> Option<usize> {
         let share = |columns: Option<_>| {
             columns.map_or(0.0, |columns| self.agreement.share(columns, &self.look))
         };
@@ -299,7 +312,9 @@ impl Known {
             .enumerate();
         let (most, share) =
             shares.reduce(|most, next| if next.1 > most.1 { next } else { most })?;
-        (apart > limit && apart - share <= limit).then_some(most)
+        let (first, _) = self.columns[most]?;
+        let sudden = (self.agreement).share_of_one(first, sensors[most].sudden, &self.look);
+        (apart > limit && apart - share <= limit && SUDDEN * sudden >= share).then_some(most)
     }
 }
 
@@ -316,17 +331,48 @@ struct Checking {
 struct Sensor {
     /// The stamp of the last sample that was looked at.
     last: Option<Instant>,
+    /// Its value, and how much more that was than the one before.
+    value: f64,
+    change: f64,
+    /// The sum of the squares of what its changes differed by, which fades.
+    sudden: f64,
     /// Since when it has been the one that contradicts the others.
     since: Option<Instant>,
-    is_out: bool,
+    /// Since when it has been left out.
+    out: Option<Instant>,
     /// Whether its last value was let through.
     passes: bool,
     /// Since when it agrees, after it did not.
     agrees_since: Option<Instant>,
+    /// Whether it has a new sample at this tick.
+    #[serde(skip)]
+    is_new: bool,
+}
+
+impl Sensor {
+    /// Takes what it reads at a tick.
+    fn read(&mut self, value: f64, stamp: Instant, lag: Duration) {
+        self.is_new = !value.is_nan() && self.last.is_none_or(|last| last < stamp);
+        if !self.is_new {
+            return;
+        }
+        match self.last.replace(stamp) {
+            Some(last) if stamp - last <= lag => {
+                let change = value - self.value;
+                let jump = change - self.change;
+                let (lag, gone) = (lag.secs(), (stamp - last).secs());
+                self.sudden = self.sudden * (lag / (lag + gone)) + jump * jump;
+                self.change = change;
+            }
+            // Over a hole heat may have moved it as far as it likes.
+            _ => (self.change, self.sudden) = (0.0, 0.0),
+        }
+        self.value = value;
+    }
 }
 
 impl Checking {
-    /// Finds which sensors contradict the others at a tick.
+    /// Finds which sensor contradicts the others at a tick.
     fn judge(&mut self, values: &[f64], now: Instant) {
         let Self {
             spec,
@@ -335,25 +381,33 @@ impl Checking {
             ..
         } = self;
         let Some(known) = learned else { return };
-        let apart = known.apart(values, |channel| sensors[channel].is_out);
-        let suspect = known.alone(apart, spec.limit);
+        let apart = known.apart(values);
+        if let Some(nth) = sensors.iter().position(|sensor| sensor.out.is_some()) {
+            let sensor = &mut sensors[nth];
+            let agrees = if values[nth].is_nan() {
+                false
+            } else if apart > spec.limit {
+                sensor.agrees_since = None;
+                false
+            } else {
+                now - *sensor.agrees_since.get_or_insert(now) >= spec.recover
+            };
+            if agrees || sensor.out.is_some_and(|at| now - at >= spec.longest) {
+                (sensor.out, sensor.agrees_since) = (None, None);
+            }
+            return;
+        }
+        let count = sensors.len();
+        let there = values[..count].iter().filter(|value| !value.is_nan());
+        // Half of all have to stay without it.
+        let suspect = (2 * there.count() >= count + 2)
+            .then(|| known.alone(apart, spec.limit, sensors))
+            .flatten();
         for (nth, sensor) in sensors.iter_mut().enumerate() {
             if suspect != Some(nth) {
                 sensor.since = None;
             } else if now - *sensor.since.get_or_insert(now) >= spec.after {
-                (sensor.is_out, sensor.since) = (true, None);
-            }
-        }
-        for nth in 0..sensors.len() {
-            if !sensors[nth].is_out || values[nth].is_nan() {
-                continue;
-            }
-            let apart = known.apart(values, |channel| channel != nth && sensors[channel].is_out);
-            let sensor = &mut sensors[nth];
-            if apart > spec.limit {
-                sensor.agrees_since = None;
-            } else if now - *sensor.agrees_since.get_or_insert(now) >= spec.recover {
-                (sensor.is_out, sensor.agrees_since) = (false, None);
+                (sensor.out, sensor.since) = (Some(now), None);
             }
         }
     }
@@ -365,25 +419,24 @@ impl Operator for Checking {
             return;
         }
         let (values, stamps) = (tick.port(0), tick.stamps(0));
+        for (nth, sensor) in self.sensors.iter_mut().enumerate() {
+            sensor.read(values[nth], stamps[nth], self.spec.lag);
+        }
         self.judge(values, tick.now);
         let count = self.sensors.len();
         for (nth, sensor) in self.sensors.iter_mut().enumerate() {
-            let is_new = !values[nth].is_nan() && sensor.last.is_none_or(|last| last < stamps[nth]);
-            let passes = !values[nth].is_nan() && !sensor.is_out;
-            if is_new {
-                sensor.last = Some(stamps[nth]);
-            }
-            if passes && is_new {
+            let passes = !values[nth].is_nan() && sensor.out.is_none();
+            if passes && sensor.is_new {
                 outputs.set_stamped(nth, values[nth], stamps[nth]);
             } else if !passes && sensor.passes {
                 outputs.set_stamped(nth, ABSENT, tick.now);
             }
             sensor.passes = passes;
-            let reason = match (&self.learned, sensor.is_out, sensor.agrees_since) {
+            let reason = match (&self.learned, sensor.out, sensor.agrees_since) {
                 (None, ..) => reason::UNKNOWN,
-                (_, false, _) => reason::AGREES,
-                (_, true, None) => reason::CONTRADICTS,
-                (_, true, Some(_)) => reason::RECOVERING,
+                (_, None, _) => reason::AGREES,
+                (_, Some(_), None) => reason::CONTRADICTS,
+                (_, Some(_), Some(_)) => reason::RECOVERING,
             };
             outputs.set_stamped(count + nth, reason, tick.now);
         }
@@ -416,6 +469,9 @@ struct Checked {
     sensors: Vec<Sensor>,
 }
 
-athermal_core::state!(Checked, "cross_check/1");
+athermal_core::state!(Checked, "cross_check/2");
 
 athermal_core::register!(CrossCheck, Feature, "cross_check");
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, Pace,
     PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
@@ -15,10 +15,10 @@ use crate::limit;
 
 /// Watches each channel and lets only trustworthy samples through.
 ///
-/// A faulty channel is absent, and the port `reason` says why: 0 healthy, 1 out of range, 2 changes too fast, 3 stuck, 4 too
-/// little noise, 5 too much noise, 6 silent, 7 recovering. After a fault a channel must have been in order for
+/// A faulty channel is absent, and the port `reason` says why: 0 healthy, 1 out of range, 2 changes too fast, 3 stuck.
+/// 4 is too little noise, 5 too much noise, 6 silent, 7 recovering. After a fault a channel must have been in order for
 /// `recover` before its samples pass again. Only the checks that are given are made. The noise is that of single
-/// samples, `sqrt(mean of squared successive differences / 2)` (von Neumann 1941), over the last `noise_samples`.
+/// samples, `√(Σ (x_i − x_{i−1})² / 2n)` of their `n` differences (von Neumann 1941), over the last `noise_samples`.
 /// Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -151,7 +151,9 @@ impl Health {
 
 impl Feature for Health {
     fn facts() -> KindFacts {
-        KindFacts::of(Duty::Watch).reasons(&reason::WORDS)
+        KindFacts::of(Duty::Watch)
+            .reasons(&reason::WORDS)
+            .pace(Pace::Passes)
     }
 
     fn inputs() -> &'static [InputPort] {

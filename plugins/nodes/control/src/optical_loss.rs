@@ -15,11 +15,11 @@ use crate::limit;
 
 /// The optical loss that a drift brings about within a window, in dB.
 ///
-/// Gaussian beams of 1/e² radius `σ` that are `d` apart couple `exp(−2 d²/σ²)` of the light, so that over a window `Δt`
-/// drifts `v_n` cost `(20/ln 10) Σ_n (v_n Δt)²/σ_n²` decibels; `20/ln 10 = 8.68589`. (Mandelli, Dankwart and Napoli, section
-/// 5.3, print `log10(e) Σ −2/σ²`, ten times less and of the other sign; their coefficients 2.09059, 59.4658 and 133.798 min²/µm² mean
-/// radii of 10.19, 1.911 and 1.274 µm.) Without the drift of every axis there is no loss. The port `share` says what each
-/// axis adds.
+/// Gaussian beams of 1/e² radius `σ` that are `d` apart couple `exp(−2 d²/σ²)` of the light, so that over a window
+/// `Δt` drifts `v_n` cost `(20/ln 10) Σ_n (v_n Δt)²/σ_n²` decibels; `20/ln 10 = 8.68589`. (Mandelli, Dankwart and
+/// Napoli, section 5.3, print `log10(e) Σ −2/σ²`, ten times less and of the other sign. Their coefficients 2.09059,
+/// 59.4658 and 133.798 min²/µm² mean radii of 10.19, 1.911 and 1.274 µm.) Without the drift of every axis there is no
+/// loss. The port `share` says what each axis adds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OpticalLoss {

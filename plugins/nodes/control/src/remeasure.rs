@@ -15,16 +15,18 @@ use crate::limit;
 
 /// Asks for a measurement in time: `lead` before the uncertainty of what a correction has accumulated will exceed `tolerance`.
 ///
-/// A correction integrates a predicted rate, and with it the error of the prediction, whose standard deviation is the input `std_dev`. That error stays
-/// about the same for `memory` and is forgotten exponentially. Its integral since the last measurement then has the variance
-/// `2 σ² τ² (T/τ − 1 + exp(−T/τ))` (Uhlenbeck and Ornstein, "On the theory of the Brownian motion", 1930, eq. 15); here it is worked out
-/// from tick to tick, so that σ may change. The uncertainty is `sigmas` times the root of it. What is to come is worked out with σ as it is now.
+/// A correction integrates a predicted rate, and with it the error of the prediction, whose standard deviation is the
+/// input `std_dev`. That error stays about the same for `memory` and is forgotten exponentially. Its integral since the
+/// last measurement then has the variance `s² = 2 σ² τ² (T/τ − 1 + exp(−T/τ))` (Uhlenbeck and Ornstein, "On the theory
+/// of the Brownian motion", 1930, eq. 15); here it is worked out from tick to tick, so that σ may change. The
+/// uncertainty is `sigmas` times the root of it. What is to come is worked out with σ as it is now.
 ///
-/// The port `ask` is 1 where a measurement is asked for, and stays so until a fresh value of `measured` comes; without that input a
-/// measurement counts as made at the tick at which it is asked for. None is asked for sooner than `least` after the last, and one at
-/// the latest `longest` after it. Where `std_dev` is absent, was since the last measurement, before there was one, or over a minute without a tick, the uncertainty is
-/// not known, and a measurement is asked for. The port `due` says in how many minutes the next one is due; `why` says why it is: 0 it
-/// is not, 1 the tolerance, 2 the longest interval, 3 the uncertainty is not known. Runs at every tick.
+/// The port `ask` is 1 where a measurement is asked for, and stays so until a fresh value of `measured` comes.
+/// Without that input a measurement counts as made at the tick at which it is asked for. None is asked for sooner
+/// than `least` after the last, and one at the latest `longest` after it. The uncertainty is not known before the
+/// first measurement, where `std_dev` is absent or was since the last one, and over a minute without a tick. Then a
+/// measurement is asked for. The port `due` says in how many minutes the next one is due. The port `why` says why it
+/// is: 0 it is not, 1 the tolerance, 2 the longest interval, 3 the uncertainty is not known. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Remeasure {

@@ -15,11 +15,13 @@ use crate::limit;
 
 /// Passes a signal on while it can be trusted, and otherwise puts out a stated safe value.
 ///
-/// A signal is not trusted where it is absent or too old, or where the input `distrust` is other than 0 (such as the
-/// reasons of a `health` node). For up to `after` ticks the last value is kept; then the output goes to `when_lost`: `hold`, `zero`
-/// or a stated value, by at most `max_slew`, and comes back by the same when trust returns. It always has a value; before the first trusted one it is the
-/// value of `when_lost`, or 0. The port `why` says: 0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on
-/// the way back. When the graph is replaced, it goes on from what it put out. Runs at every tick.
+/// `y = x` while it is trusted, else `y(t) = y(t') ± max_slew · (t − t')` on its way to the safe value. A signal is not
+/// trusted where it is absent or too old, or where the input `distrust` is other than 0 (such as the reasons of a
+/// `health` node). For up to `after` ticks the last value is kept. Then the output goes to `when_lost`, by at most
+/// `max_slew`: `hold`, `zero` or a stated value. It comes back by the same when trust returns. It always has a value;
+/// before the first trusted one it is the value of `when_lost`, or 0. The port `why` says: 0 trusted, 1 absent, 2
+/// distrusted, 3 and 4 the same and past `after`, 5 on the way back. When the graph is replaced, it goes on from what
+/// it put out. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SafeState {
@@ -34,7 +36,7 @@ pub struct SafeState {
     /// The fastest way there and back, such as `"50 nm/s"`.
     #[schemars(extend("minimum" = 0))]
     pub max_slew: Quantity,
-    /// The longest time between two ticks that counts for that way: after a longer pause the output goes on from where it is and
+    /// The longest time between two ticks that counts for that way. After a longer pause the output goes on from where it is and
     /// does not make up for the pause at once.
     #[serde(default = "limit::minute")]
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -15,11 +15,12 @@ use crate::limit;
 
 /// The settle time: from a change of the set point to the start of the first ten minutes that are stable throughout.
 ///
-/// Stable is what lies below `below`, usually the optical loss over five minutes below 0.2 dB. The set point may be a
-/// measured temperature: a change is a departure by more than `change` from where it stood at the change before, and what
-/// it does within `same_change` of that belongs to it. A value of the loss counts until the next. `settle_time` is given once the machine has been stable for
-/// `for`; `since` is the time since a change that has not settled yet, and 0 when it has. A pause longer than
-/// `max_gap` between two values of the loss is no stable time. Runs at every tick.
+/// `settle_time = t₁ − t₀`, with `t₀` the change and `t₁` the start. Stable is what lies below `below`, usually the
+/// optical loss over five minutes below 0.2 dB. The set point may be a measured temperature. A change is a departure by
+/// more than `change` from where it stood at the change before. What it does within `same_change` of that belongs to
+/// it. A value of the loss counts until the next. `settle_time` is given once the machine has been stable for `for`;
+/// `since` is the time since a change that has not settled yet, and 0 when it has. A pause longer than `max_gap`
+/// between two values of the loss is no stable time. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settled {

@@ -15,10 +15,10 @@ use crate::limit;
 
 /// The stability of each axis: 0 stable, 1 quasi-stable, 2 transient.
 ///
-/// By the absolute drift, stable below `stable_below` and transient from `transient_above` on (30 and 80 nm/min in
-/// Mandelli, Dankwart and Napoli, section 3.4). To come back to a calmer state the drift must fall `hysteresis` below the
-/// limit, and any change of state must have lasted for `dwell`. The port `worst` gives the least stable of all axes.
-/// Without a drift there is no state. Runs at every tick.
+/// Of a drift `v` it is 0 where `|v| < stable_below`, 2 where `|v| ≥ transient_above`, else 1 (30 and 80 nm/min in
+/// Mandelli, Dankwart and Napoli, section 3.4). To come back to a calmer state the drift must fall `hysteresis` below
+/// the limit, and any change of state must have lasted for `dwell`. The port `worst` gives the least stable of all
+/// axes. Without a drift there is no state. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stability {

@@ -9,29 +9,31 @@ use crate::order::Order;
 keys! {
     /// ARMAX whose noise may be integrated: it then has no level to return to, so that an offset that comes to stay is followed.
     ///
-    /// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section
-    /// 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton
-    /// steps, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit
-    /// circle.
+    /// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999,
+    /// section 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by
+    /// damped Gauss–Newton steps, starting where Hannan and Rissanen (1982) end on the differences. Roots of `A` and
+    /// `C` stay inside the unit circle.
     ///
-    /// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is decided
-    /// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 choose the order), unless
-    /// `differences` says so: without any it is ARMAX, and an offset that the rows of the fit did not have stays an error.
+    /// Noise that has a level is not integrated: its differences are more noise than it is. Unless `differences` says
+    /// which of the two there is, an information criterion decides, from one-step predictions of the same rows (as
+    /// Hyndman and Khandakar 2008 choose the order). Without any it is ARMAX, and an offset that the rows of the fit
+    /// did not have stays an error.
     ///
-    /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
-    /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
-    /// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-    /// series counts as so many steps, rounded; missing ones are estimated from the truths that follow too,
-    /// as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the embargo lets through and
-    /// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
-    /// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
-    /// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
-    /// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that and
-    /// the features had always been what they are, and so does, in the fit too, what comes after more steps without
-    /// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
-    /// port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that are missing.
-    /// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Since the
-    /// answer changes with time alone, the node runs at every tick.
+    /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by
+    /// default the span of the truth, since truths whose windows overlap share their noise. Where several come within
+    /// a step, each begins a series of its own. All series are fitted together and followed side by side. The time
+    /// between two truths of a series counts as so many steps, rounded. Missing ones are estimated from the truths
+    /// that follow too, as in a Kalman filter of the model (Jones 1980). Running, it takes each truth that the
+    /// embargo lets through and predicts as many steps ahead of the newest as there are. Where truths are missing in
+    /// the fit, or outside of its limits, the model is followed through them in the same way. From where as many
+    /// truths a step apart are known as the model looks back on, errors count in their variance, as the likelihood
+    /// has it. Where truths regularly come less often than that, `every` must be as long as they are apart. A segment
+    /// begins with its first truth, as if that and the features had always been what they are. So does, in the fit
+    /// too, what comes after more steps without features than ten, or than the model reaches back where that is more.
+    /// With `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the truth about its
+    /// prediction, larger after truths that are missing. Features that are missing are taken for the last ones, and
+    /// what that adds to the error is not in it. Since the answer changes with time alone, the node runs at every
+    /// tick.
     ///
     /// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
     pub struct Arimax {

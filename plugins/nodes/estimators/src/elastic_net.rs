@@ -21,11 +21,11 @@ use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
-/// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w`, the intercept free, with features
-/// and truth standardised (Zou and Hastie 2005; exactly, by an active set as in Osborne, Presnell and Turlach 2000), so that `α`
-/// means the same in all units; `ρ = l1_ratio`. Of features
-/// that hang together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against
-/// the *mean* of squares, that of ridge against their sum.
+/// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w`, the intercept free, with
+/// `ρ = l1_ratio` (Zou and Hastie 2005). It is solved exactly, by an active set as in Osborne, Presnell and Turlach
+/// (2000). Features and truth are standardised, so that `α` means the same in all units. Of features that hang
+/// together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against the
+/// *mean* of squares, that of ridge against their sum.
 ///
 /// The port `novelty` shows how far the features are outside of those of the fit, as that of `linear` does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

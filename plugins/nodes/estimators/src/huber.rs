@@ -23,14 +23,14 @@ use crate::unsolved::unsolved;
 ///
 /// The port `novelty` shows how far the features are outside of those of the fit, as that of `linear` does.
 ///
-/// A fit tells how many rows are outliers: those with errors beyond three standard deviations, which are 1.4826 times the median of
-/// the sizes of the errors (Hampel 1974); of normal errors 0.3 %.
+/// A fit reports how many rows are outliers: those with errors beyond three standard deviations, 0.3 % of
+/// normal errors. A standard deviation is 1.4826 times the median of the sizes of the errors (Hampel 1974).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Huber {
     /// From how many scales on an error counts by its size, 1 or more. The scale is below the standard deviation, of normal errors 0.68
     /// of it at 1.35: 36 % of them count by their size, which costs 11 % of the precision. At 1.6 it is 18 % and 5 %.
-    /// Towards 1 the scale falls to that of the smallest errors, so that all others count by their size: these are the least absolute
+    /// Towards 1 the scale falls to that of the smallest errors, so that all others count by their size. These are the least absolute
     /// deviations, and the scale says nothing of the errors any more.
     #[serde(default = "usual")]
     #[schemars(range(min = 1.0))]

@@ -66,7 +66,7 @@ pub use polynomial::{Polynomial, PolynomialPredictor};
 pub use pooling::{PoolErrors, PoolFit, Pooling, Watch};
 pub use prior::{EstimatorPrior, Prior, PriorNoise, PriorRegressor};
 pub use regression::LinearPredictor;
-pub use rls::{Forgetting, Rls};
+pub use rls::Rls;
 pub use selection::{By, CrossValidated, Selection};
 pub use solver::Solver;
 pub use stack::Stack;

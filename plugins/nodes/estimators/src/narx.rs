@@ -22,11 +22,12 @@ const MOST_TERMS: usize = 500;
 keys! {
     /// Nonlinear autoregression with exogenous inputs: a polynomial in features and the truth's own past.
     ///
-    /// `ŷ(t + ahead) = ȳ + Σ θ_k p_k(z)` with products `p_k` of up to `degree` of the variables `z`: the features and the past
-    /// truths, each about its mean in the rows of the fit and in units of its deviation there (Chen and Billings 1989). The constant
-    /// and all products, 499 at most, are candidates. Forward regression takes, one after the other, the one that explains most of
-    /// what is left of the truth; its share of the truth's squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo
-    /// 1989), which the fit prints and keeps for every term. Coefficients are least squares.
+    /// `ŷ(t + ahead) = ȳ + Σ θ_k p_k(z)` with products `p_k` of up to `degree` of the variables `z` (Chen and
+    /// Billings 1989). These are the features and the past truths, each about its mean in the rows of the fit and in
+    /// units of its deviation there. The constant and all products, 499 at most, are candidates. Forward regression
+    /// takes, one after the other, the one that explains most of what is left of the truth. Its share of the truth's
+    /// squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo 1989), which the fit prints
+    /// and keeps for every term. Coefficients are least squares.
     ///
     /// Outside the range of the fit powers grow without bound: there a variable counts in products as at the edge of the range,
     /// and alone as it is. The port `novelty` shows where that is: that of `linear`, of the terms as they are without an edge. A fit whose

@@ -38,15 +38,13 @@ pub(crate) fn novelty_at(novelty: Option<&Novelty>, row: &[f64]) -> f64 {
     novelty.map_or(f64::NAN, |novelty| novelty.at(row))
 }
 
-/// How far a row is outside of what is known after learning went on: of what lies beyond the edge of the fit, the share that is still
-/// as unsure, `1 + (ν − 1) √(v / v₀)`, with the variance `v` that the coefficients bring into the prediction, and `v₀` that of the
-/// fit. It is never more than of the fit.
+/// How far a row is outside of what is known after learning went on: of what lies beyond the edge of the fit, as much as its variance
+/// has become, `1 + (ν − 1) √(v / v₀)`, with the variance `v` that the coefficients bring into the prediction, and `v₀` that of the fit.
 pub(crate) fn after_learning(novelty: f64, variances: impl FnOnce() -> [f64; 2]) -> f64 {
     if novelty > 1.0 {
         let [now, of_fit] = variances();
         let share = (now / of_fit).sqrt();
-        // Written so that NaN fails.
-        if share < 1.0 {
+        if share.is_finite() {
             return 1.0 + (novelty - 1.0) * share;
         }
     }
@@ -62,13 +60,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_been_learned_beyond_the_edge_is_no_longer_new_and_what_has_been_forgotten_no_newer()
-    {
+    fn what_has_been_learned_beyond_the_edge_is_no_longer_new_and_what_has_been_forgotten_newer() {
         let after = |novelty: f64, now: f64| after_learning(novelty, || [now, 4.0]);
         assert_eq!(after(3.0, 4.0), 3.0);
         assert_eq!(after(3.0, 1.0), 2.0);
         assert_eq!(after(3.0, 0.0), 1.0);
-        assert_eq!(after(3.0, 40.0), 3.0);
+        assert_eq!(after(3.0, 16.0), 5.0);
         assert_eq!(after(0.7, 0.0), 0.7);
         assert!(after(f64::NAN, 1.0).is_nan());
         assert_eq!(after_learning(3.0, || [0.0, 0.0]), 3.0);

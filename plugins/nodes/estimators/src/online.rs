@@ -4,8 +4,9 @@ use athermal_core::node::{
     Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };
 use athermal_core::node::{number, number_or_none, numbers};
-use athermal_core::time::Instant;
-use athermal_numerics::{Novelty, Rls, Sgd, Standardization};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{Learned, Novelty, Rls, Sgd, Standardization};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::novelty::{after_learning, novelty_at, novelty_mistakes};
@@ -14,8 +15,9 @@ use crate::scaling::scale_mistakes;
 /// A truth that misses by more than so many deviations is a leap of the constant: it would move all coefficients by more than a
 /// memory of a thousand rows has found out.
 const LEAP: f64 = 100.0;
-/// How large the variance of a leap is at most, in that of the noise: beyond, rounding would be more than noise.
-const WIDEST: f64 = 1e12;
+/// One that misses by more than so many deviations counts as if it missed by them (Huber 1964): an hour of wrong truths that are no
+/// outliers moves little.
+const MOST: f64 = 2.0;
 
 /// Regressors as the recursion sees them: standardised as in the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,9 +42,27 @@ pub(crate) enum Recursion {
     Rls {
         /// The recursion.
         rls: Rls,
-        /// The standard deviation of the noise, in the unit of the truth.
+        /// A truth says little whose `xᵀP₀x` is below.
         #[serde(with = "number")]
-        noise: f64,
+        little: f64,
+    },
+}
+
+/// What was learned, without the fit that it goes on from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Known {
+    Sgd(Sgd),
+    /// As a recursion before kept it that forgot to nothing; its form has no heir.
+    #[serde(skip_serializing)]
+    Rls(IgnoredAny),
+    LeastSquares {
+        /// The coefficients of the fit, by which it is known again.
+        #[serde(with = "numbers")]
+        of_fit: Vec<f64>,
+        learned: Learned,
+        /// When a truth came last.
+        last: Option<Instant>,
     },
 }
 
@@ -99,18 +119,28 @@ impl Frame {
 
     /// `s √(1 + zᵀPz)`: the noise, and what is not known of the coefficients; NaN where the recursion knows neither.
     fn std_dev(&self, recursion: &Recursion, regressors: &[f64]) -> f64 {
-        let Recursion::Rls { rls, noise } = recursion else {
+        let Recursion::Rls { rls, .. } = recursion else {
             return f64::NAN;
         };
-        noise * (1.0 + self.spread(rls, regressors)).sqrt()
+        (rls.variance() * (1.0 + self.spread(rls, regressors))).sqrt()
+    }
+
+    /// The value of a standardised regressor, and after them that of the constant.
+    fn value(&self, regressors: &[f64], i: usize) -> f64 {
+        match regressors.get(i) {
+            Some(x) => (x - self.means[i]) / self.scales[i],
+            None => 1.0,
+        }
     }
 
     /// `zᵀPz`: what is not known of the coefficients, in units of the noise.
     fn spread(&self, rls: &Rls, regressors: &[f64]) -> f64 {
-        rls.spread(|i| match regressors.get(i) {
-            Some(x) => (x - self.means[i]) / self.scales[i],
-            None => 1.0,
-        })
+        rls.spread(|i| self.value(regressors, i))
+    }
+
+    /// The same of the fit.
+    pub(crate) fn spread_of_fit(&self, rls: &Rls, regressors: &[f64]) -> f64 {
+        rls.spread_of_fit(|i| self.value(regressors, i))
     }
 
     /// What is predicted in the middle of the rows of the fit.
@@ -121,10 +151,10 @@ impl Frame {
     /// The standard errors of the intercept and of the coefficients on the scale of the data; none where the recursion knows
     /// nothing of them.
     fn errors(&self, recursion: &Recursion) -> Option<Vec<f64>> {
-        let Recursion::Rls { rls, noise } = recursion else {
+        let Recursion::Rls { rls, .. } = recursion else {
             return None;
         };
-        let width = self.scales.len();
+        let (width, noise) = (self.scales.len(), rls.variance().sqrt());
         let of_intercept = rls.spread(|i| {
             if i < width {
                 -self.means[i] / self.scales[i]
@@ -132,10 +162,9 @@ impl Frame {
                 1.0
             }
         });
-        let variances = rls.covariance().iter().step_by(width + 2);
-        let scaled = variances
-            .zip(&self.scales)
-            .map(|(variance, scale)| variance / (scale * scale));
+        let one = |nth: usize| rls.spread(|i| f64::from(u8::from(i == nth)));
+        let scaled = self.scales.iter().enumerate();
+        let scaled = scaled.map(|(nth, scale)| one(nth) / (scale * scale));
         let all = std::iter::once(of_intercept).chain(scaled);
         Some(all.map(|variance| noise * variance.sqrt()).collect())
     }
@@ -146,15 +175,9 @@ impl Recursion {
     fn mistakes(&self, width: usize) -> Vec<Mistake> {
         match self {
             Self::Sgd(sgd) => Mistake::of_lengths(width, &[("weights", sgd.weights().len())]),
-            Self::Rls { rls, noise } => {
+            Self::Rls { rls, .. } => {
                 let coefficients = [("coefficients", rls.coefficients().len())];
-                let mut mistakes = Mistake::of_lengths(width + 1, &coefficients);
-                // Not a number where rows were too few to tell.
-                if *noise < 0.0 || noise.is_infinite() {
-                    let message = format!("`noise` is {noise} and must be from 0 on");
-                    mistakes.push(Mistake::at("noise", message));
-                }
-                mistakes
+                Mistake::of_lengths(width + 1, &coefficients)
             }
         }
     }
@@ -263,19 +286,19 @@ impl Predictor for OnlinePredictor {
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {
-        let state = OnlineState {
+        let mut learner = OnlineLearner {
+            coefficients: self.coefficients.clone(),
+            intercept: self.intercept,
+            row: vec![1.0; self.coefficients.len() + 1],
             frame: self.frame.clone(),
             recursion: self.recursion.clone(),
-        };
-        let fit = OfFit {
             rmse: self.rmse,
             novelty: self.novelty.clone(),
-            rls: match &self.recursion {
-                Recursion::Rls { rls, .. } if self.novelty.is_some() => Some(rls.clone()),
-                _ => None,
-            },
+            leaps: true,
+            last: None,
         };
-        Some(Box::new(OnlineLearner::new(state, fit)))
+        learner.refresh();
+        Some(Box::new(learner))
     }
 
     fn trained_range(&self) -> Option<&TrainedRange> {
@@ -285,11 +308,11 @@ impl Predictor for OnlinePredictor {
 
 athermal_core::predictor!(OnlinePredictor, "online_linear");
 
-/// What has been learned: enough to go on, whatever the fit that it is carried to.
+/// What has been learned: enough to go on from a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct OnlineState {
     frame: Frame,
-    recursion: Recursion,
+    recursion: Known,
 }
 
 athermal_core::state!(OnlineState, "online_linear/1");
@@ -297,62 +320,47 @@ athermal_core::state!(OnlineState, "online_linear/1");
 /// A linear model that goes on learning.
 #[derive(Debug)]
 struct OnlineLearner {
-    state: OnlineState,
+    frame: Frame,
+    recursion: Recursion,
     /// The model of now, on the scale of the data.
     coefficients: Vec<f64>,
     intercept: f64,
     row: Vec<f64>,
-    fit: OfFit,
-}
-
-/// What a learner goes by that stays as the fit found it.
-#[derive(Debug)]
-struct OfFit {
+    /// What stays as the fit found it.
     rmse: Option<f64>,
     novelty: Option<Novelty>,
-    /// Where the recursion began, where there is a novelty.
-    rls: Option<Rls>,
+    /// Whether a truth can leap: a difference over a window has no origin that could be set anew.
+    leaps: bool,
+    /// When a truth was learned from or passed over last.
+    last: Option<Instant>,
 }
 
 impl OnlineLearner {
-    fn new(state: OnlineState, fit: OfFit) -> Self {
-        let width = state.frame.regressors.len();
-        let mut learner = Self {
-            coefficients: vec![0.0; width],
-            intercept: 0.0,
-            row: vec![1.0; width + 1],
-            fit,
-            state,
-        };
-        learner.refresh();
-        learner
-    }
-
-    /// Moves the constant alone where a truth misses by so much that it has leapt; whether it has.
-    fn leapt(&mut self, regressors: &[f64], truth: f64, at: Instant) -> bool {
-        let by = truth - self.predict(regressors, at);
-        let usual = match &self.state.recursion {
+    /// By how much a truth misses, and what is usual.
+    fn misses(&self, regressors: &[f64], truth: f64, at: Instant) -> (f64, f64) {
+        let usual = match &self.recursion {
             Recursion::Sgd(_) => self.usual_error(),
             Recursion::Rls { .. } => self.std_dev(regressors, at),
         };
+        (truth - self.predict(regressors, at), usual)
+    }
+
+    /// Moves the constant alone where a truth misses by so much that it has leapt; whether it has.
+    fn leapt(&mut self, width: usize, (by, usual): (f64, f64)) -> bool {
         // Written so that NaN fails.
-        let leapt = by.is_finite() && by.abs() > LEAP * usual && usual > 0.0;
+        let leapt = self.leaps && by.is_finite() && by.abs() > LEAP * usual && usual > 0.0;
         if leapt {
-            match &mut self.state.recursion {
+            match &mut self.recursion {
                 Recursion::Sgd(sgd) => sgd.shift(by),
-                Recursion::Rls { rls, noise } => {
-                    // Whether it stays there shows at the next truth.
-                    let variance = (by / *noise).powi(2).min(WIDEST);
-                    rls.shift(regressors.len(), by, variance);
-                }
+                // Whether it stays there shows at the next truths.
+                Recursion::Rls { rls, .. } => rls.shift(width, by),
             }
         }
         leapt
     }
 
     fn refresh(&mut self) {
-        let OnlineState { frame, recursion } = &self.state;
-        self.intercept = frame.unscaled(recursion, &mut self.coefficients);
+        self.intercept = self.frame.unscaled(&self.recursion, &mut self.coefficients);
     }
 }
 
@@ -366,75 +374,132 @@ impl Learner for OnlineLearner {
     }
 
     fn std_dev(&self, regressors: &[f64], _of: Instant) -> f64 {
-        let OnlineState { frame, recursion } = &self.state;
-        frame.std_dev(recursion, regressors)
+        self.frame.std_dev(&self.recursion, regressors)
     }
 
     fn novelty(&self, regressors: &[f64]) -> f64 {
-        let novelty = novelty_at(self.fit.novelty.as_ref(), regressors);
-        let OnlineState { frame, recursion } = &self.state;
-        match (recursion, &self.fit.rls) {
-            (Recursion::Rls { rls, .. }, Some(of_fit)) => after_learning(novelty, || {
-                [rls, of_fit].map(|rls| frame.spread(rls, regressors))
+        let novelty = novelty_at(self.novelty.as_ref(), regressors);
+        match &self.recursion {
+            Recursion::Rls { rls, .. } => after_learning(novelty, || {
+                let of_fit = self.frame.spread_of_fit(rls, regressors);
+                [self.frame.spread(rls, regressors), of_fit]
             }),
-            _ => novelty,
+            Recursion::Sgd(_) => novelty,
         }
     }
 
     fn centre(&self, _of: Instant) -> f64 {
-        self.state.frame.centre(&self.state.recursion)
+        self.frame.centre(&self.recursion)
     }
 
     fn usual_error(&self) -> f64 {
-        self.fit.rmse.unwrap_or(f64::NAN)
+        self.rmse.unwrap_or(f64::NAN)
+    }
+
+    fn set_window(&mut self, window: Duration) {
+        // A step of stochastic gradients has no other bound.
+        self.leaps = window == Duration::ZERO || matches!(self.recursion, Recursion::Sgd(_));
+    }
+
+    fn memory(&self) -> Option<Duration> {
+        match &self.recursion {
+            Recursion::Sgd(_) => None,
+            Recursion::Rls { rls, .. } => {
+                let longest = Duration::from_ns(i64::MAX);
+                Some(Duration::from_secs_f64(rls.fit().memory_s).unwrap_or(longest))
+            }
+        }
+    }
+
+    fn says_little(&self, regressors: &[f64]) -> bool {
+        match &self.recursion {
+            Recursion::Sgd(_) => false,
+            Recursion::Rls { rls, little } => self.frame.spread_of_fit(rls, regressors) < *little,
+        }
+    }
+
+    fn pass_over(&mut self, _regressors: &[f64], _truth: f64, at: Instant) {
+        self.last = Some(at);
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
-        if self.leapt(regressors, truth, at) {
+        let after_s = self.last.map_or(0.0, |last| (at - last).secs().max(0.0));
+        self.last = Some(at);
+        let (by, usual) = self.misses(regressors, truth, at);
+        if self.leapt(regressors.len(), (by, usual)) {
             return self.refresh();
         }
-        let OnlineState { frame, recursion } = &mut self.state;
-        frame.standardise(regressors, &mut self.row);
-        let truth = truth - frame.level;
-        match recursion {
+        self.frame.standardise(regressors, &mut self.row);
+        let truth = truth - self.frame.level;
+        match &mut self.recursion {
             Recursion::Sgd(sgd) => {
                 sgd.step(&self.row[..regressors.len()], truth);
             }
             Recursion::Rls { rls, .. } => {
-                rls.step(&self.row, truth);
+                let most = MOST * usual;
+                let truth = match by.abs() > most {
+                    true => truth - by + most.copysign(by),
+                    false => truth,
+                };
+                rls.step(&self.row, truth, after_s);
             }
         }
         self.refresh();
     }
 
+    fn segment(&mut self, shift: Duration) {
+        self.last = self.last.map(|last| last + shift);
+    }
+
     fn snapshot(&self) -> Box<dyn State> {
-        Box::new(self.state.clone())
+        Box::new(OnlineState {
+            frame: self.frame.clone(),
+            recursion: match &self.recursion {
+                Recursion::Sgd(sgd) => Known::Sgd(sgd.clone()),
+                Recursion::Rls { rls, .. } => Known::LeastSquares {
+                    of_fit: rls.fit().coefficients.clone(),
+                    learned: rls.learned().clone(),
+                    last: self.last,
+                },
+            },
+        })
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let mut known = match state.known::<OnlineState>() {
+        let OnlineState { frame, recursion } = match state.known() {
             Ok(known) => known,
             Err(cold) => return cold,
         };
-        if known.frame.regressors != self.state.frame.regressors {
+        if frame.regressors != self.frame.regressors {
             return Restored::cold("another fit chose other regressors");
         }
-        let width = known.frame.regressors.len();
-        if !(known.frame.mistakes().is_empty() && known.recursion.mistakes(width).is_empty()) {
-            return Restored::cold("its parts do not fit together");
-        }
-        // What was learned goes on; how it goes on is said by the parameters of now.
-        known.recursion = match (known.recursion, &self.state.recursion) {
-            (Recursion::Sgd(known), Recursion::Sgd(own)) => {
-                Recursion::Sgd(known.with(own.options()))
+        let width = frame.regressors.len();
+        match (recursion, &mut self.recursion) {
+            (Known::Sgd(known), Recursion::Sgd(own)) => {
+                let known = Recursion::Sgd(known.with(own.options()));
+                if !(frame.mistakes().is_empty() && known.mistakes(width).is_empty()) {
+                    return Restored::cold("its parts do not fit together");
+                }
+                (self.frame, self.recursion) = (frame, known);
             }
-            (Recursion::Rls { rls, .. }, Recursion::Rls { rls: own, noise }) => Recursion::Rls {
-                rls: rls.with(own.options()),
-                noise: *noise,
-            },
+            (
+                Known::LeastSquares {
+                    of_fit,
+                    learned,
+                    last,
+                },
+                Recursion::Rls { rls, .. },
+            ) => {
+                if frame != self.frame || of_fit != rls.fit().coefficients {
+                    return Restored::cold("another fit begins from what it knows itself");
+                }
+                if !rls.resume(&learned) {
+                    return Restored::cold("its parts do not fit together");
+                }
+                self.last = last;
+            }
             _ => return Restored::cold("it learned by another recursion"),
-        };
-        self.state = known;
+        }
         self.refresh();
         Restored::Accepted
     }

@@ -59,8 +59,8 @@ impl<'de> Deserialize<'de> for OrderRange {
 
 /// Which orders are compared, and by what. All are fitted on the same rows.
 ///
-/// With `N` rows, `V` the mean square of the residuals, `p` coefficients, beside which `oe` and `bj` count the starts that
-/// were found, and `k = p + 1` since the variance of the noise is found too: AIC `N ln V + 2k`, AICc
+/// There are `N` rows, `V` is the mean square of the residuals, and `p` counts coefficients, with `oe` and `bj` the starts
+/// that were found too. `k = p + 1`, since the variance of the noise is found too. AIC is `N ln V + 2k`, AICc
 /// `AIC + 2k(k + 1)/(N − k − 1)`, BIC `N ln V + k ln N`, FPE `V (N + p)/(N − p)` (Ljung 1999, section 16.4; Hurvich and Tsai
 /// 1989). They take rows for independent; those of a drift whose windows overlap are not, and the order then comes out large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

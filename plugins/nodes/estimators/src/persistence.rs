@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Predicts the last truth that shares nothing with the predicted one: the truth at the smallest legal lag.
 ///
-/// It needs no fit, and runs at every tick.
+/// `ŷ(t + ahead) = y(t − L)`, with `L` that lag. It needs no fit, and runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Persistence {}

@@ -22,11 +22,11 @@ const MOST_TERMS: usize = 500;
 
 /// Second-order regression of the truth on features, their squares and their products.
 ///
-/// `ŷ(t + ahead) = b₀ + Σ b_j z_j + Σ b_jk z_j z_k` with features centred and scaled by the rows of the fit, so that a square is not
-/// nearly its feature once more. Terms are chosen by stepwise regression, as Chen (1996) did for the thermal errors of a
-/// machining centre, unless another selection is stated; there may be 500 of them at most. Outside the range of the fit a
-/// square grows without bound: the port `novelty` shows where that is, of the terms as that of `linear` does of features, and `outside`
-/// says what becomes of it. Put a `guard` behind it too.
+/// `ŷ(t + ahead) = b₀ + Σ b_j z_j + Σ b_jk z_j z_k` with features centred and scaled by the rows of the fit, so that
+/// a square is not nearly its feature once more. Terms are chosen by stepwise regression, as Chen (1996) did for the
+/// thermal errors of a machining centre, unless another selection is stated. There may be 500 of them at most.
+/// Outside the range of the fit a square grows without bound. The port `novelty` shows where that is, of the terms as
+/// that of `linear` does of features; `outside` says what becomes of it. Put a `guard` behind it too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Polynomial {

@@ -194,6 +194,15 @@ impl LinearTrainer {
         novelty_of(&self.blocks, &found.standard, &found.fit.columns)
     }
 
+    /// The median over its rows of a measure of some of their columns; none where they were not kept.
+    pub(crate) fn median(&self, columns: &[usize], of: impl Fn(&[f64]) -> f64) -> Option<f64> {
+        let row = |x: &[f64]| -> Vec<f64> { columns.iter().map(|&column| x[column]).collect() };
+        let rows = self.blocks.rows()?;
+        let mut all: Vec<f64> = rows.iter().map(|(x, ..)| of(&row(x))).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    }
+
     /// How many rows it was given.
     pub(crate) fn rows(&self) -> u64 {
         self.blocks.count()

@@ -19,8 +19,8 @@ pub enum Selection {
     Forward(CrossValidated),
     /// From all regressors on, the one that is missed least is taken out, until that loses more than the tolerance.
     Backward(CrossValidated),
-    /// Forward, and after each step back for as long as that gives a better set than any of that size before, or than one that
-    /// came with several sensors at once past that size (Pudil, Novovičová and Kittler 1994).
+    /// Forward, and after each step back for as long as that gives a better set than any of that size before. A set
+    /// that came past that size, with several sensors at once, stands there too (Pudil, Novovičová and Kittler 1994).
     Floating(CrossValidated),
     /// By F-tests on all rows: the most significant regressor enters, those that have lost their significance leave
     /// (Efroymson 1960; for thermal errors Chen 1996). It takes rows for independent, which those of a drift are not: it

@@ -13,10 +13,11 @@ use crate::prior::{Prior, Wanted};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Solver {
-    /// Minimises the sum of squares plus `alpha · ‖w‖²`, the intercept free (Hoerl and Kennard 1970). With a prior it minimises the sum of
-    /// squares plus `λ (θ − μ)ᵀ Σ⁻¹ (θ − μ)`, with mean and covariance of the coefficients `θ` over the machines of a fleet, the
-    /// constant among them, in the units of the regressors (Lindley and Smith 1972). Regressors that the prior does not know have
-    /// the penalty `alpha`. Of fewer regressors than it knows, as after a selection, it has the mean and covariance of those.
+    /// Minimises the sum of squares plus `alpha · ‖w‖²`, the intercept free (Hoerl and Kennard 1970). With a prior it
+    /// minimises the sum of squares plus `λ (θ − μ)ᵀ Σ⁻¹ (θ − μ)` (Lindley and Smith 1972). Mean and covariance are
+    /// those of the coefficients `θ` over the machines of a fleet, the constant among them, in the units of the
+    /// regressors. Regressors that the prior does not know have the penalty `alpha`. Of fewer regressors than it knows,
+    /// as after a selection, it has the mean and covariance of those.
     Ridge {
         /// The penalty, at least 0, or how it is chosen.
         #[serde(default = "one")]

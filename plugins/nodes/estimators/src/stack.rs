@@ -16,18 +16,19 @@ use crate::novelty::{novelty_at, novelty_mistakes, novelty_of};
 
 /// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
 ///
-/// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
-/// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Only where the truth is a
-/// thousand times as large as it varies, such as a position that is counted from far away, do they add up to one, which they nearly do
-/// there anyway. Predictions of the rows that an estimator was itself fitted on would flatter the one that fits them closest, so that
-/// weights are found on out-of-fold predictions: each third of the data, with as many instants at which there is a truth, is predicted
-/// by voters fitted on the rest; nothing is left out between the two, so that thirds should be long against windows and horizons.
-/// So voters are fitted four times, and those of a voter that is a stack itself 13 times.
+/// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson
+/// 1974). There is no intercept, and the weights need not add up to one: voters that all promise too much are scaled
+/// down. They add up to one only where the truth is a thousand times as large as it varies, such as a position that
+/// is counted from far away. There they nearly do so anyway. Predictions of the rows that an estimator was itself
+/// fitted on would flatter the one that fits them closest. So weights are found on out-of-fold predictions: each
+/// third of the data is predicted by voters fitted on the rest. The thirds have as many instants at which there is a
+/// truth. Nothing is left out between a third and the rest, so that thirds should be long against windows and
+/// horizons. So voters are fitted four times, and those of a voter that is a stack itself 13 times.
 ///
-/// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
-/// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over.
-/// Where all weights are 0 there is no prediction. Only rows with
-/// all predictions take part in the fit, and a voter that lacks more than a tenth of them is left out. At most 10 voters.
+/// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the
+/// others go by the weights that are the best without it. Where two say nearly the same, one may have all their
+/// weight, and the other takes it over. Where all weights are 0 there is no prediction. Only rows with all
+/// predictions take part in the fit, and a voter that lacks more than a tenth of them is left out. At most 10 voters.
 ///
 /// The port `novelty` shows how far predictions are outside of those of the fit, as that of `linear` does of features: voters that
 /// disagree as they never did. There is none while a voter is absent, nor where the rows of the fit do not fit in memory.

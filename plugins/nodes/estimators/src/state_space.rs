@@ -23,28 +23,29 @@ const ROUNDING: f64 = 1e-13;
 /// Values of a past: more would take the memory of many rows.
 const LARGEST_PAST: usize = 1000;
 
-/// A state-space model by subspace identification: states that sum up what the past tells of the future.
+/// A state-space model by subspace identification: states that sum up what the past says of the future.
 ///
-/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter
-/// 4; Ljung 1999, section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the
-/// features meanwhile, is decomposed by singular values: as many as count, and chance does not explain (Wachter 1980),
-/// are states, and `A` and `C` follow by least squares from how those go on. `B`, `D`, the Kalman gain `K` and the states
-/// in which records begin are then found such that one-step errors are least: a few steps by Gauss and Newton (Ljung
-/// 1999, section 10.2) from the gain that the covariances of what is left give. The singular values are printed and
-/// kept. A mode that would grow is brought back to one that barely fades. `A` and `C` are not searched for, so that a
-/// fit takes a few passes over the rows; `oe` or `armax` may come closer from there.
+/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996,
+/// chapter 4; Ljung 1999, section 10.6). Past truths and features explain a part of the next `horizon` truths, beside
+/// the features meanwhile. That part is decomposed by singular values: as many as count, and chance does not explain
+/// (Wachter 1980), are states. `A` and `C` follow by least squares from how those go on. `B`, `D`, the Kalman gain
+/// `K` and the states in which records begin are then found such that one-step errors are least. That takes a few
+/// steps by Gauss and Newton (Ljung 1999, section 10.2) from the gain that the covariances of what is left give. The
+/// singular values are printed and kept. A mode that would grow is brought back to one that barely fades. `A` and `C`
+/// are not searched for, so that a fit takes a few passes over the rows; `oe` or `armax` may come closer from there.
 ///
-/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as
-/// a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by
-/// default the span of the truth, since truths whose windows overlap share their noise; where several come within a step,
-/// each begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
-/// series counts as so many steps, rounded. Running, it takes each truth that the embargo lets through; what those that
-/// are missing were is estimated from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
-/// missing in the fit, windows end and begin again. A segment begins with its first truth, as if that and the features had
-/// always been what they are, and so does what comes after more steps without features than ten, or than the model reaches
-/// back where that is more; with `learn = false` it stays at rest. The port `std_dev` is the standard deviation of the
-/// truth about its prediction, larger after truths that are missing. Features that are missing are taken for the last ones,
-/// and what that adds to the error is not in it. Since the answer changes with time alone, the node runs at every tick.
+/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is
+/// followed as a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step
+/// apart: `every`, by default the span of the truth, since truths whose windows overlap share their noise. Where
+/// several come within a step, each begins a series of its own. All series are fitted together and followed side by
+/// side. The time between two truths of a series counts as so many steps, rounded. Running, it takes each truth that
+/// the embargo lets through. Those that are missing are estimated from the truths that follow too, as in a Kalman
+/// filter (Jones 1980). Where truths or rows are missing in the fit, windows end and begin again. A segment begins
+/// with its first truth, as if that and the features had always been what they are. So does what comes after more
+/// steps without features than ten, or than the model reaches back where that is more. With `learn = false` it stays
+/// at rest. The port `std_dev` is the standard deviation of the truth about its prediction, larger after truths that
+/// are missing. Features that are missing are taken for the last ones, and what that adds to the error is not in it.
+/// Since the answer changes with time alone, the node runs at every tick.
 ///
 /// The port `novelty` is that of `linear`, of the features as the run saw them; the truths that are followed do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -55,8 +56,9 @@ pub struct StateSpace {
     #[serde(default)]
     pub states: States,
     /// How many steps past and future have each, 2 to 100; as many as there are states where that is more. Without it ten, or
-    /// fewer where rows without a gap would not make twice as many windows of both, each with one a step later, as a past has values, or where a past would
-    /// have more than 1000 values, one of the truth and one of each feature at every step.
+    /// fewer where that is too many for the rows, or where a past would have more than 1000 values. A past has one value of the
+    /// truth and one of each feature at every step. Rows without a gap have to make twice as many windows of past and future, each
+    /// with one a step later, as a past has values.
     #[serde(default)]
     #[schemars(range(min = 2, max = 100))]
     pub horizon: Option<usize>,

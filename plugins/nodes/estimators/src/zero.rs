@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Predicts zero: what a machine without a model does.
 ///
-/// It needs no fit, and runs at every tick.
+/// `ŷ = 0`. It needs no fit, and runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Zero {}

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 
 /// The weighted sum of its inputs: `Σ w_i x_i`, such as the mean of two sensors or what one has more than another.
 ///
-/// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or `[degF]` the weights must add up
-/// to 1, which gives a temperature, or to 0, which gives a difference, in K of Cel and in `[degR]` of `[degF]`; other sums hang
-/// on where the scale has its zero.
+/// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or `[degF]` the weights
+/// must add up to 1 or to 0. A sum of 1 gives a temperature, 0 a difference, in K of Cel and in `[degR]` of `[degF]`.
+/// Other sums would depend on where the scale has its zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sum {
@@ -25,7 +25,7 @@ pub struct Sum {
 
 /// The product of its inputs, such as an interaction of two temperatures.
 ///
-/// It exists while all inputs do; each is held up to its maximum age.
+/// `y = Π x_i`. It exists while all inputs do; each is held up to its maximum age.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Product {

@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 
 /// Gives each value later: at the first tick at or after its own plus the delay, or some ticks later.
 ///
-/// The stamp moves with the value. A delay may close a loop; its one channel is then described by `unit`, since what it
-/// reads is not yet known where it stands.
+/// `y(t) = x(t − delay)`. The stamp moves with the value. A delay may close a loop; its one channel is then described
+/// by `unit`, since what it reads is not yet known where it stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Delay {

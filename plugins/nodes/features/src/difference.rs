@@ -11,13 +11,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::past::{LookingBack, max_age, max_age_mistake};
 
-/// The change of each channel over a time, or from one value to the next: `x(t) − x(t − over)`.
+/// The change of each channel over a time, or from one value to the next: `y(t) = x(t) − x(t − over)`.
 ///
-/// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value before. That
-/// one must not have been older than `max_age` at that instant: by default as old as a held value of the channel may be. Without
-/// `over`, what has a span may be older by the signal's `max_age`, since the value before of a slow clock is a whole period old; a
-/// sample may not. A difference of two samples has the noise of both, and that of a `slope` over the same time is smaller; over
-/// one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures in Cel or K are in K, of those in `[degF]` in `[degR]`.
+/// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value
+/// before. That one must not have been older than `max_age` at that instant: by default as old as a held value of the
+/// channel may be. Without `over`, what has a span may be older by the signal's `max_age`, since the value before of
+/// a slow clock is a whole period old; a sample may not. A difference of two samples has the noise of both; a `slope`
+/// over the same time has less. Over one sample it is the differencing of Box and Jenkins (1976). Differences of
+/// temperatures in Cel or K are in K, of those in `[degF]` in `[degR]`.
 ///
 /// Two differences share a sample where one ends as the other begins, so that a value summarises `over` and `max_age`: where it
 /// is a truth, the embargo goes by that.

@@ -1,8 +1,8 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
 use athermal_core::node::{
-    Feature, Forms, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Feature, Forms, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, Pace,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -22,7 +22,7 @@ pub struct FirstOrder {
     /// What is given: the lagged value, or how far the input is from it.
     #[serde(default)]
     pub output: FirstOrderOutput,
-    /// How much of the past one value is taken to summarise, greater than 0; a truth can be made of it only where this
+    /// How much of the past one value is taken to summarise, greater than 0. A truth can be made of it only where this
     /// is stated, since a lag forgets nothing entirely. Three time constants leave 5 %, five less than 1 %.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -118,6 +118,10 @@ impl Grid {
 }
 
 impl Feature for FirstOrder {
+    fn facts() -> KindFacts {
+        KindFacts::default().pace(Pace::ByChannel)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is followed")] }
     }

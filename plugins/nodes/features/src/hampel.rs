@@ -20,15 +20,16 @@ use crate::windows::three;
 
 /// Takes out spikes: a sample far from the median of the trailing window is an outlier, and absent.
 ///
-/// It is one where `|x − m| > threshold · S`, with `m` the median of the samples in `(t − window, t]`, the present one among
-/// them, and `S = 1.4826 · median |x_i − m|`, which is the standard deviation of normal noise and cannot be moved by less than
-/// half of the samples (Hampel 1974; Pearson 2002). Outliers stay in the window, so that a step counts as outliers only
-/// until half of the samples lie beyond it. The port `outlier` says 1 where a sample was one and 0 where it was none; it is absent, and
-/// the sample passes, while the window holds fewer than `min_samples`.
+/// It is one where `|x − m| > threshold · S`. `m` is the median of the samples in `(t − window, t]`, the present one
+/// among them, and `S = 1.4826 · median |x_i − m|`. `S` is the standard deviation of normal noise, and less than half
+/// of the samples cannot move it far (Hampel 1974; Pearson 2002). Outliers stay in the window, so that a step counts
+/// as outliers only until half of the samples lie beyond it. The port `outlier` says 1 where a sample was one and 0
+/// where it was none; it is absent, and the sample passes, while the window holds fewer than `min_samples`.
 ///
-/// What wanders within the window, as temperatures do, is farthest from the median at its newest end and then looks like a spike:
-/// take a window of some ten samples, and a `floor` of what does no harm. Of the reference machines' bodies, sampled every 10 s,
-/// 6 to 9 % of the sound samples were taken out over 5 minutes without a floor, and at most 0.1 % over 70 s with one of 20 mK.
+/// What wanders within the window, as temperatures do, is farthest from the median at its newest end and then looks
+/// like a spike. Take a window of some ten samples, and a `floor` of what does no harm. Of the reference machines'
+/// bodies, sampled every 10 s, 5 minutes without a floor took out 6 to 9 % of the sound samples. 70 s with a floor of
+/// 20 mK took out at most 0.1 %.
 ///
 /// Samples that hardly ever differ make `S` zero, and then any change an outlier: give `floor`, such as one step of a coarse
 /// sensor. With `replace = "median"` an outlier becomes the median instead of absent; a value is then made of the whole window,

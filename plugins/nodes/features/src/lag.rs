@@ -4,8 +4,8 @@ use std::fmt;
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
-    Restored, State, Tick,
+    Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, Pace,
+    PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -15,9 +15,10 @@ use crate::past::{LookingBack, max_age_mistake};
 
 /// Each channel as it was some time ago, at one lag or several: past values as regressors. A negative lag gives what is planned.
 ///
-/// With every new value at `t` it gives, for each lag, the last value at or before `t − lag`, unless that was older than
-/// `max_age` at that instant. With several lags a channel is named by both: `plate1@5min`. The stamp moves with the value. A `delay`
-/// gives every value on, each later by the same; a `lag` looks back whenever there is a new one.
+/// `y(t) = x(t − lag)`: with every new value at `t` it gives, for each lag, the last value at or before `t − lag`,
+/// unless that was older than `max_age` at that instant. With several lags a channel is named by both: `plate1@5min`.
+/// The stamp moves with the value. A `delay` gives every value on, each later by the same; a `lag` looks back whenever
+/// there is a new one.
 ///
 /// A negative lag, `"-5min"`, gives what will be then, as it is planned at `t`. Only signals with `known_ahead` may be read so, and as far
 /// as that says. With a negative lag among the others all are given at every tick, stamped with it, since a plan holds from the instant
@@ -86,6 +87,10 @@ impl JsonSchema for Shift {
 }
 
 impl Feature for Lag {
+    fn facts() -> KindFacts {
+        KindFacts::default().pace(Pace::ByChannel)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is looked back at")] }
     }

@@ -18,15 +18,17 @@ use crate::windows::{Cold, Windows, half, over, three};
 
 /// Statistics of the samples of each channel in trailing windows: their mean, and more by the name of a port.
 ///
-/// Over the samples with time in `(t − T, t]`, each counted once however far apart they lie: `mean` (the default port),
-/// `std` (standard deviation by n − 1), `min`, `max`, `range` (largest less smallest), `median` and `count`. So
-/// `inputs.features = ["calm", "calm:range"]` reads the means and ranges of a node `calm`. Of temperatures `std` and `range` are in
-/// the unit of their differences: K of Cel and K, `[degR]` of `[degF]`. Sums are never subtracted from, so that a spike leaves
-/// no trace once it has left the window (Chan, Golub and LeVeque 1983).
+/// Of the `n` samples in the window `mean = Σ x_i / n`, `std² = Σ (x_i − mean)² / (n − 1)`. Each sample with time in
+/// `(t − T, t]` counts once, however far apart they lie. The ports are `mean` (the default), `std` (standard deviation
+/// by n − 1), `min`, `max`, `range` (largest less smallest), `median` and `count`. So
+/// `inputs.features = ["calm", "calm:range"]` reads the means and ranges of a node `calm`. Of temperatures `std` and
+/// `range` are in the unit of their differences: K of Cel and K, `[degR]` of `[degF]`. Sums are never subtracted from,
+/// so that a spike leaves no trace once it has left the window (Chan, Golub and LeVeque 1983).
 ///
-/// A value exists, as that of a `slope` does, once the window reaches back no further than the channel's first value, holds
-/// `min_samples` samples and these span `min_coverage` of it. It summarises the window and what the samples summarise
-/// themselves: where it is a truth, or made of what a truth is made of, the embargo and the search for leaks go by that.
+/// A value exists, as that of a `slope` does, once the window reaches back no further than the channel's first value,
+/// holds `min_samples` samples and these span `min_coverage` of it. It summarises the window and what the samples
+/// summarise themselves. Where it is a truth, or made of what a truth is made of, the embargo and the search for
+/// leaks go by that.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Moving {

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Passes channels on as they are, under one node's name: a sensor subset that several nodes read.
 ///
-/// Which channels is said by the reference: `inputs.signal = ["gradients.{plate1,holder1}@*", "gradients.room@*"]`.
-/// Values, stamps and absence pass unchanged.
+/// `y = x`. The reference says which channels:
+/// `inputs.signal = ["gradients.{plate1,holder1}@*", "gradients.room@*"]`. Values, stamps and absence pass unchanged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pick {

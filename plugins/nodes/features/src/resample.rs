@@ -11,9 +11,11 @@ use serde::{Deserialize, Serialize};
 
 /// Brings each channel to a regular clock: one value for every period, made of the samples within it.
 ///
-/// Periods are `(k · every, (k + 1) · every]`, counted from the origin of time whatever the first sample, so that several nodes
-/// and several starts agree. A value comes at the first tick at or after the end of its period; where that is later than `late`,
-/// and where a period holds no sample, there is none. The stamp is that of the newest sample within. Runs at every tick.
+/// `y_k = Σ x_i / n` of the `n` samples in the `k`th period, or the last of them by `method`. Periods are
+/// `(k · every, (k + 1) · every]`, counted from the origin of time whatever the first sample, so that several nodes and
+/// several starts agree. A value comes at the first tick at or after the end of its period. There is none where that
+/// tick is later than `late`, nor where a period holds no sample. The stamp is that of the newest sample within. Runs
+/// at every tick.
 ///
 /// A value that comes late has no part in the time since the end of its period, and reaches back as much further. So its span is
 /// `every` and `late`, by default two periods, so that a held value counts until the next one is due. Where it is a truth, the

@@ -1,16 +1,18 @@
 //! Samples taken when another channel is measured.
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
+    Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs, Pace,
+    PortSummary, Reach, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Each channel as it is at the instants at which another one is measured.
 ///
-/// With every new value under `instants` it gives the last value of each channel, unless that is too old. What is measured at
-/// irregular instants thus meets temperatures of the same instants: a line through four positions follows other instants than
-/// one through thirty temperatures in the same window, and the difference looks like drift.
+/// `y(t_k) = x(t_k)`: with every new value under `instants` it gives the last value of each channel, unless that is too
+/// old. What is measured at irregular instants thus meets temperatures of the same instants. A line through four
+/// positions follows other instants than one through thirty temperatures in the same window, and the difference looks
+/// like drift.
 ///
 /// Only the instants count, not what was measured at them, so that the positions of an axis may say when without giving their
 /// drift away.
@@ -19,6 +21,10 @@ use serde::{Deserialize, Serialize};
 pub struct SampleAt {}
 
 impl Feature for SampleAt {
+    fn facts() -> KindFacts {
+        KindFacts::default().pace(Pace::BySecond)
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[
@@ -40,7 +46,7 @@ impl Feature for SampleAt {
     }
 
     fn reach(&self, _port: &str) -> Reach {
-        Reach::First
+        Reach::First(1)
     }
 
     fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -63,7 +63,7 @@ fn seconds(window: Duration) -> String {
 /// Windows that fit a drift window `t_s`, from the shortest to the harmonics of its spectrum.
 ///
 /// The Fourier transform of a windowed line has its zeros at the roots of `tan x = x`, and that of a difference over `t_s`
-/// its first at `2π/t_s`; they fall together for windows of `t_s · x_j / π`. `steps` windows run on a logarithmic scale
+/// its first at `2π/t_s`. They fall together for windows of `t_s · x_j / π`. `steps` windows run on a logarithmic scale
 /// from `shortest` to the first of these, and the others follow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -13,11 +13,15 @@ use crate::chain::{Chain, Freedom};
 
 /// Carries the expansions of several axes or links to the displacement of a point, such as the tip of a tool.
 ///
-/// The links are a chain: each stands on the end of the one before, the first on the origin. `links` has one for each channel of
-/// `inputs.links`, in order. What is a length (nm) or a rate of it (nm/min) makes its link grow along `along`; what is an angle (urad, or
-/// urad/min) turns it at its beginning `about` an axis, with all that stands on it. The port `displacement` has X, Y and Z of the point,
-/// which `optical_loss` takes; `rotation` has A, B and C, by how much the end turns about X, Y and Z. The motions are small against the
-/// lengths, so that they add up.
+/// The links are a chain: each stands on the end of the one before, the first on the origin. `links` has one for each
+/// channel of `inputs.links`, in order. A length (nm) or a rate of it (nm/min) makes its link grow along `along`. An
+/// angle (urad) or a rate of it (urad/min) turns the link at its beginning `about` an axis, with all that stands on it.
+///
+/// The point moves by `Σ z_i l_i + Σ z_i × (p − p_i) φ_i` and the end turns by `Σ z_i φ_i`, of the lengths `l_i` and
+/// angles `φ_i`. `z_i` is the direction and `p_i` the beginning of a link, `p` the point (Siciliano, Sciavicco, Villani
+/// and Oriolo 2009, equations 3.26 to 3.30). The port `displacement` has X, Y and Z of the point, which `optical_loss`
+/// takes. The port `rotation` has A, B and C, by how much the end turns about X, Y and Z. The motions are small against
+/// the lengths, so that they add up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kinematics {

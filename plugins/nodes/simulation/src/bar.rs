@@ -87,6 +87,9 @@ pub struct Bar {
     conductance: f64,
     skin: f64,
     growth_nm: f64,
+    /// Of one that has changed, by how much it has grown more than it was made to, and what its cells added up to when that was found last.
+    more_nm: f64,
+    last: Option<f64>,
 }
 
 impl Bar {
@@ -103,6 +106,8 @@ impl Bar {
             conductance: shape.material.conductivity * shape.section_m2 / cell_m,
             skin: shape.surface_m2 * shape.transfer / count as f64,
             growth_nm: shape.material.expansion * cell_m * 1e9,
+            more_nm: 0.0,
+            last: None,
         }
     }
 
@@ -146,7 +151,15 @@ impl Bar {
     /// How much longer the bar is, in nm, than at `reference` °C throughout.
     #[must_use]
     pub fn growth_nm(&self, reference: f64) -> f64 {
-        self.growth_nm * self.temperature.iter().map(|t| t - reference).sum::<f64>()
+        self.growth_nm * self.temperature.iter().map(|t| t - reference).sum::<f64>() + self.more_nm
+    }
+
+    /// Grows by a share more than it is made to, from where it was when this was called last: what has changed moves nothing at rest.
+    pub fn swell(&mut self, share: f64) {
+        let sum: f64 = self.temperature.iter().sum();
+        let by = self.last.map_or(0.0, |last| sum - last);
+        self.more_nm += share * self.growth_nm * by;
+        self.last = Some(sum);
     }
 
     /// One step of `step_s` seconds in air of `air` °C; `coupling` scales the heat transfer of the skin (1 as designed).

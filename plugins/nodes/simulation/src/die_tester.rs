@@ -10,7 +10,7 @@ use crate::room::{Coupling, Room, RoomShape};
 use athermal_core::prng::Prng;
 use athermal_trial::machine::schedule::{Schedule, Track};
 use athermal_trial::machine::{
-    Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
+    Changing, Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
 
 /// The machine `die-tester`.
@@ -77,11 +77,15 @@ impl Machine for DieTester {
         Some(Schedule::cycle(CHUCK.name, &LEVELS, HOLD_S))
     }
 
+    fn can_change(&self) -> bool {
+        true
+    }
+
     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
         let own = || self.schedule(setup.seed);
         let schedule = setup.schedule.clone().or_else(own).unwrap_or_default();
-        let bodies = Bodies::settled(self.world.clone(), &schedule, setup);
+        let bodies = Bodies::settled(self.world.with(&setup.changes), &schedule, setup);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup)))
     }
 }
@@ -217,16 +221,22 @@ impl Side {
     }
 
     /// One step; gives the heat in W that has flowed into the frame.
-    fn step(&mut self, air: f64, door: f64, chuck: &Chuck, frame: f64) -> f64 {
+    fn step(
+        &mut self,
+        (air, door): (f64, f64),
+        chuck: &Chuck,
+        frame: f64,
+        (contact, load): (f64, f64),
+    ) -> f64 {
         let motion = self.motors.step(Bodies::STEP_S);
-        let to_stage = self.holder_to_stage * (self.holder.last() - self.stage.first());
-        let to_frame = self.stage_to_frame * (self.stage.last() - frame);
+        let to_stage = contact * self.holder_to_stage * (self.holder.last() - self.stage.first());
+        let to_frame = contact * self.stage_to_frame * (self.stage.last() - frame);
         let to_holder_w = chuck.heat_w(self.shape.holder_view, self.holder.first());
         let to_stage_w = chuck.heat_w(self.shape.stage_view, self.stage.first());
         self.holder.heat_first(to_holder_w);
         self.holder.heat_last(-to_stage);
         self.stage.heat_first(to_stage + to_stage_w);
-        self.stage.heat_last(motion.heat_w - to_frame);
+        self.stage.heat_last(load * motion.heat_w - to_frame);
         let coupling = door * self.coupling.step();
         self.holder.step(Bodies::STEP_S, air, coupling);
         self.stage.step(Bodies::STEP_S, air, coupling);
@@ -290,7 +300,13 @@ impl Plant for Bodies {
     const STEP_S: f64 = 5.0;
 
     fn step(&mut self, time_ns: i64) {
-        self.air = self.room.step(self.room_track.at(time_ns));
+        let changed = |kind| self.world.changed(kind, time_ns);
+        let of_sides = (
+            1.0 + changed(Changing::Contact),
+            1.0 + changed(Changing::Load),
+        );
+        let set = self.room_track.at(time_ns) + changed(Changing::Season);
+        self.air = self.room.step(set);
         self.chuck.step(Self::STEP_S, self.chuck_track.at(time_ns));
         // Side 1 stands at one end of the frame, side 2 at the other.
         let ends = [self.frame.first(), self.frame.last()];
@@ -299,12 +315,15 @@ impl Plant for Bodies {
         let [one, two] = &mut self.sides;
         one.stage.heat_all(lamp);
         let heat_w = [
-            one.step(self.air, door, &self.chuck, ends[0]),
-            two.step(self.air, door, &self.chuck, ends[1]),
+            one.step((self.air, door), &self.chuck, ends[0], of_sides),
+            two.step((self.air, door), &self.chuck, ends[1], of_sides),
         ];
         self.frame.heat_first(heat_w[0]);
         self.frame.heat_last(heat_w[1]);
         self.frame.step(Self::STEP_S, self.air, door);
+        let sides = self.sides.iter_mut();
+        let of_sides = sides.flat_map(|side| [&mut side.holder, &mut side.stage]);
+        self.world.swell(time_ns, of_sides.chain([&mut self.frame]));
     }
 
     fn temperatures(&self, into: &mut [f64]) {

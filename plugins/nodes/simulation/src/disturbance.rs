@@ -6,8 +6,9 @@ use std::str::FromStr;
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
-use athermal_trial::machine::{Channel, Machine};
+use athermal_trial::machine::{Change, Changing, Channel, Machine};
 
+use crate::bar::Bar;
 use crate::{DieTester, LinearAxis};
 
 /// What is another than it was while the machine was learned.
@@ -104,15 +105,42 @@ impl std::error::Error for DisturbanceError {}
 
 /// What happens to a machine, in a form that it steps with.
 #[derive(Debug, Clone)]
-pub(crate) struct World(Vec<Disturbance>);
+pub(crate) struct World {
+    disturbances: Vec<Disturbance>,
+    changes: Vec<Change>,
+}
 
 impl World {
     /// One that stays as it is.
-    pub(crate) const SAME: Self = Self(Vec::new());
+    pub(crate) const SAME: Self = Self {
+        disturbances: Vec::new(),
+        changes: Vec::new(),
+    };
+
+    /// The same in which a machine changes.
+    pub(crate) fn with(&self, changes: &[Change]) -> Self {
+        Self {
+            changes: changes.to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// How far something of the machine has changed.
+    pub(crate) fn changed(&self, kind: Changing, time_ns: i64) -> f64 {
+        Change::of(&self.changes, kind, time_ns)
+    }
+
+    /// Lets bodies grow by more than they are made to, once they have changed.
+    pub(crate) fn swell<'a>(&self, time_ns: i64, bodies: impl IntoIterator<Item = &'a mut Bar>) {
+        if !self.changes.is_empty() {
+            let share = self.changed(Changing::Expansion, time_ns);
+            bodies.into_iter().for_each(|body| body.swell(share));
+        }
+    }
 
     fn at(&self, time_ns: i64) -> impl Iterator<Item = &Kind> {
         let of = move |of: &&Disturbance| (of.from_ns..of.until_ns).contains(&time_ns);
-        self.0.iter().filter(of).map(|of| &of.kind)
+        self.disturbances.iter().filter(of).map(|of| &of.kind)
     }
 
     /// How many times as strongly the air couples to all bodies, and how the first stage is heated in K/s.
@@ -147,7 +175,10 @@ pub fn disturbed(
     name: &str,
     by: &[Disturbance],
 ) -> Result<Option<Box<dyn Machine>>, DisturbanceError> {
-    let world = World(by.to_vec());
+    let world = World {
+        disturbances: by.to_vec(),
+        ..World::SAME
+    };
     let machine: Box<dyn Machine> = match name {
         _ if by.is_empty() => return Ok(None),
         "die-tester" => Box::new(DieTester { world }),

@@ -9,7 +9,7 @@ use crate::room::{Coupling, Room, RoomShape};
 use athermal_core::prng::Prng;
 use athermal_trial::machine::schedule::Track;
 use athermal_trial::machine::{
-    Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
+    Changing, Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
 };
 
 /// The machine `linear-axis`.
@@ -57,13 +57,17 @@ impl Machine for LinearAxis {
         &SET_POINTS
     }
 
+    fn can_change(&self) -> bool {
+        true
+    }
+
     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
         let rows = rows_of(self.name(), &SET_POINTS, setup, PERIOD_S * SECOND_NS)?;
         let room = setup
             .schedule
             .as_ref()
             .map_or_else(|| Track::constant(ROOM.default), |s| s.track(&ROOM));
-        let bodies = Bodies::settled(self.world.clone(), room, setup);
+        let bodies = Bodies::settled(self.world.with(&setup.changes), room, setup);
         Ok(Box::new(Recorder::new(bodies, &CHANNELS, rows, setup)))
     }
 }
@@ -180,12 +184,18 @@ impl Plant for Bodies {
     const STEP_S: f64 = 5.0;
 
     fn step(&mut self, time_ns: i64) {
-        self.air = self.room.step(self.room_track.at(time_ns));
+        let changed = |kind| self.world.changed(kind, time_ns);
+        let (contact, load) = (
+            1.0 + changed(Changing::Contact),
+            1.0 + changed(Changing::Load),
+        );
+        let set = self.room_track.at(time_ns) + changed(Changing::Season);
+        self.air = self.room.step(set);
         let motion = self.motors.step(Self::STEP_S);
-        let to_slide = self.arm_to_slide * (self.arm.last() - self.slide.first());
-        let to_column = self.slide_to_column * (self.slide.last() - self.column.first());
+        let to_slide = contact * self.arm_to_slide * (self.arm.last() - self.slide.first());
+        let to_column = contact * self.slide_to_column * (self.slide.last() - self.column.first());
         self.arm.heat_last(-to_slide);
-        self.slide.heat_first(to_slide + motion.heat_w);
+        self.slide.heat_first(to_slide + load * motion.heat_w);
         self.slide.heat_last(-to_column);
         self.column.heat_first(to_column);
         let (door, lamp) = self.world.couples_and_heats(time_ns);
@@ -196,6 +206,8 @@ impl Plant for Bodies {
         self.slide.step(Self::STEP_S, self.air, door * slide.step());
         self.column
             .step(Self::STEP_S, self.air, door * column.step());
+        self.world
+            .swell(time_ns, [&mut self.arm, &mut self.slide, &mut self.column]);
         for creep in &mut self.creep {
             if motion.ended {
                 creep.start();

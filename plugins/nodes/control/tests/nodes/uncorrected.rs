@@ -73,3 +73,51 @@ fn corrections_and_positions_go_together_one_by_one() {
             .contains("was corrected in K")
     );
 }
+
+#[test]
+fn what_is_not_what_was_commanded_or_not_reported_is_not_known_and_the_reason_says_so() {
+    let graph = GRAPH
+        .replace(
+            "[nodes.free]",
+            "[signals.asked]\nunit = \"um\"\nchannels = [\"Z\"]\ncolumn = \"asked\"\nmax_age = \"30s\"\n[nodes.free]",
+        )
+        .replace("applied = \"applied\" }", "applied = \"applied\", commanded = \"asked\" }\ndiffers = \"3 nm\"")
+        .replace("free = \"free\"", "free = \"free\"\nwhy = \"free:reason\"");
+    let mut machine = Machine::new(&graph);
+    let is = |found: f64, expected: f64| found == expected || found.is_nan() && expected.is_nan();
+    for (nth, (samples, free, why)) in [
+        // Within 3 nm, and where nothing was commanded there is nothing to differ from.
+        ([105.0, 0.002, NONE], 103.0, 0.0),
+        ([105.0, 0.010, 0.012], 95.0, 0.0),
+        // The wrong sign, and twice as much.
+        ([105.0, -0.010, 0.012], NONE, 2.0),
+        ([105.0, 0.024, 0.012], NONE, 2.0),
+        ([105.0, 0.012, 0.012], 93.0, 0.0),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        machine.step(10.0 * nth as f64, &samples);
+        assert!(
+            is(machine.get("free.Z"), free) && is(machine.get("why.Z"), why),
+            "{nth}: {}",
+            machine.get("why.Z")
+        );
+    }
+    machine.step(100.0, &[105.0, NONE, 0.012]);
+    assert!(machine.get("free.Z").is_nan() && machine.get("why.Z") == 1.0);
+    let alone = graph.replace("differs = \"3 nm\"", "");
+    assert!(
+        compiled(&alone)
+            .0
+            .unwrap_err()
+            .contains("`differs` and `inputs.commanded` go together")
+    );
+    let kelvin = graph.replace("3 nm", "3 K");
+    assert!(
+        compiled(&kelvin)
+            .0
+            .unwrap_err()
+            .contains("`differs` is in K")
+    );
+}

@@ -18,6 +18,8 @@ pub(super) struct Reach {
     pub(super) earlier: Duration,
     /// Whether the model will follow truths while it runs.
     pub(super) follows: bool,
+    /// The span of the truth.
+    pub(super) window: Duration,
     /// Which truths it will not follow.
     pub(super) limits: LearningLimits,
 }
@@ -25,7 +27,7 @@ pub(super) struct Reach {
 /// The root mean square error, the horizon ahead and from the truths that the embargo lets through; none where no row is predicted.
 pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
     let mut following = of.learner()?;
-    let mut gate = LearningGate::new(reach.limits, &*following);
+    let mut gate = LearningGate::new(reach.limits, reach.window, &mut *following);
     let mut withheld = VecDeque::new();
     let (mut squares, mut count) = (0.0, 0_u64);
     let mut first = Instant::MIN;
@@ -33,7 +35,7 @@ pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
         if seen.begins {
             // What was withheld moves nothing any more but how large an error is for an outlier.
             for (at, inputs, truth) in withheld.drain(..) {
-                gate.offer(&mut *following, of.trained_range(), inputs, truth, at);
+                gate.offer(&mut *following, of, inputs, truth, at);
             }
             following.segment(Duration::ZERO);
             first = seen.of + reach.ahead;
@@ -46,7 +48,7 @@ pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
         while let Some(&(at, inputs, truth)) = withheld.front()
             && at <= newest
         {
-            gate.offer(&mut *following, of.trained_range(), inputs, truth, at);
+            gate.offer(&mut *following, of, inputs, truth, at);
             withheld.pop_front();
         }
         following.run(seen.inputs, seen.of, newest);

@@ -97,6 +97,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 earlier: setup.span.max(setup.ahead).max(Duration::from_ns(1)),
                 follows: setup.learns,
                 limits: setup.limits,
+                window: setup.span,
             },
             memory: setup.memory,
             rows: Rows::new(setup.regressors.len()),

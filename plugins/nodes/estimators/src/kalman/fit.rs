@@ -16,10 +16,11 @@ use athermal_numerics::{
 };
 
 use super::coefficients::Hourly;
-use super::follow::Following;
+use super::follow::{Following, variance};
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
 use crate::novelty::novelty_of_rows;
+use crate::rls::LITTLE;
 use crate::scaling::Scaling;
 
 /// The most rows that the search for variances goes through, again and again.
@@ -36,6 +37,7 @@ pub(super) struct KalmanTrainer {
     unit: String,
     every: Duration,
     ahead: Duration,
+    span: Duration,
     /// How much earlier than a truth the newest one arrived that its prediction knows of.
     earlier: Duration,
     /// Whether it will follow truths while it runs, and which of them not.
@@ -78,6 +80,7 @@ impl KalmanTrainer {
             limits: setup.limits,
             alone: names.is_empty(),
             ahead: setup.ahead,
+            span: setup.span,
             parameters,
             unit: setup.error_unit.clone(),
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
@@ -219,13 +222,21 @@ impl KalmanTrainer {
         if !filter.is_sound() {
             return Err(beyond_numbers());
         }
+        let scaling = Scaling {
+            means: standard.means,
+            scales: standard.scales,
+            truth: mean,
+        };
+        let rows = self.regressors.chunks_exact(width.max(1));
+        let mut said: Vec<f64> = rows
+            .map(|row| variance(&filter, width, scaling.of(row)))
+            .collect();
+        said.sort_by(f64::total_cmp);
         let predictor = KalmanPredictor {
+            memory: self.parameters.memory,
+            little: LITTLE * said.get(said.len() / 2).copied().unwrap_or(0.0),
             regressors: self.names.clone(),
-            scaling: Scaling {
-                means: standard.means,
-                scales: standard.scales,
-                truth: mean,
-            },
+            scaling,
             filter,
             at_large: followed.at_large,
             every: self.every,
@@ -242,8 +253,7 @@ impl KalmanTrainer {
         let width = self.names.len();
         let row = |nth: usize| &self.regressors[nth * width..(nth + 1) * width];
         let mut following = Following::new(predictor);
-        let mut gate = LearningGate::new(self.limits, &following);
-        let range = predictor.range.as_ref();
+        let mut gate = LearningGate::new(self.limits, self.span, &mut following);
         let mut withheld = VecDeque::<usize>::new();
         let (mut squares, mut count) = (0.0, 0_u64);
         let mut first = Instant::MIN;
@@ -257,18 +267,21 @@ impl KalmanTrainer {
                 && self.kept[next].at <= newest
             {
                 let Kept { at, truth, .. } = self.kept[next];
-                gate.offer(&mut following, range, row(next), truth, at);
+                gate.offer(&mut following, predictor, row(next), truth, at);
                 withheld.pop_front();
             }
             if kept.begins {
-                following.segment(Duration::ZERO);
+                let shift = nth.checked_sub(1).map(|last| kept.at - self.kept[last].at);
+                following.segment(shift.unwrap_or(Duration::ZERO));
+                gate.segment(shift.unwrap_or(Duration::ZERO));
                 first = kept.at + self.ahead;
             }
             // Without features rows are truths, of which the first ones come before what the first run predicts.
             if self.alone && kept.at < first {
                 continue;
             }
-            squares += (following.predict(row(nth), kept.at) - kept.truth).powi(2);
+            let predicted = gate.speaker(&following, kept.at).predict(row(nth), kept.at);
+            squares += (predicted - kept.truth).powi(2);
             count += 1;
             if self.follows {
                 withheld.push_back(nth);
@@ -474,6 +487,7 @@ mod tests {
                     }),
                     penalty: 1.0,
                     every: None,
+                    memory: Duration::from_ns(86_400_000_000_000),
                 };
                 for truth in [|_: f64| 12.0, f64::sin] {
                     match fitted(&parameters, truth) {
@@ -492,6 +506,7 @@ mod tests {
             noises: None,
             penalty: 1.0,
             every: None,
+            memory: Duration::from_ns(86_400_000_000_000),
         };
         let refused = fitted(&parameters, |nth| 1e-160 * (7.0 * nth * nth).sin());
         let told = refused.map(|_| ()).unwrap_err().to_string();
@@ -505,6 +520,7 @@ mod tests {
             noises: None,
             penalty: 1.0,
             every: None,
+            memory: Duration::from_ns(86_400_000_000_000),
         };
         let mut trainer = parameters.trainer(&setup(&["a", "seldom"]));
         for nth in 0..100_i32 {

@@ -2,11 +2,12 @@
 
 use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Kalman as Filter, Novelty};
+use athermal_numerics::{Kalman as Filter, Novelty, Resetting};
 use serde::{Deserialize, Serialize};
 
 use super::KalmanPredictor;
 use crate::novelty::{after_learning, novelty_at};
+use crate::rls::SHARE;
 use crate::scaling::Scaling;
 
 /// A truth that misses by more than so many deviations is a leap.
@@ -25,7 +26,14 @@ pub(super) struct Following {
     /// The regressors of the filter.
     row: Vec<f64>,
     /// How far regressors are from those of the fit, and the filter that it ended with.
-    of_fit: Option<(Novelty, Filter)>,
+    novelty: Option<Novelty>,
+    start: Filter,
+    memory: Duration,
+    /// What coefficients go back to, and how little a truth may say of them.
+    fading: Option<Resetting>,
+    little: f64,
+    /// The same with the coefficients of the fit, where there are any: it follows the level alone.
+    of_fit: Option<Box<Self>>,
 }
 
 /// What is known of level, trend and coefficients.
@@ -36,6 +44,15 @@ struct Known {
     scaling: Scaling,
     /// When that was.
     last: Option<Instant>,
+    /// Up to when what is known of the coefficients has faded.
+    #[serde(default)]
+    faded: Option<Instant>,
+    /// Whether the level alone has followed the last truth, from outside of the fit: it has made up for what is new there.
+    #[serde(default)]
+    made_up: bool,
+    /// What is known with the coefficients of the fit, as it is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    of_fit: Option<Box<Self>>,
 }
 
 athermal_core::state!(Known, "kalman/2");
@@ -46,7 +63,24 @@ impl Known {
             filter: filter.with_coefficient(),
             scaling: scaling.clone(),
             last,
+            faded: None,
+            made_up: false,
+            of_fit: None,
         }
+    }
+
+    /// The coefficients.
+    fn coefficients(&self) -> &[f64] {
+        &self.filter.state()[self.mean() + 1..]
+    }
+
+    /// Goes on from what was known of the same states; whether that can be.
+    fn resume(&mut self, known: &Self) -> bool {
+        let same = !known.filter.is_diffuse() && self.filter.resume(&known.filter);
+        if same {
+            (self.last, self.faded, self.made_up) = (known.last, known.faded, known.made_up);
+        }
+        same
     }
 
     /// The time in seconds from the last truth.
@@ -80,7 +114,7 @@ pub(super) fn std_dev(filter: &Filter, time: f64, regressors: impl Fn(usize) -> 
 }
 
 /// The variance that the last so many states, which are coefficients, bring into a prediction.
-fn variance(filter: &Filter, coefficients: usize, scaled: impl Fn(usize) -> f64) -> f64 {
+pub(super) fn variance(filter: &Filter, coefficients: usize, scaled: impl Fn(usize) -> f64) -> f64 {
     let order = filter.state().len();
     let first = order - coefficients;
     let rows = filter.covariance().chunks_exact(order).skip(first);
@@ -93,15 +127,25 @@ fn variance(filter: &Filter, coefficients: usize, scaled: impl Fn(usize) -> f64)
 
 impl Following {
     pub(super) fn new(predictor: &KalmanPredictor) -> Self {
+        let of_fit = Box::new(Self::of_level(predictor));
+        Self {
+            of_fit: Some(of_fit).filter(|_| !predictor.regressors.is_empty()),
+            ..Self::of_level(predictor)
+        }
+    }
+
+    fn of_level(predictor: &KalmanPredictor) -> Self {
         Self {
             known: Known::new(&predictor.filter, &predictor.scaling, None),
             at_large: predictor.at_large.clone(),
             every: predictor.every,
             row: vec![1.0; predictor.regressors.len() + 1],
-            of_fit: predictor
-                .novelty
-                .clone()
-                .map(|novelty| (novelty, predictor.filter.clone())),
+            novelty: predictor.novelty.clone(),
+            start: predictor.filter.clone(),
+            memory: predictor.memory,
+            fading: Resetting::to(&predictor.filter, predictor.regressors.len(), SHARE),
+            little: predictor.little,
+            of_fit: None,
         }
     }
 
@@ -113,6 +157,7 @@ impl Following {
             filter,
             scaling,
             last,
+            ..
         } = &mut self.known;
         let scaled = scaling.of(regressors);
         for (nth, value) in self.row[1..].iter_mut().enumerate() {
@@ -142,6 +187,14 @@ impl Following {
         *last = Some(at);
     }
 
+    /// A truth has been learned from, or said little: up to it the coefficients have faded.
+    fn has_passed(&mut self, at: Instant) {
+        (self.known.faded, self.known.made_up) = (Some(at), false);
+        if let Some(of_fit) = &mut self.of_fit {
+            of_fit.has_passed(at);
+        }
+    }
+
     /// How uncertain the level is where a truth misses by so much that it has leapt: as much as it misses.
     fn leap(&self, regressors: &[f64], truth: f64, at: Instant) -> Option<f64> {
         let leap = (truth - self.predict(regressors, at)).powi(2);
@@ -169,14 +222,16 @@ impl Learner for Following {
     }
 
     fn novelty(&self, regressors: &[f64]) -> f64 {
-        let Some((novelty, start)) = &self.of_fit else {
-            return f64::NAN;
-        };
         let Known {
             filter, scaling, ..
         } = &self.known;
-        after_learning(novelty_at(Some(novelty), regressors), || {
-            [filter, start].map(|filter| variance(filter, regressors.len(), scaling.of(regressors)))
+        let novelty = novelty_at(self.novelty.as_ref(), regressors);
+        if self.known.made_up && novelty > 1.0 {
+            return 1.0;
+        }
+        after_learning(novelty, || {
+            [filter, &self.start]
+                .map(|filter| variance(filter, regressors.len(), scaling.of(regressors)))
         })
     }
 
@@ -187,9 +242,41 @@ impl Learner for Following {
         scaling.truth + filter.expected(self.known.since(of), with_one(|_| 0.0))
     }
 
+    fn memory(&self) -> Option<Duration> {
+        Some(self.memory)
+    }
+
+    /// Not where it has nothing but the level.
+    fn yields_to_fit(&self) -> bool {
+        self.of_fit.is_some()
+    }
+
+    fn as_fitted(&self) -> Option<&dyn Learner> {
+        self.of_fit.as_deref().map(|of_fit| of_fit as &dyn Learner)
+    }
+
+    fn says_little(&self, regressors: &[f64]) -> bool {
+        let scaled = self.known.scaling.of(regressors);
+        variance(&self.start, regressors.len(), scaled) < self.little
+    }
+
+    fn pass_over(&mut self, regressors: &[f64], truth: f64, at: Instant) {
+        self.follow_level(regressors, truth, at);
+        self.has_passed(at);
+    }
+
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
-        let all = self.known.filter.state().len();
+        let known = &mut self.known;
+        if let (Some(fading), Some(last)) = (&mut self.fading, known.faded) {
+            let after_s = (at - last).secs().max(0.0);
+            fading.fade(&mut known.filter, after_s / self.memory.secs());
+        }
+        let all = known.filter.state().len();
         self.take(all, regressors, truth, at);
+        if let Some(of_fit) = &mut self.of_fit {
+            of_fit.follow_level(regressors, truth, at);
+        }
+        self.has_passed(at);
     }
 
     fn has_level(&self) -> bool {
@@ -198,19 +285,31 @@ impl Learner for Following {
 
     fn follow_level(&mut self, regressors: &[f64], truth: f64, at: Instant) {
         self.take(self.known.mean() + 1, regressors, truth, at);
+        self.known.made_up = true;
+        if let Some(of_fit) = &mut self.of_fit {
+            of_fit.follow_level(regressors, truth, at);
+        }
     }
 
-    fn segment(&mut self, _shift: Duration) {
+    fn segment(&mut self, shift: Duration) {
+        self.known.faded = self.known.faded.map(|faded| faded + shift);
         // How long the machine was not watched is unknown, and so is where the level has gone meanwhile.
         let mean = self.known.mean();
         let leapt = self.known.filter.state()[mean];
         self.known.filter.restart_level(&self.at_large);
         self.known.filter.widen(mean, leapt * leapt);
-        self.known.last = None;
+        (self.known.last, self.known.made_up) = (None, false);
+        if let Some(of_fit) = &mut self.of_fit {
+            of_fit.segment(shift);
+        }
     }
 
     fn snapshot(&self) -> Box<dyn State> {
-        Box::new(self.known.clone())
+        let of_fit = self.of_fit.as_ref();
+        Box::new(Known {
+            of_fit: of_fit.map(|of_fit| Box::new(of_fit.known.clone())),
+            ..self.known.clone()
+        })
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
@@ -224,10 +323,19 @@ impl Learner for Following {
         if known.filter.is_diffuse() {
             return Restored::cold("it knows nothing of a state");
         }
-        if !self.known.filter.resume(&known.filter) {
+        let own = self.of_fit.as_deref_mut().zip(known.of_fit.as_deref());
+        if let Some((own, kept)) = &own
+            && own.known.coefficients() != kept.coefficients()
+        {
+            return Restored::cold("another fit begins from what it knows itself");
+        }
+        if !self.known.resume(&known) {
             return Restored::cold("it has other states: a trend more or less, or other features");
         }
-        self.known.last = known.last;
+        // In an older form the fit has none: its level is found at the next truths.
+        if let Some((own, kept)) = own {
+            own.known.resume(kept);
+        }
         Restored::Accepted
     }
 }
@@ -237,6 +345,7 @@ mod tests {
     use athermal_numerics::{Passage, Structural};
 
     use super::*;
+    use crate::rls::day;
 
     fn scaling() -> Scaling {
         Scaling {
@@ -259,7 +368,11 @@ mod tests {
     }
 
     fn following() -> Following {
-        Following::new(&KalmanPredictor {
+        Following::new(&predictor())
+    }
+
+    fn predictor() -> KalmanPredictor {
+        KalmanPredictor {
             regressors: vec!["a".to_owned()],
             scaling: scaling(),
             filter: filter(),
@@ -267,7 +380,9 @@ mod tests {
             every: Duration::ZERO,
             range: None,
             novelty: None,
-        })
+            memory: day(),
+            little: 0.0,
+        }
     }
 
     fn after(secs: i64) -> Instant {
@@ -310,6 +425,58 @@ mod tests {
         );
         assert!((mean - 600.0).abs() < 20.0, "{mean}");
         assert!((deviation - 500.0).abs() < 20.0, "{deviation}");
+    }
+
+    #[test]
+    fn what_was_learned_of_a_coefficient_fades_and_goes_back_to_the_fit() {
+        let mut following = following();
+        for secs in 0..3000 {
+            let x = (0.3 * secs as f64).sin();
+            following.learn(&[10.0 + 2.0 * x], 101.0 + 5.0 * x, after(secs));
+        }
+        let coefficient = |of: &Following| of.known.filter.state()[2];
+        assert!((coefficient(&following) - 5.0).abs() < 0.1);
+        let kept = following.snapshot();
+        let mut other = super::tests::following();
+        assert_eq!(other.restore(kept), Restored::Accepted);
+        for of in [&mut following, &mut other] {
+            // In the middle of the fit it says nothing of the coefficient.
+            of.learn(&[10.0], 101.0, after(30 * 86_400));
+            let found = coefficient(of);
+            assert!((found - 3.0).abs() < 0.05, "{found}");
+        }
+        let variance = following.known.filter.covariance()[8];
+        assert!(variance <= 0.2 / SHARE * 1.001, "{variance}");
+    }
+
+    #[test]
+    fn what_stands_in_follows_the_level_with_the_coefficients_of_the_fit() {
+        let mut following = following();
+        for secs in 0..3000 {
+            let x = (0.3 * secs as f64).sin();
+            following.learn(&[10.0 + 2.0 * x], 121.0 + 5.0 * x, after(secs));
+        }
+        let of_fit = following.as_fitted().unwrap();
+        let at = |value: f64| of_fit.predict(&[value], after(2999));
+        assert!((at(10.0) - 121.0).abs() < 2.0, "{}", at(10.0));
+        let per_scale = at(12.0) - at(10.0);
+        assert!((per_scale - 3.0).abs() < 1e-9, "{per_scale}");
+        let mut other = super::tests::following();
+        assert_eq!(other.restore(following.snapshot()), Restored::Accepted);
+        let other = other.as_fitted().unwrap();
+        assert_eq!(other.predict(&[12.0], after(2999)), at(12.0));
+    }
+
+    #[test]
+    fn what_was_learned_from_another_fit_is_not_gone_on_from() {
+        let model = filter().model();
+        let other = Filter::starting_at(model, vec![1.0, 4.0], &[0.5, 0.1, 0.1, 0.2]);
+        let mut other = Following::new(&KalmanPredictor {
+            filter: other.unwrap(),
+            ..predictor()
+        });
+        let kept = following().snapshot();
+        assert!(matches!(other.restore(kept), Restored::Cold { .. }));
     }
 
     #[test]

@@ -17,47 +17,55 @@ mod follow;
 
 use crate::features::too_many;
 use crate::novelty::{novelty_at, novelty_mistakes};
+use crate::rls::day;
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
 use follow::{Following, std_dev};
 
 /// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
 ///
-/// `y = ȳ + μ + Σ b_j x_j + ε` with the mean truth `ȳ` of the fit; the level `μ` wanders and returns to 0 at a rate of its own
-/// (an autoregressive component, which with a rate of 0 is the random walk of the local level), or has a slope that is a
-/// random walk (local linear trend). Both are in continuous time, so that truths may come at any instants and be missing
-/// (Harvey 1989, sections 2.3, 9.1 and 9.2; Durbin and Koopman 2012, chapters 2 to 4). The fit finds the coefficients,
-/// and unless `noises` gives them the variances and the rate that make its rows most likely. Running, the filter takes each
-/// truth that the embargo lets through and predicts `ahead` of now from the newest one. The coefficients are states that do
-/// not wander: each truth moves them too, by as much as they are still uncertain, which is less from truth to truth. With
-/// `learn = false` it stays where the fit ended, which is regression on the features. Without features it is a forecast from the past of the truth
-/// alone.
+/// `y = ȳ + μ + Σ b_j x_j + ε` with the mean truth `ȳ` of the fit. The level `μ` wanders and returns to 0 at a rate
+/// of its own (an autoregressive component). With a rate of 0 it is the random walk of the local level. Or it has a
+/// slope that is a random walk (local linear trend). Both are in continuous time, so that truths may come at any
+/// instants and be missing. (Harvey 1989, sections 2.3, 9.1 and 9.2; Durbin and Koopman 2012, chapters 2 to 4.) The
+/// fit finds the coefficients, and unless `noises` gives them the variances and the rate that make its rows most
+/// likely. Running, the filter takes each truth that the embargo lets through and predicts `ahead` of now from the
+/// newest one. The coefficients are states that do not wander: each truth moves them too, by as much as they are
+/// still uncertain. What was learned of them fades in `memory`, and goes back to a tenth of what the fit knew, as
+/// that of `rls` does. As there, at most ten truths of one window teach, and one that says little of the coefficients
+/// moves the level alone. It speaks only while its error over the last 20 windows of truth is no larger than that of
+/// the fit on the same truths. Until then, and one `memory` after the last truth, the fit stands in: a filter whose
+/// level and trend follow the same truths, with the coefficients of the fit. With `learn = false` it stays where the
+/// fit ended, which is regression on the features.
+/// Without features it is a forecast from the past of the truth alone.
 ///
 /// The fit knows nothing of level and trend where it starts, nor at the start of a segment (a diffuse start). A level is one
 /// that returns only where that makes the rows likelier by a factor of 60, as one in twenty does that does not return. What is
 /// not known of the variances and of that rate is no part of `std_dev`; what is not known of level, trend and coefficients is.
 ///
-/// A truth of which a feature lies outside the range of the fit, by more than `learn.margin` says, moves level and trend and
-/// leaves the coefficients as they are (Schmidt 1966), so that a dead sensor cannot spoil them. One that misses by more than
-/// ten deviations, and is no outlier any more since so many before it did too, is a leap of the level: the level is where the
-/// truth is, as unsure as it has leapt until the next truth tells whether it stays there, and the coefficients hardly move. Of
-/// the variance of the leap, the mean `ȳ` of a level that returns has a hundredth, so that the mean has moved where the level
-/// stays away, and a trend what a ramp since the truth before could tell. In a new segment the mean is as unsure as it has moved.
+/// Where a feature lies outside the range of the fit, by more than `learn.margin` says, its truth moves level and
+/// trend only (Schmidt 1966). The coefficients stay, so that a dead sensor cannot spoil them. One that misses by more
+/// than ten deviations, and is no outlier any more since so many before it did too, is a leap of the level. The level
+/// is then where the truth is, as unsure as it has leapt until the next truth shows whether it stays there. The
+/// coefficients hardly move. Of the variance of the leap, the mean `ȳ` of a level that returns has a hundredth, so
+/// that the mean has moved where the level stays away. A trend has as much as a ramp since the truth before could
+/// explain. In a new segment the mean is as unsure as it has moved.
 ///
-/// The limit of `learn.outliers` keeps spikes out, and with them the beginning of what really changes within a truth or two. Without
-/// features there is nothing else to go by: on the die tester's axis Z1, whose drift leaps by hundreds of nm/min when a die is
-/// loaded, one to three truths are refused each time, and the error is 66 nm/min instead of 56. Where truths are sound, say
-/// `learn = { outliers = inf }`. That several in a row are refused on one side does not tell a change from a spike: where
-/// windows overlap, one bad position spoils several truths.
+/// The limit of `learn.outliers` keeps spikes out, and with them the beginning of what really changes within a truth
+/// or two. Without features there is nothing else to go by: the drift of the die tester's axis Z1 leaps by hundreds
+/// of nm/min when a die is loaded. One to three truths are refused each time, and the error is 66 nm/min instead
+/// of 56. Where truths are sound, say `learn = { outliers = inf }`. That several in a row are refused on one side does
+/// not tell a change from a spike: where windows overlap, one bad position spoils several truths.
 ///
-/// Truths whose windows overlap share their noise, which the model would take for a level that moves; so a truth that comes
-/// sooner than `every` after the one before counts for its share of that time, its variance being multiplied by the inverse.
-/// The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new segment level and
-/// trend start from what the fit knew of them at large. The port `std_dev` is the standard deviation of the truth about its
-/// prediction; it grows while no truth comes. The port `learning` tells what became of the newest truth, in the numbers of
-/// `rls`, and what is not learned from is not followed either, but for 4, a feature outside the range of the fit. The answer
-/// changes with time alone, so the node runs at every tick. The port `novelty` is that of `linear`, of the features, and less where it
-/// has learned since, as that of `rls` is by the variance that the coefficients bring in.
+/// Truths whose windows overlap share their noise, which the model would take for a level that moves. So a truth that
+/// comes sooner than `every` after the one before counts for its share of that time: its variance is multiplied by
+/// the inverse. The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new
+/// segment level and trend start from what the fit knew of them at large. The port `std_dev` is the standard
+/// deviation of the truth about its prediction; it grows while no truth comes. The port `learning` says what became
+/// of the newest truth, in the numbers of `rls`. What is not learned from is not followed either, but for 4, a
+/// feature outside the range of the fit. The answer changes with time alone, so the node runs at every tick. The port
+/// `novelty` is that of `linear`, of the features, and less where it has learned since, as that of `rls` is by the
+/// variance that the coefficients bring in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kalman {
@@ -67,15 +75,19 @@ pub struct Kalman {
     /// How large the noises are; without it they are found by maximum likelihood.
     #[serde(default)]
     pub noises: Option<Noises>,
-    /// The penalty on the coefficients of standardised features, at least 0, as in ridge: their prior variance is the sum
-    /// of the model's variances over a typical step, the mean gap between rows, divided by it. 0 says that nothing is known of them; a smaller one than
-    /// 1e-10 counts as that, since differences of larger variances would be rounding alone.
+    /// The penalty on the coefficients of standardised features, at least 0, as in ridge. Their prior variance is the sum
+    /// of the model's variances over a typical step, the mean gap between rows, divided by it. 0 says that nothing is known of
+    /// them. A smaller one than 1e-10 counts as that, since differences of larger variances would be rounding alone.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0))]
     pub penalty: f64,
     /// The time within which truths share their noise; without it the span of the truth.
     #[serde(default)]
     pub every: Option<Duration>,
+    /// In which time what was learned of the coefficients fades, but for 1/e.
+    #[serde(default = "day")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub memory: Duration,
 }
 
 /// How large the noises of a structural model are, as standard deviations in units that measure the same as the truth.
@@ -229,6 +241,12 @@ struct KalmanPredictor {
     /// How far regressors are from those of the rows that were followed, where these say so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     novelty: Option<Novelty>,
+    /// In which time what is learned of the coefficients fades.
+    #[serde(default = "day")]
+    memory: Duration,
+    /// A truth says little of them where the variance that they bring into its prediction was less in the fit.
+    #[serde(default)]
+    little: f64,
 }
 
 impl Predictor for KalmanPredictor {

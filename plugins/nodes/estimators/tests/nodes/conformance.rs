@@ -358,7 +358,7 @@ conformance!(
         r#"
         ahead = "0s"
         lags = ["30s"]
-        forgetting = { type = "variable", memory = 100.0, lowest = 0.8 }
+        memory = "100s"
         learn = { margin = 1.0 }
         "#
     )

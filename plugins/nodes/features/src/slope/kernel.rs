@@ -8,6 +8,7 @@
 //! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
 
 mod blocks;
+mod keeps;
 mod lanes;
 mod layout;
 mod line;
@@ -25,6 +26,8 @@ use std::array::from_fn;
 
 use pulp::Simd;
 use serde::{Deserialize, Serialize};
+
+pub use keeps::keeps;
 
 use blocks::{Blocks, EACH};
 use lanes::{LANES, Lanes};
@@ -347,7 +350,7 @@ impl RollingSlope {
                 Kind::Gaps => {
                     let wait = self.rows.wait(window.head, group);
                     let beyond = window.span(t_ns) as f64 - window.needed_span as f64;
-                    least.add_span(beyond, silent, wait);
+                    least.add_span(beyond, silent, &wait);
                     window.parts.slopes_with_gaps(groups, slopes, &mut least);
                 }
                 Kind::Absent => *slopes = [self.no_value.absent; LANES],
@@ -430,7 +433,7 @@ impl RollingSlope {
         let head_ns = self.rows.time(window.head);
         let samples = (window.head..self.rows.next()).map(|row| {
             let t = self.rows.time(row).saturating_sub(head_ns) as f64;
-            (t, self.rows.samples(row).as_flattened()[channel] - origin)
+            (t, self.rows.samples(row)[channel] - origin)
         });
         let end = self.rows.time(self.rows.next() - 1).saturating_sub(head_ns) as f64;
         Line::through(samples.filter(|(_, y)| !y.is_nan()), end)

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Duty, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
-    PortSummary, Reach, Restored, State, Tick,
+    Duty, Feature, InputPort, Inputs, Kept, KindFacts, Mistake, Operator, OutputPort, Outputs,
+    Pace, PortSummary, Reach, Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -20,11 +20,12 @@ use crate::windows::{half, over, three};
 
 /// The slope of the least-squares line through the samples of each channel in trailing windows.
 ///
-/// `Σ(x − x̄)(y − ȳ) / Σ(x − x̄)²` over the samples with time in `(t − T, t]`; times need not be regular. With several
-/// windows per temperature these are the dynamic-range features of Mandelli, Dankwart and Napoli, section 3.2; of a
-/// position it is the drift. Ports tell more of each line: `stderr` the standard error of its slope, from its own residuals
-/// (Draper and Smith 1998, section 1.4); `value` its value at the end of the window, a smoothed sample that lags nothing behind a
-/// steady ramp; `r2` its coefficient of determination, the share of the variance that it explains.
+/// `Σ(x − x̄)(y − ȳ) / Σ(x − x̄)²` over the samples with time in `(t − T, t]`; times need not be regular. With
+/// several windows per temperature these are the dynamic-range features of Mandelli, Dankwart and Napoli, section
+/// 3.2; of a position it is the drift. Three ports say more of each line. `stderr` is the standard error of its
+/// slope, from its own residuals (Draper and Smith 1998, section 1.4). `value` is its value at the end of the window,
+/// a smoothed sample that lags nothing behind a steady ramp. `r2` is its coefficient of determination, the share of
+/// the variance that it explains.
 ///
 /// A value exists once the window reaches back no further than the channel's first value, holds `min_samples` samples and
 /// these span `min_coverage` of it. Where times jitter, half a sample's period more than a whole number of periods keeps the oldest
@@ -35,7 +36,7 @@ pub struct Slope {
     /// The lengths of the windows, such as `["150s", "5min"]`, or a dynamic range of them.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub windows: Windows,
-    /// The unit of the slopes, such as `mK/min` of a temperature; without it, that of differences of the input per minute: of Cel
+    /// The unit of the slopes, such as `mK/min` of a temperature. Without it, that of differences of the input per minute: of Cel
     /// and K it is K/min, of \[degF\] \[degR\]/min.
     #[serde(default)]
     pub unit: Option<Unit>,
@@ -93,7 +94,7 @@ impl Slope {
 
 impl Feature for Slope {
     fn facts() -> KindFacts {
-        KindFacts::of(Duty::Slope).change()
+        KindFacts::of(Duty::Slope).change().pace(Pace::ByChannel)
     }
 
     fn inputs() -> &'static [InputPort] {
@@ -150,6 +151,13 @@ impl Feature for Slope {
     fn memory(&self) -> Duration {
         let lengths = self.windows.lengths().unwrap_or_default();
         lengths.into_iter().max().unwrap_or(Duration::ZERO)
+    }
+
+    fn keeps(&self, inputs: &Inputs, wanted: &[bool], every: Duration) -> Vec<Kept> {
+        let windows = self.windows.lengths().unwrap_or_default();
+        let channels = inputs.port("signal").len();
+        let squares = wanted.iter().skip(1).any(|wanted| *wanted);
+        kernel::keeps(&windows, channels, squares, every)
     }
 
     fn reach(&self, _port: &str) -> Reach {

@@ -2,6 +2,7 @@
 //! It does not decide which rows a window holds, nor which blocks are still needed.
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use super::lanes::{LANES, Lanes, group_count};
 use super::sums::{Common, Group, Table};
@@ -17,7 +18,8 @@ const REBASE_TIMES: u64 = 4;
 /// Rows from a channel's first sample on at which its origin is chosen each time, so that it is soon a good one.
 const SETTLING_ROWS: u64 = 5;
 
-/// Of a closed block the sums from each row on are kept so many rows apart; those between are added anew, which are fewer.
+/// Of the closed block in which a window begins the sums from each row on are kept so many rows apart; those between are added anew, which
+/// are fewer.
 pub(super) const EACH: u64 = 8;
 
 /// Sums over rows cut into blocks, the last of which is the current one.
@@ -30,12 +32,15 @@ pub(super) struct Blocks {
     /// Rows until these are chosen anew when a block closes, and rows still to come at which they are chosen anew at once.
     until_rebase: u64,
     settling: u64,
-    /// Of closed blocks each eighth row from the end, at [`Blocks::place`]: the rows from it to the end of its block, about the time of
-    /// the last.
+    /// By window, as many as [`most_tails`](Self::most_tails): of the block in which it begins, each eighth row from the end: the rows from it
+    /// to the end of the block, about the time of the last.
     tails: Table,
+    most_tails: usize,
+    /// By window: the first row of the block that it has the tails of, or none.
+    tails_of: Vec<u64>,
     /// By closed block: all of its rows, about the time of the last.
     wholes: Table,
-    /// By window, for as many rows as lie between two of [`tails`](Self::tails): the rows from it to the end of its closed block, about the
+    /// By window, for as many rows as lie between two of its tails: the rows from it to the end of its closed block, about the
     /// time of the last, the newest first; then an empty run.
     heads: Table,
     /// By block: the closed blocks from it on, about the time of the first row of the current one. That of the current one is empty.
@@ -55,6 +60,8 @@ impl Blocks {
             until_rebase: 0,
             settling: 0,
             tails: Table::new(channels, squares, 0),
+            most_tails: 0,
+            tails_of: vec![u64::MAX; windows],
             wholes: Table::new(channels, squares, 1),
             heads: Table::new(channels, squares, windows * EACH as usize + 1),
             rest: Table::new(channels, squares, 1),
@@ -69,6 +76,7 @@ impl Blocks {
         self.origins.fill([0.0; LANES]);
         self.until_rebase = 0;
         self.settling = 0;
+        self.tails_of.fill(u64::MAX);
         self.gaps = false;
         self.keep_times();
         self.rest.clear(0, 0);
@@ -137,7 +145,7 @@ impl Blocks {
             self.rebuild(rows, t_ns);
         } else {
             if let Some(closed) = self.starts.len().checked_sub(2) {
-                self.sum_tails(rows, closed);
+                self.sum_whole(rows, closed);
             }
             self.sum_rest(t_ns);
         }
@@ -191,20 +199,34 @@ impl Blocks {
     /// where sums are kept. A row that lies `n` before it has its sums at `n − 1` behind the first slot of the window.
     #[inline(always)]
     pub(super) fn sum_heads(&mut self, rows: &Rows, window: usize, head: u64, block: usize) -> u64 {
-        let end = self.starts[block + 1];
-        let kept = end - (end - head - 1) / EACH * EACH;
-        let place = self.place(kept);
-        let before = (kept < end).then_some((&self.tails, place));
+        let (start, end) = (self.starts[block], self.starts[block + 1]);
+        if self.tails_of[window] != start {
+            self.tails_of[window] = start;
+            self.sum_tails(rows, window, head..end);
+        }
+        let behind = (end - head - 1) / EACH;
+        let kept = end - behind * EACH;
+        let last = (window * self.most_tails + behind as usize).checked_sub(1);
+        let before = last.filter(|_| kept < end).map(|last| (&self.tails, last));
         let slot = window * EACH as usize;
         let about = (rows.time(end - 1), &*self.origins);
         self.heads.sum_each(slot, before, rows, head..kept, about);
         kept
     }
 
-    /// Where the sums from a row on are, which is an eighth one of its block.
-    #[inline]
-    fn place(&self, row: u64) -> usize {
-        (row / EACH) as usize & (self.tails.slots() - 1)
+    /// Sums each eighth row of a closed block that a window may come to begin with.
+    #[inline(always)]
+    fn sum_tails(&mut self, rows: &Rows, window: usize, numbers: Range<u64>) {
+        let (first, mut end) = (window * self.most_tails, numbers.end);
+        let count = (end - numbers.start - 1) / EACH;
+        for slot in first..first + count as usize {
+            match slot == first {
+                true => self.tails.clear(slot, rows.time(end - 1)),
+                false => self.tails.copy(slot - 1, slot),
+            }
+            self.tails.add(slot, rows, end - EACH..end, &self.origins);
+            end -= EACH;
+        }
     }
 
     /// Sums all rows of a window that begins within the current block: at most [`FEWEST_ROWS`]. Says where the sums are.
@@ -222,13 +244,10 @@ impl Blocks {
 
     /// Computes all sums anew, with the same bits; `t_ns` is the time of the next row, if the current block is still empty.
     pub(super) fn rebuild(&mut self, rows: &Rows, t_ns: i64) {
-        let slots = (rows.capacity() / EACH as usize + 1).next_power_of_two();
-        if self.tails.slots() != slots {
-            self.tails.resize(slots);
-        }
+        self.tails_of.fill(u64::MAX);
         self.heads.clear(self.heads.slots() - 1, 0);
         for block in 0..self.starts.len() - 1 {
-            self.sum_tails(rows, block);
+            self.sum_whole(rows, block);
         }
         let start = self.current_start();
         if start < rows.next() {
@@ -262,19 +281,18 @@ impl Blocks {
 
     /// Newest row first: whatever an older row of the block holds is not in the sums of the later ones.
     #[inline(always)]
-    fn sum_tails(&mut self, rows: &Rows, block: usize) {
+    fn sum_whole(&mut self, rows: &Rows, block: usize) {
         if block >= self.wholes.slots() {
             self.wholes.resize(block + block / 4 + 1);
         }
-        let (start, mut end) = (self.starts[block], self.starts[block + 1]);
-        self.wholes.clear(block, rows.time(end - 1));
-        while end - start >= EACH {
-            let row = end - EACH;
-            self.wholes.add(block, rows, row..end, &self.origins);
-            let place = self.place(row);
-            self.tails.set(place, &self.wholes, block);
-            end = row;
+        let (start, end) = (self.starts[block], self.starts[block + 1]);
+        let tails = ((end - start - 1) / EACH) as usize;
+        if tails > self.most_tails {
+            self.most_tails = tails;
+            self.tails.resize(self.tails_of.len() * tails);
+            self.tails_of.fill(u64::MAX);
         }
+        self.wholes.clear(block, rows.time(end - 1));
         self.wholes.add(block, rows, start..end, &self.origins);
     }
 
@@ -297,7 +315,7 @@ impl Blocks {
                 let mut found = 0;
                 let samples = (oldest..rows.next())
                     .rev()
-                    .map(|row| rows.samples(row)[group][i]);
+                    .map(|row| rows.sample(row, group)[i]);
                 for (kept, y) in newest.iter_mut().zip(samples.filter(|y| !y.is_nan())) {
                     *kept = y;
                     found += 1;

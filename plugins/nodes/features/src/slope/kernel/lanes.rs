@@ -11,3 +11,9 @@ pub(super) type Lanes = [f64; LANES];
 pub(super) fn group_count(channels: usize) -> usize {
     channels.div_ceil(LANES)
 }
+
+/// Makes a list so long, with no more room than that: windows hold about as many rows at all times.
+pub(super) fn lengthen<T: Clone>(list: &mut Vec<T>, len: usize, with: T) {
+    list.reserve_exact(len.saturating_sub(list.len()));
+    list.resize(len, with);
+}

@@ -77,11 +77,14 @@ impl Weights {
     #[inline(always)]
     pub(super) fn slopes(&self, i: usize, [head, rest, now]: [&Values; 3]) -> Lanes {
         let (of_ty, of_y, of_head_y) = (self.of_ty[i], self.of_y[i], self.of_head_y[i]);
-        from_fn(|i| {
-            of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+        let mut slopes = [0.0; LANES];
+        // A closure of this length is not inlined.
+        for (i, slope) in slopes.iter_mut().enumerate() {
+            *slope = of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
                 - of_y * (rest.y[i] + now.y[i])
-                - of_head_y * head.y[i]
-        })
+                - of_head_y * head.y[i];
+        }
+        slopes
     }
 }
 

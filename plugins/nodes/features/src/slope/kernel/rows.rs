@@ -1,18 +1,20 @@
 //! The rows that some window still holds, and how long each channel has been there, silent or awaited.
 //! It does not decide which rows a window holds, nor when there is a value.
 
-use super::lanes::{LANES, Lanes, group_count};
+use std::array::from_fn;
+
+use super::lanes::{LANES, Lanes, group_count, lengthen};
 
 /// Rows in a ring, counted from the last reset.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     channels: usize,
-    groups: usize,
     time: Vec<i64>,
-    samples: Vec<Lanes>,
+    /// Row by row one of each channel, and behind the last row as many numbers as a group has channels.
+    samples: Vec<f64>,
     /// Nanoseconds from each row to the channel's next sample, 0 where it has one, infinite where none has come yet. Has room from the first
-    /// gap on.
-    wait: Vec<Lanes>,
+    /// gap on, as samples have.
+    wait: Vec<f64>,
     /// The row in slot 0, the first or the newest that was there, and the number of the next one.
     base: u64,
     next: u64,
@@ -30,21 +32,15 @@ pub(super) struct Rows {
     latest_first: Option<i64>,
 }
 
-/// Rows that there is room for from the beginning, and pieces in which there becomes more of it.
-const INITIAL_CAPACITY: usize = 64;
-const PIECE: usize = 32;
-
-/// Who has not waited.
-const AT_ONCE: &Lanes = &[0.0; LANES];
+/// Rows that there is room for from the beginning, and more of which there becomes room at least.
+const PIECE: usize = 16;
 
 impl Rows {
     pub(super) fn new(channels: usize, wide_ns: i64) -> Rows {
-        let groups = group_count(channels);
-        Rows {
+        let mut rows = Rows {
             channels,
-            groups,
-            time: vec![0; INITIAL_CAPACITY],
-            samples: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
+            time: vec![0; PIECE],
+            samples: vec![0.0; PIECE * channels + LANES],
             wait: Vec::new(),
             base: 0,
             next: 0,
@@ -52,10 +48,12 @@ impl Rows {
             complete_from: 0,
             wide_ns,
             even_from: 0,
-            silent: vec![[f64::INFINITY; LANES]; groups],
+            silent: vec![[0.0; LANES]; group_count(channels)],
             first: vec![None; channels],
             latest_first: None,
-        }
+        };
+        rows.reset();
+        rows
     }
 
     pub(super) fn reset(&mut self) {
@@ -63,7 +61,7 @@ impl Rows {
         self.last = None;
         self.complete_from = 0;
         self.even_from = 0;
-        self.silent.fill([f64::INFINITY; LANES]);
+        self.silent.as_flattened_mut()[..self.channels].fill(f64::INFINITY);
         self.first.fill(None);
         self.latest_first = None;
     }
@@ -72,10 +70,6 @@ impl Rows {
     #[inline]
     pub(super) fn next(&self) -> u64 {
         self.next
-    }
-
-    pub(super) fn capacity(&self) -> usize {
-        self.time.len()
     }
 
     #[inline]
@@ -97,17 +91,43 @@ impl Rows {
         self.last
     }
 
-    /// The samples of a row by groups of channels, NaN where absent.
+    /// Where the numbers of a row are.
     #[inline]
-    pub(super) fn samples(&self, row: u64) -> &[Lanes] {
-        let slot = self.slot(row);
-        &self.samples[slot * self.groups..(slot + 1) * self.groups]
+    fn place(&self, row: u64) -> usize {
+        self.slot(row) * self.channels
+    }
+
+    /// The samples of a row, NaN where absent.
+    #[inline]
+    pub(super) fn samples(&self, row: u64) -> &[f64] {
+        &self.samples[self.place(row)..][..self.channels]
     }
 
     /// Those of one group.
-    #[inline]
-    pub(super) fn sample(&self, row: u64, group: usize) -> &Lanes {
-        &self.samples[self.slot(row) * self.groups + group]
+    #[inline(always)]
+    pub(super) fn sample(&self, row: u64, group: usize) -> Lanes {
+        self.lanes(&self.samples, row, group)
+    }
+
+    /// The same, with how long after an instant the row is.
+    #[inline(always)]
+    pub(super) fn timed(&self, row: u64, group: usize, origin: i64) -> (f64, Lanes) {
+        let t = self.time(row).wrapping_sub(origin) as f64;
+        (t, self.sample(row, group))
+    }
+
+    /// What a list has of a row for the channels of a group; 0 for those with which it is filled up.
+    #[inline(always)]
+    fn lanes(&self, list: &[f64], row: u64, group: usize) -> Lanes {
+        let first = group * LANES;
+        let Some(lanes) = list[self.place(row) + first..].first_chunk() else {
+            return [0.0; LANES];
+        };
+        let channels = self.channels - first;
+        if channels >= LANES {
+            return *lanes;
+        }
+        from_fn(|i| if i < channels { lanes[i] } else { 0.0 })
     }
 
     /// The first row after the last one from which a sample is missing.
@@ -124,9 +144,11 @@ impl Rows {
 
     /// Nanoseconds from a row to the next sample of each channel of a group.
     #[inline]
-    pub(super) fn wait(&self, row: u64, group: usize) -> &Lanes {
-        let place = self.slot(row) * self.groups + group;
-        self.wait.get(place).unwrap_or(AT_ONCE)
+    pub(super) fn wait(&self, row: u64, group: usize) -> Lanes {
+        if self.wait.is_empty() {
+            return [0.0; LANES];
+        }
+        self.lanes(&self.wait, row, group)
     }
 
     /// Nanoseconds since each channel's newest sample.
@@ -180,18 +202,18 @@ impl Rows {
         }
     }
 
-    /// By an eighth, and at least a piece: windows hold about as many rows at all times.
+    /// By a part, and at least a piece: windows hold about as many rows at all times.
     fn grow(&mut self, oldest: u64) {
         let first = self.slot(oldest);
-        let slots = self.time.len() + (self.time.len() / 8).next_multiple_of(PIECE);
-        let places = slots * self.groups;
+        let slots = self.time.len() + (self.time.len() / 64).max(PIECE);
+        let (len, numbers) = (self.samples.len() - LANES, slots * self.channels + LANES);
         self.time.rotate_left(first);
-        self.time.resize(slots, 0);
-        self.samples.rotate_left(first * self.groups);
-        self.samples.resize(places, [0.0; LANES]);
-        if !self.wait.is_empty() {
-            self.wait.rotate_left(first * self.groups);
-            self.wait.resize(places, [0.0; LANES]);
+        lengthen(&mut self.time, slots, 0);
+        for list in [&mut self.samples, &mut self.wait] {
+            if !list.is_empty() {
+                list[..len].rotate_left(first * self.channels);
+                lengthen(list, numbers, 0.0);
+            }
         }
         self.base = oldest;
     }
@@ -209,9 +231,8 @@ impl Rows {
         }
         let slot = self.slot(self.next);
         self.time[slot] = t_ns;
-        let places = slot * self.groups..(slot + 1) * self.groups;
+        let places = slot * self.channels..(slot + 1) * self.channels;
         let row = &mut self.samples[places.clone()];
-        let row = &mut row.as_flattened_mut()[..self.channels];
         let y = &y[..y.len().min(self.channels)];
         let (there, missing) = row.split_at_mut(y.len());
         let mut absent = !missing.is_empty();
@@ -227,9 +248,9 @@ impl Rows {
         }
         missing.fill(f64::NAN);
         if !self.wait.is_empty() {
-            self.wait[places].fill([0.0; LANES]);
+            self.wait[places].fill(0.0);
         } else if absent {
-            self.wait.resize(self.samples.len(), [0.0; LANES]);
+            lengthen(&mut self.wait, self.samples.len(), 0.0);
         }
         // Where this row and the last are complete nobody is silent or awaited.
         let begun = (absent || self.complete_from == self.next) && {
@@ -246,10 +267,10 @@ impl Rows {
 
     /// Counts how long each channel has been silent at the new row.
     fn follow_silence(&mut self, passed: f64) {
-        let slot = self.slot(self.next);
-        let row = &self.samples[slot * self.groups..(slot + 1) * self.groups];
+        let place = self.place(self.next);
+        let row = &self.samples[place..][..self.channels];
         let silent = self.silent.as_flattened_mut().iter_mut();
-        for (silent, y) in silent.zip(row.as_flattened()) {
+        for (silent, y) in silent.zip(row) {
             *silent = if y.is_nan() { *silent + passed } else { 0.0 };
         }
     }
@@ -257,12 +278,10 @@ impl Rows {
     /// Marks where the new row's channels are awaited and ends the wait of those that have come back; says whether one has begun.
     fn follow_absence(&mut self, oldest: u64) -> bool {
         let mut begun = false;
-        let width = LANES * self.groups;
-        let (slot, t_ns) = (self.slot(self.next), self.time(self.next));
+        let (place, t_ns) = (self.place(self.next), self.time(self.next));
         for channel in 0..self.channels {
-            let place = slot * width + channel;
-            if self.samples.as_flattened()[place].is_nan() {
-                self.wait.as_flattened_mut()[place] = f64::INFINITY;
+            if self.samples[place + channel].is_nan() {
+                self.wait[place + channel] = f64::INFINITY;
                 continue;
             }
             if self.first[channel].is_none() {
@@ -270,18 +289,14 @@ impl Rows {
                 begun = true;
             }
             for row in (oldest..self.next).rev() {
-                let earlier = self.slot(row);
-                let Some(wait) = self
-                    .wait
-                    .as_flattened_mut()
-                    .get_mut(earlier * width + channel)
-                else {
+                let (earlier, t) = (self.place(row) + channel, self.time(row));
+                let Some(wait) = self.wait.get_mut(earlier) else {
                     break;
                 };
                 if *wait != f64::INFINITY {
                     break;
                 }
-                *wait = t_ns.saturating_sub(self.time[earlier]) as f64;
+                *wait = t_ns.saturating_sub(t) as f64;
             }
         }
         if begun {

@@ -57,7 +57,7 @@ impl From<RollingSlope> for Saved {
             squares: kernel.squares,
             times_ns: (oldest..rows.next()).map(|row| rows.time(row)).collect(),
             samples: (oldest..rows.next())
-                .flat_map(|row| &rows.samples(row).as_flattened()[..channels])
+                .flat_map(|row| rows.samples(row))
                 .map(|&y| (!y.is_nan()).then_some(y))
                 .collect(),
             cuts: blocks.starts()[1..]

@@ -8,7 +8,7 @@
 use std::array::from_fn;
 use std::ops::Range;
 
-use super::lanes::{LANES, Lanes, group_count};
+use super::lanes::{LANES, Lanes, group_count, lengthen};
 use super::rows::Rows;
 
 /// Sums of `L` channels that concern the times of their samples: Σ1, Σt, Σt².
@@ -208,22 +208,22 @@ impl Table {
         for group in &mut self.groups {
             group.keeps_times = keep;
             if keep {
-                group.times.resize(slots, TimesOfLanes(Times::NONE));
+                lengthen(&mut group.times, slots, TimesOfLanes(Times::NONE));
             }
         }
     }
 
     /// Changes the number of slots; the runs must be computed anew.
     pub(super) fn resize(&mut self, slots: usize) {
-        self.common.resize(slots, Common::NONE);
+        lengthen(&mut self.common, slots, Common::NONE);
         for group in &mut self.groups {
-            group.values.resize(slots, Values::NONE);
+            lengthen(&mut group.values, slots, Values::NONE);
             // Once there was a gap, a later one must not have to make room.
-            if !group.times.is_empty() {
-                group.times.resize(slots, TimesOfLanes(Times::NONE));
+            if group.keeps_times || !group.times.is_empty() {
+                lengthen(&mut group.times, slots, TimesOfLanes(Times::NONE));
             }
             if group.keeps_squares {
-                group.squares.resize(slots, [0.0; LANES]);
+                lengthen(&mut group.squares, slots, [0.0; LANES]);
             }
         }
     }
@@ -269,27 +269,25 @@ impl Table {
         }
         let origin = common.origin;
         for (index, (group, about)) in self.groups.iter_mut().zip(origins).enumerate() {
-            let samples = numbers.clone().rev().map(|row| {
-                let t = rows.time(row).wrapping_sub(origin) as f64;
-                (t, rows.sample(row, index))
-            });
             let mut values = group.values[slot];
-            for (t, y) in samples.clone() {
-                values = values.plus(&Values::of(t, y, about));
+            for row in numbers.clone().rev() {
+                let (t, y) = rows.timed(row, index, origin);
+                values = values.plus(&Values::of(t, &y, about));
             }
             group.values[slot] = values;
             if group.keeps_squares {
                 let mut sum = group.squares[slot];
-                for (_, y) in samples.clone() {
-                    let squares = squares(y, about);
+                for row in numbers.clone().rev() {
+                    let squares = squares(&rows.sample(row, index), about);
                     sum = from_fn(|i| sum[i] + squares[i]);
                 }
                 group.squares[slot] = sum;
             }
             if group.keeps_times {
                 let mut times = group.times[slot].0;
-                for (t, y) in samples {
-                    times = times.plus(&Times::of(t, y));
+                for row in numbers.clone().rev() {
+                    let (t, y) = rows.timed(row, index, origin);
+                    times = times.plus(&Times::of(t, &y));
                 }
                 group.times[slot].0 = times;
             }
@@ -316,44 +314,42 @@ impl Table {
         }
         for (index, (group, about)) in self.groups.iter_mut().zip(origins).enumerate() {
             let behind = behind.map(|(table, run)| (&table.groups[index], run));
-            let samples = slots.clone().zip(numbers.clone().rev()).map(|(slot, row)| {
-                let t = rows.time(row).wrapping_sub(origin) as f64;
-                (slot, t, rows.sample(row, index))
-            });
             let mut values = behind.map_or(Values::NONE, |(group, run)| group.values[run]);
-            for (slot, t, y) in samples.clone() {
-                values = values.plus(&Values::of(t, y, about));
+            for (slot, row) in slots.clone().zip(numbers.clone().rev()) {
+                let (t, y) = rows.timed(row, index, origin);
+                values = values.plus(&Values::of(t, &y, about));
                 group.values[slot] = values;
             }
             if group.keeps_squares {
                 let mut sum = behind.map_or([0.0; LANES], |(group, run)| group.squares[run]);
-                for (slot, _, y) in samples.clone() {
-                    let squares = squares(y, about);
+                for (slot, row) in slots.clone().zip(numbers.clone().rev()) {
+                    let squares = squares(&rows.sample(row, index), about);
                     sum = from_fn(|i| sum[i] + squares[i]);
                     group.squares[slot] = sum;
                 }
             }
             if group.keeps_times {
                 let mut times = behind.map_or(Times::NONE, |(group, run)| group.times[run].0);
-                for (slot, t, y) in samples {
-                    times = times.plus(&Times::of(t, y));
+                for (slot, row) in slots.clone().zip(numbers.clone().rev()) {
+                    let (t, y) = rows.timed(row, index, origin);
+                    times = times.plus(&Times::of(t, &y));
                     group.times[slot].0 = times;
                 }
             }
         }
     }
 
-    /// Sets a run to one of another table.
+    /// Sets a run to another one.
     #[inline(always)]
-    pub(super) fn set(&mut self, slot: usize, other: &Table, from: usize) {
-        self.common[slot] = other.common[from];
-        for (group, other) in self.groups.iter_mut().zip(&other.groups) {
-            group.values[slot] = other.values[from];
+    pub(super) fn copy(&mut self, from: usize, to: usize) {
+        self.common[to] = self.common[from];
+        for group in &mut self.groups {
+            group.values[to] = group.values[from];
             if group.keeps_times {
-                group.times[slot] = other.times[from];
+                group.times[to] = group.times[from];
             }
             if group.keeps_squares {
-                group.squares[slot] = other.squares[from];
+                group.squares[to] = group.squares[from];
             }
         }
     }
