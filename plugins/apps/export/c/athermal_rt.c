@@ -1100,8 +1100,10 @@ static void at_forget_blocks(const at_slope *s, at_memory m, int64_t forgotten)
     }
 }
 
-static void at_close_block(const at_slope *s, at_memory m, int64_t now)
+/* Begins a block with the next row; whether origins were chosen anew. */
+static int at_close_block(const at_slope *s, at_memory m, int64_t now)
 {
+    int anew = 0;
     const int64_t rows = m.i[s->ints + AT_ROWS];
     int64_t oldest;
     int32_t window;
@@ -1125,11 +1127,15 @@ static void at_close_block(const at_slope *s, at_memory m, int64_t now)
         const int64_t kept = AT_REBASE_TIMES * (rows - m.i[s->ints + AT_STARTS]);
         m.i[s->ints + AT_UNTIL_REBASE] = (kept > AT_REBASE_ROWS) ? kept : AT_REBASE_ROWS;
         at_choose_origins(s, m);
+        anew = 1;
     }
+    return anew;
 }
 
-static void at_push(const at_plan *p, const at_slope *s, at_memory m)
+/* Adds the row of this tick; whether origins were chosen anew, so that all sums are others. */
+static int at_push(const at_plan *p, const at_slope *s, at_memory m)
 {
+    int anew = 0;
     const int64_t now = m.i[AT_LAST];
     const int64_t row = m.i[s->ints + AT_ROWS];
     const int64_t start = m.i[s->ints + AT_STARTS + m.i[s->ints + AT_BLOCKS] - 1];
@@ -1142,7 +1148,7 @@ static void at_push(const at_plan *p, const at_slope *s, at_memory m)
     at_advance(s, m, s->order[0], now);
     if (((row - start) >= AT_MOST_ROWS)
         || (((row - start) >= AT_FEWEST_ROWS) && (m.i[at_heads(s) + s->order[0]] > start))) {
-        at_close_block(s, m, now);
+        anew = at_close_block(s, m, now);
     }
     m.i[of_channels + (3 * s->channels) + at_row_place(s, row)] = now;
     for (channel = 0; channel < s->channels; channel++) {
@@ -1175,10 +1181,12 @@ static void at_push(const at_plan *p, const at_slope *s, at_memory m)
     if (m.i[s->ints + AT_SETTLING] > 0) {
         m.i[s->ints + AT_SETTLING]--;
         at_choose_origins(s, m);
+        anew = 1;
     }
     for (window = 0; window < s->windows; window++) {
         at_advance(s, m, window, now);
     }
+    return anew;
 }
 
 /* Sums over a run of rows: of all rows 1, t and t squared; by channel y, t y, and the three of its own rows. */
@@ -1356,6 +1364,185 @@ static void at_finish(const at_plan *p, const at_slope *s, at_memory m, int32_t 
     }
 }
 
+/* ---- Sums that are kept: of the current block all rows, then of closed blocks each eighth row's from the end of its block, then by block all
+ * rows, and all closed blocks after it. So a tick adds at most seven rows for each window, in the order of all of them. */
+
+#define AT_EACH 8
+
+static int32_t at_kept_width(const at_slope *s)
+{
+    return 3 + (AT_SUMS * s->channels);
+}
+
+static int64_t at_kept_slots(const at_slope *s)
+{
+    return ((int64_t)s->room / AT_EACH) + 2;
+}
+
+/* Where the sums from a row on are, which is an eighth one of its block. */
+static at_real *at_tail_at(const at_slope *s, at_memory m, int64_t row)
+{
+    const int64_t slot = 1 + ((row / AT_EACH) % at_kept_slots(s));
+    return &m.r[s->kept + (int32_t)(slot * (int64_t)at_kept_width(s))];
+}
+
+/* Where the sums of a block are, with those of the closed blocks after it behind them. No block has fewer rows than lie between two places. */
+static at_real *at_whole_at(const at_slope *s, at_memory m, int64_t start)
+{
+    const int64_t slot = (1 + at_kept_slots(s)) + (2 * ((start / AT_EACH) % at_kept_slots(s)));
+    return &m.r[s->kept + (int32_t)(slot * (int64_t)at_kept_width(s))];
+}
+
+static void at_keep(const at_slope *s, at_real place[], const at_sums *sums)
+{
+    int32_t nth;
+    place[0] = sums->n;
+    place[1] = sums->t;
+    place[2] = sums->tt;
+    for (nth = 0; nth < (AT_SUMS * s->channels); nth++) {
+        place[3 + nth] = sums->of[nth];
+    }
+}
+
+/* Sums where they lie. */
+static at_sums at_kept_at(at_real place[])
+{
+    at_sums sums;
+    sums.n = place[0];
+    sums.t = place[1];
+    sums.tt = place[2];
+    sums.of = &place[3];
+    return sums;
+}
+
+/* Sums a closed block, the newest row first. */
+static void at_sum_block(const at_plan *p, const at_slope *s, at_memory m, int64_t block)
+{
+    const int64_t first = m.i[s->ints + AT_STARTS + block];
+    const int64_t end = m.i[s->ints + AT_STARTS + block + 1];
+    const int64_t last = at_row_time(s, m, end - 1);
+    at_sums tail = at_kept_at(&m.r[p->scratch]);
+    int64_t row;
+    at_clear(&tail, s->channels);
+    for (row = end - 1; row >= first; row--) {
+        at_add_row(s, m, &tail, row, last, 1);
+        if (((end - row) % AT_EACH) == 0) {
+            at_keep(s, at_tail_at(s, m, row), &tail);
+        }
+    }
+    at_keep(s, at_whole_at(s, m, first), &tail);
+}
+
+/* Of each block sums the closed ones after it, about the time of the first row of the current one. */
+static void at_sum_rest(const at_plan *p, const at_slope *s, at_memory m)
+{
+    const int64_t *starts = &m.i[s->ints + AT_STARTS];
+    const int64_t current = m.i[s->ints + AT_BLOCKS] - 1;
+    const int64_t origin = at_row_time(s, m, starts[current]);
+    at_sums rest = at_kept_at(&m.r[p->scratch]);
+    int64_t block;
+    at_clear(&rest, s->channels);
+    for (block = current - 1; block >= 0; block--) {
+        at_real *place = at_whole_at(s, m, starts[block]);
+        const at_sums whole = at_kept_at(place);
+        at_keep(s, &place[at_kept_width(s)], &rest);
+        at_add_shifted(s, &rest, &whole, (at_real)at_minus(at_row_time(s, m, starts[block + 1] - 1), origin), 1);
+    }
+}
+
+/* Sums the rows of the current block from one on. */
+static void at_sum_now(const at_slope *s, at_memory m, int64_t from)
+{
+    const int64_t current = m.i[s->ints + AT_STARTS + m.i[s->ints + AT_BLOCKS] - 1];
+    at_real *place = &m.r[s->kept];
+    at_sums now = at_kept_at(place);
+    int64_t row;
+    if (from == current) {
+        at_clear(&now, s->channels);
+    }
+    for (row = from; row < m.i[s->ints + AT_ROWS]; row++) {
+        at_add_row(s, m, &now, row, at_row_time(s, m, current), 1);
+    }
+    place[0] = now.n;
+    place[1] = now.t;
+    place[2] = now.tt;
+}
+
+/* Makes all sums of the rows, after origins have been chosen anew or a state was loaded. */
+static void at_rebuild(const at_plan *p, const at_slope *s, at_memory m)
+{
+    const int64_t current = m.i[s->ints + AT_BLOCKS] - 1;
+    int64_t block;
+    for (block = 0; block < current; block++) {
+        at_sum_block(p, s, m, block);
+    }
+    at_sum_rest(p, s, m);
+    at_sum_now(s, m, m.i[s->ints + AT_STARTS + current]);
+}
+
+static void at_run_fast(const at_plan *p, const at_slope *s, at_memory m, int anew)
+{
+    const int64_t rows = m.i[s->ints + AT_ROWS];
+    const int64_t *starts = &m.i[s->ints + AT_STARTS];
+    int64_t block = m.i[s->ints + AT_BLOCKS] - 1;
+    const int64_t current = starts[block];
+    const int64_t origin = at_row_time(s, m, current);
+    const int gaps = (m.i[at_heads(s) + s->order[s->windows - 1]] < m.i[s->ints + AT_COMPLETE_FROM]) ? 1 : 0;
+    at_sums now;
+    at_sums tail = at_kept_at(&m.r[p->scratch]);
+    at_sums none = at_kept_at(&m.r[p->scratch + at_kept_width(s)]);
+    int32_t nth;
+    int64_t row;
+    if (anew != 0) {
+        at_rebuild(p, s, m);
+    } else {
+        if ((current == (rows - 1)) && (block > 0)) {
+            at_sum_block(p, s, m, block - 1);
+            at_sum_rest(p, s, m);
+        }
+        at_sum_now(s, m, rows - 1);
+    }
+    now = at_kept_at(&m.r[s->kept]);
+    at_clear(&none, s->channels);
+    for (nth = 0; nth < s->windows; nth++) {
+        const int64_t head = m.i[at_heads(s) + s->order[nth]];
+        at_clear(&tail, s->channels);
+        if (head == current) {
+            at_finish(p, s, m, s->order[nth], &none, &none, &now, AT_R(0.0));
+        } else if (head > current) {
+            for (row = head; row < rows; row++) {
+                at_add_row(s, m, &tail, row, at_row_time(s, m, head), gaps);
+            }
+            at_finish(p, s, m, s->order[nth], &none, &none, &tail, AT_R(0.0));
+        } else {
+            int64_t end;
+            int64_t last;
+            int64_t from;
+            at_sums rest;
+            while ((block > 0) && (starts[block] > head)) {
+                block--;
+            }
+            end = starts[block + 1];
+            last = at_row_time(s, m, end - 1);
+            from = end - (((end - head) / AT_EACH) * AT_EACH);
+            if (from < end) {
+                const at_sums kept = at_kept_at(at_tail_at(s, m, from));
+                tail.n = kept.n;
+                tail.t = kept.t;
+                tail.tt = kept.tt;
+                for (row = 0; row < (AT_SUMS * (int64_t)s->channels); row++) {
+                    tail.of[row] = kept.of[row];
+                }
+            }
+            for (row = from - 1; row >= head; row--) {
+                at_add_row(s, m, &tail, row, last, gaps);
+            }
+            rest = at_kept_at(&at_whole_at(s, m, starts[block])[at_kept_width(s)]);
+            at_finish(p, s, m, s->order[nth], &tail, &rest, &now, (at_real)at_minus(last, origin));
+        }
+    }
+}
+
 static void at_run_slope(const at_plan *p, const at_slope *s, at_memory m)
 {
     at_sums now = { AT_R(0.0), AT_R(0.0), AT_R(0.0), NULL };
@@ -1369,11 +1556,16 @@ static void at_run_slope(const at_plan *p, const at_slope *s, at_memory m)
     int64_t origin;
     int64_t row;
     int gaps;
+    int anew;
     int32_t nth = 0;
     if (at_gather_is(p, m, s->gather, AT_FRESH) == 0) {
         return;
     }
-    at_push(p, s, m);
+    anew = at_push(p, s, m);
+    if (AT_IS_USED(AT_FAST) && (s->kept >= 0)) {
+        at_run_fast(p, s, m, anew);
+        return;
+    }
     now.of = &m.r[p->scratch];
     rest.of = &m.r[p->scratch + width];
     tail.of = &m.r[p->scratch + (2 * width)];
@@ -1501,23 +1693,24 @@ static void at_run_first_order(const at_plan *p, const at_first_order *f, at_mem
 
 /* ---- Linear estimators. */
 
-static at_real at_form(const at_linear *l, const at_real row[])
+/* A constant and a product, which is summed in four strands. */
+static at_real at_form(at_real constant, const at_real b[], const at_real row[], int32_t width)
 {
     at_real sums[4] = { AT_R(0.0), AT_R(0.0), AT_R(0.0), AT_R(0.0) };
     at_real others = AT_R(-0.0);
     int32_t nth = 0;
-    while ((nth + 4) <= l->width) {
-        sums[0] = sums[0] + (l->coefficients[nth] * row[nth]);
-        sums[1] = sums[1] + (l->coefficients[nth + 1] * row[nth + 1]);
-        sums[2] = sums[2] + (l->coefficients[nth + 2] * row[nth + 2]);
-        sums[3] = sums[3] + (l->coefficients[nth + 3] * row[nth + 3]);
+    while ((nth + 4) <= width) {
+        sums[0] = sums[0] + (b[nth] * row[nth]);
+        sums[1] = sums[1] + (b[nth + 1] * row[nth + 1]);
+        sums[2] = sums[2] + (b[nth + 2] * row[nth + 2]);
+        sums[3] = sums[3] + (b[nth + 3] * row[nth + 3]);
         nth += 4;
     }
-    while (nth < l->width) {
-        others = others + (l->coefficients[nth] * row[nth]);
+    while (nth < width) {
+        others = others + (b[nth] * row[nth]);
         nth++;
     }
-    return l->constant + (((sums[0] + sums[2]) + (sums[1] + sums[3])) + others);
+    return constant + (((sums[0] + sums[2]) + (sums[1] + sums[3])) + others);
 }
 
 static at_real at_novelty_of(const at_novelty *n, const at_real row[], int32_t width, at_real along[])
@@ -1547,15 +1740,691 @@ static at_real at_novelty_of(const at_novelty *n, const at_real row[], int32_t w
     return at_unless_infinite(at_root(at_over(beyond, (size + (at_real)width) * n->edge)));
 }
 
+/* Room within a step: the row, the same standardised, with 1 behind it, then what else is needed. */
+static at_real *at_standardised(const at_plan *p, const at_linear *l, at_memory m)
+{
+    return &m.r[p->scratch + l->width];
+}
+
+static void at_standardise(const at_plan *p, const at_linear *l, at_memory m, const at_real row[])
+{
+    at_real *z = at_standardised(p, l, m);
+    int32_t nth;
+    for (nth = 0; nth < l->width; nth++) {
+        z[nth] = (row[nth] - l->spread->mean[nth]) / l->spread->scale[nth];
+    }
+    z[l->width] = AT_R(1.0);
+}
+
+/* The variance that coefficients bring into a prediction, in that of the noise: of the row that was standardised last. */
+static at_real at_spread_of(const at_plan *p, const at_linear *l, at_memory m, const at_real root[])
+{
+    const at_real *z = at_standardised(p, l, m);
+    const at_real *row = root;
+    at_real sum = AT_R(-0.0);
+    int32_t i;
+    int32_t j;
+    for (i = 0; i <= l->width; i++) {
+        at_real along = AT_R(-0.0);
+        for (j = 0; j <= i; j++) {
+            along = along + (row[j] * z[j]);
+        }
+        sum = sum + (along * along);
+        row = &row[i + 1];
+    }
+    return sum;
+}
+
+/* ---- Learners. Of integers: where the oldest waiting truth lies and how many wait; why nothing is learned from this tick; of recent errors
+ * how many there were, how many in a row were too large and since when, and whether they are in units of a deviation; when the last truth
+ * taught, and up to when what was learned has faded; when the newest window of truth began and the last truth came, how many windows there
+ * were and which is the newest; of waiting truths the arrival, the run and why it is not learned from. Of numbers: the mean square of recent
+ * errors; what was learned, information, where it goes back to, pull, as how many rows it counts and the squares of their errors; what
+ * follows from it, the root of the covariance, coefficients of standardised regressors, and coefficients and constant as they are used; of each window the squares of the
+ * errors of the learner and of its fit; waiting truths.
+ *
+ * Of past rows, which several share, integers: how many there were, the number of the first that counts, the tick of the last; times, and why
+ * each is not learned from. */
+
+#define AT_L_WAITING_FROM 0
+#define AT_L_WAITING 1
+#define AT_L_FROZEN 2
+#define AT_L_SEEN 3
+#define AT_L_REFUSED 4
+#define AT_L_WEIGHED 5
+#define AT_L_SINCE 6
+#define AT_L_LESSON 7
+#define AT_L_FADED 8
+#define AT_L_FROM 9
+#define AT_L_TRUTH 10
+#define AT_L_WINDOWS 11
+#define AT_L_NEWEST 12
+#define AT_L_ARRIVED 13
+/* No instant. */
+#define AT_NEVER INT64_MIN
+
+#define AT_P_RUNS 0
+#define AT_P_FIRST 1
+#define AT_P_TICK 2
+#define AT_P_TIMES 3
+
+#define AT_LEARNED 0
+/* 1: on command, which a run knows. */
+#define AT_OF_CHANNEL 2
+#define AT_OUTLIER 3
+#define AT_OUT_OF_RANGE 4
+#define AT_OUT_OF_LIMITS 5
+#define AT_INCOMPLETE 6
+#define AT_PASSED_OVER 7
+
+/* Who speaks: the learner, or the fit since there were too few windows of truth, since it errs less, or since no truth came. */
+#define AT_LEARNER 0
+#define AT_TOO_FEW 10
+#define AT_WORSE 20
+#define AT_SILENCE 30
+
+/* How many errors weigh in, how many there must have been before one is too large, and how many in a row can be, in so many windows; as how
+ * large, squared, one that is too large counts. */
+#define AT_ERRORS 50
+#define AT_FIRST_ERRORS 10
+#define AT_PATIENCE 20
+#define AT_PATIENT_WINDOWS 4
+#define AT_OF_REFUSED AT_R(4.0)
+/* By so many deviations a truth misses that moves the constant alone; and as by so many counts one that misses by more. */
+#define AT_LEAP AT_R(100.0)
+#define AT_MOST_MISSED AT_R(2.0)
+/* Over how many windows the learner is compared with its fit. */
+#define AT_WINDOWS 20
+
+typedef struct {
+    int64_t *known;
+    int64_t *arrived;
+    int64_t *run_of;
+    int64_t *notes;
+    int64_t *runs;
+    at_real *rows;
+    at_real *mean_square;
+    at_real *information;
+    at_real *start;
+    at_real *pull;
+    at_real *counts;
+    at_real *root;
+    at_real *theta;
+    at_real *b;
+    at_real *constant;
+    at_real *windows;
+    at_real *truths;
+    int32_t order;
+    int32_t cells;
+} at_pupil;
+
+static at_pupil at_pupil_of(const at_linear *l, at_memory m)
+{
+    const at_learner *g = l->learner;
+    at_pupil u;
+    u.order = l->width + 1;
+    u.cells = (u.order * (u.order + 1)) / 2;
+    u.known = &m.i[g->ints];
+    u.arrived = &u.known[AT_L_ARRIVED];
+    u.run_of = &u.arrived[g->waiting];
+    u.notes = &u.run_of[g->waiting];
+    u.runs = &m.i[g->run_ints];
+    u.rows = &m.r[g->run_reals];
+    u.mean_square = &m.r[g->reals];
+    u.information = &u.mean_square[1];
+    u.start = &u.information[u.cells];
+    u.pull = &u.start[u.order];
+    u.counts = &u.pull[u.order];
+    u.root = &u.counts[2];
+    u.theta = &u.root[u.cells];
+    u.b = &u.theta[u.order];
+    u.constant = &u.b[l->width];
+    u.windows = &u.constant[1];
+    u.truths = &u.windows[2 * AT_WINDOWS];
+    return u;
+}
+
+/* The last of several runs at or before an instant, unless it lies too long before: its number, or -1. */
+static int64_t at_run_at(at_memory m, const int64_t times[], int32_t room, int64_t first, int64_t runs, int64_t due,
+                         int64_t limit)
+{
+    const int64_t oldest = ((runs - first) > (int64_t)room) ? (runs - (int64_t)room) : first;
+    int64_t low = oldest;
+    int64_t high = runs;
+    int64_t found = -1;
+    while (low < high) {
+        const int64_t middle = low + ((high - low) / 2);
+        if (times[middle % (int64_t)room] <= due) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    if (low > oldest) {
+        if (at_minus(due, times[(low - 1) % (int64_t)room]) <= limit) {
+            found = low - 1;
+        }
+    } else if (oldest > first) {
+        m.i[AT_FLAGS] |= (int64_t)AT_FULL;
+    } else {
+        /* There was none yet. */
+    }
+    return found;
+}
+
+/* Where a truth is put that has just been measured, of a ring in which it waits: the oldest goes where there is no room. */
+static int32_t at_wait(at_memory m, int64_t waiting[], int32_t room)
+{
+    if (waiting[1] >= (int64_t)room) {
+        waiting[0] = (waiting[0] + 1) % (int64_t)room;
+        waiting[1]--;
+        m.i[AT_FLAGS] |= (int64_t)AT_FULL;
+    }
+    waiting[1]++;
+    return (int32_t)((waiting[0] + (waiting[1] - 1)) % (int64_t)room);
+}
+
+/* Coefficients as they are used. */
+static void at_use(const at_linear *l, const at_pupil *u)
+{
+    int32_t nth;
+    for (nth = 0; nth < l->width; nth++) {
+        u->b[nth] = u->theta[nth] / l->spread->scale[nth];
+    }
+    *u->constant = (u->theta[l->width] + l->learner->level) - at_form(AT_R(0.0), u->b, l->spread->mean, l->width);
+}
+
+/* Whether an error is no outlier among recent ones, which it joins. */
+static int at_admits(const at_learner *g, const at_pupil *u, at_real missed, at_real std_dev, int64_t at)
+{
+    const int64_t weighed = ((std_dev > AT_R(0.0)) && isfinite(std_dev)) ? 1 : 0;
+    const at_real error = (weighed != 0) ? (missed / std_dev) : missed;
+    const at_real square = error * error;
+    const int64_t patience =
+        (g->window > (INT64_MAX / AT_PATIENT_WINDOWS)) ? INT64_MAX : (g->window * AT_PATIENT_WINDOWS);
+    const int64_t since = u->known[AT_L_SINCE];
+    const int waited = ((since == AT_NEVER) || (at < since) || (at_minus(at, since) >= patience)) ? 1 : 0;
+    at_real most = (at_real)INFINITY;
+    at_real counted;
+    int admitted = 0;
+    if (isfinite(square)) {
+        if (((u->known[AT_L_REFUSED] >= AT_PATIENCE) && (waited != 0)) || (weighed != u->known[AT_L_WEIGHED])) {
+            const int of_fit = ((weighed != 0) && (u->known[AT_L_WEIGHED] == 0)) ? 1 : 0;
+            u->known[AT_L_SEEN] = (of_fit != 0) ? AT_FIRST_ERRORS : 0;
+            *u->mean_square = (of_fit != 0) ? AT_R(1.0) : AT_R(0.0);
+            u->known[AT_L_REFUSED] = 0;
+            u->known[AT_L_SINCE] = AT_NEVER;
+            u->known[AT_L_WEIGHED] = weighed;
+        }
+        if ((u->known[AT_L_SEEN] >= AT_FIRST_ERRORS) && (*u->mean_square > AT_R(0.0)) && isfinite(g->outliers)) {
+            most = (g->outliers * g->outliers) * *u->mean_square;
+        }
+        admitted = (square <= most) ? 1 : 0;
+        counted = AT_OF_REFUSED * *u->mean_square;
+        if ((admitted != 0) || (square < counted)) {
+            counted = square;
+        }
+        if (u->known[AT_L_SEEN] < AT_ERRORS) {
+            u->known[AT_L_SEEN]++;
+        }
+        *u->mean_square = *u->mean_square + ((counted - *u->mean_square) / (at_real)u->known[AT_L_SEEN]);
+        if (admitted != 0) {
+            u->known[AT_L_REFUSED] = 0;
+            u->known[AT_L_SINCE] = AT_NEVER;
+        } else {
+            u->known[AT_L_REFUSED]++;
+            if (u->known[AT_L_SINCE] == AT_NEVER) {
+                u->known[AT_L_SINCE] = at;
+            }
+        }
+    }
+    return admitted;
+}
+
+/* Where a row of a triangle begins. */
+static int32_t at_row_of(int32_t row)
+{
+    return (row * (row + 1)) / 2;
+}
+
+/* Puts the inverse of Cholesky's factor in the place of a matrix; 0 where that is not positive. */
+static int at_invert_root(at_real root[], at_real room[], int32_t order)
+{
+    int positive = 1;
+    int32_t i;
+    int32_t j;
+    int32_t k;
+    for (k = 0; (k < order) && (positive != 0); k++) {
+        const at_real square = root[at_row_of(k) + k];
+        const at_real pivot = (square > AT_R(0.0)) ? at_root(square) : AT_R(0.0);
+        if (!((pivot > AT_R(0.0)) && isfinite(pivot))) {
+            positive = 0;
+        } else {
+            root[at_row_of(k) + k] = pivot;
+            for (i = k + 1; i < order; i++) {
+                root[at_row_of(i) + k] = at_over(root[at_row_of(i) + k], pivot);
+                room[i] = root[at_row_of(i) + k];
+            }
+            for (i = k + 1; i < order; i++) {
+                at_real *row = &root[at_row_of(i)];
+                for (j = k + 1; j <= i; j++) {
+                    row[j] = row[j] - (room[i] * room[j]);
+                }
+            }
+        }
+    }
+    for (i = 0; (i < order) && (positive != 0); i++) {
+        at_real *row = &root[at_row_of(i)];
+        const at_real pivot = row[i];
+        for (j = 0; j < i; j++) {
+            room[j] = row[j];
+            row[j] = AT_R(0.0);
+        }
+        for (k = 0; k < i; k++) {
+            const at_real *done = &root[at_row_of(k)];
+            for (j = 0; j <= k; j++) {
+                row[j] = row[j] - (room[k] * done[j]);
+            }
+        }
+        row[i] = AT_R(1.0);
+        for (j = 0; j <= i; j++) {
+            row[j] = at_over(row[j], pivot);
+        }
+    }
+    return positive;
+}
+
+/* Begins with what the fit knew. */
+static void at_begin_again(const at_linear *l, const at_pupil *u)
+{
+    const at_learner *g = l->learner;
+    int32_t nth;
+    for (nth = 0; nth < u->cells; nth++) {
+        u->information[nth] = g->information[nth];
+        u->root[nth] = l->spread->root[nth];
+    }
+    for (nth = 0; nth < u->order; nth++) {
+        u->start[nth] = g->start[nth];
+        u->pull[nth] = AT_R(0.0);
+        u->theta[nth] = g->start[nth];
+    }
+    u->counts[0] = g->rows;
+    u->counts[1] = g->squares;
+}
+
+/* Finds root and coefficients from what was learned; what cannot be solved any more begins again. */
+static void at_solve(const at_plan *p, const at_linear *l, at_memory m, const at_pupil *u)
+{
+    at_real *room = &at_standardised(p, l, m)[u->order];
+    int solved;
+    int32_t i;
+    int32_t j;
+    for (i = 0; i < u->cells; i++) {
+        u->root[i] = u->information[i];
+    }
+    solved = at_invert_root(u->root, room, u->order);
+    if (solved != 0) {
+        for (i = 0; i < u->order; i++) {
+            u->theta[i] = u->start[i];
+        }
+        for (i = 0; i < u->order; i++) {
+            const at_real *row = &u->root[at_row_of(i)];
+            const at_real along = at_form(AT_R(-0.0), row, u->pull, i + 1);
+            for (j = 0; j <= i; j++) {
+                u->theta[j] = u->theta[j] + (along * row[j]);
+            }
+        }
+        for (i = 0; i < u->order; i++) {
+            if (!isfinite(u->theta[i])) {
+                solved = 0;
+            }
+        }
+    }
+    if (solved == 0) {
+        at_begin_again(l, u);
+    }
+}
+
+/* A step of recursive least squares whose past fades to a share of the fit, with the row that was standardised last. */
+static void at_recur(const at_plan *p, const at_linear *l, at_memory m, const at_pupil *u, at_real truth, at_real after)
+{
+    const at_learner *g = l->learner;
+    const at_real *x = at_standardised(p, l, m);
+    const at_real error = truth - at_form(AT_R(-0.0), u->theta, x, u->order);
+    const at_real of_start = truth - at_form(AT_R(-0.0), u->start, x, u->order);
+    const at_real square = at_over(error * error, AT_R(1.0) + at_spread_of(p, l, m, u->root));
+    int32_t i;
+    int32_t j;
+    if (isfinite(square) && isfinite(of_start)) {
+        const at_real left = (at_real)at_exp((double)at_over(-after, g->memory));
+        const at_real back = (AT_R(1.0) - left) * g->share;
+        for (i = 0; i < u->order; i++) {
+            at_real *row = &u->information[at_row_of(i)];
+            const at_real *start = &g->information[at_row_of(i)];
+            for (j = 0; j <= i; j++) {
+                row[j] = ((left * row[j]) + (back * start[j])) + (x[i] * x[j]);
+            }
+            u->pull[i] = (left * u->pull[i]) + (x[i] * of_start);
+        }
+        u->counts[0] = ((left * u->counts[0]) + (back * g->rows)) + AT_R(1.0);
+        u->counts[1] = ((left * u->counts[1]) + (back * g->squares)) + square;
+        at_solve(p, l, m, u);
+    }
+}
+
+/* Moves the constant, and where it goes back to, which is then known as by one row alone. */
+static void at_leap(const at_plan *p, const at_linear *l, at_memory m, const at_pupil *u, at_real by)
+{
+    at_real *row = &at_standardised(p, l, m)[u->order];
+    const int32_t last = u->order - 1;
+    at_real known;
+    int32_t i;
+    int32_t j;
+    u->theta[last] = u->theta[last] + by;
+    u->start[last] = u->start[last] + by;
+    for (j = 0; j <= last; j++) {
+        row[j] = u->information[at_row_of(last) + j];
+    }
+    known = row[last];
+    if (known > AT_R(1.0)) {
+        const at_real less = (AT_R(1.0) - (AT_R(1.0) / known)) / known;
+        for (i = 0; i < last; i++) {
+            for (j = 0; j <= i; j++) {
+                at_real *cell = &u->information[at_row_of(i) + j];
+                *cell = *cell - ((row[i] * row[j]) * less);
+            }
+            u->information[at_row_of(last) + i] = row[i] / known;
+        }
+        u->information[at_row_of(last) + last] = AT_R(1.0);
+    }
+    for (i = 0; i <= last; i++) {
+        at_real sum = AT_R(-0.0);
+        for (j = 0; j <= last; j++) {
+            const int32_t place = (j < i) ? (at_row_of(i) + j) : (at_row_of(j) + i);
+            sum = sum + (u->information[place] * (u->theta[j] - u->start[j]));
+        }
+        u->pull[i] = sum;
+    }
+    at_solve(p, l, m, u);
+}
+
+/* The errors of a learner and of its fit for a truth that tells of a window. */
+static void at_weigh_against_fit(const at_learner *g, const at_pupil *u, at_real missed, at_real of_fit, int64_t at)
+{
+    const int64_t from = u->known[AT_L_FROM];
+    at_real *sums;
+    u->known[AT_L_TRUTH] = at;
+    if ((from == AT_NEVER) || (at < from) || (at_minus(at, from) >= g->window)) {
+        u->known[AT_L_FROM] = at;
+        if (u->known[AT_L_WINDOWS] < AT_WINDOWS) {
+            u->known[AT_L_NEWEST] = u->known[AT_L_WINDOWS];
+            u->known[AT_L_WINDOWS]++;
+        } else {
+            u->known[AT_L_NEWEST] = (u->known[AT_L_NEWEST] + 1) % AT_WINDOWS;
+        }
+        u->windows[2 * u->known[AT_L_NEWEST]] = AT_R(0.0);
+        u->windows[(2 * u->known[AT_L_NEWEST]) + 1] = AT_R(0.0);
+    }
+    sums = &u->windows[2 * u->known[AT_L_NEWEST]];
+    sums[0] = sums[0] + (missed * missed);
+    sums[1] = sums[1] + (of_fit * of_fit);
+}
+
+/* Who speaks at an instant. */
+static int32_t at_speaks(const at_learner *g, const at_pupil *u, int64_t now)
+{
+    int32_t speaks = AT_TOO_FEW;
+    if (u->known[AT_L_WINDOWS] >= AT_WINDOWS) {
+        if (at_minus(now, u->known[AT_L_TRUTH]) > g->silence) {
+            speaks = AT_SILENCE;
+        } else {
+            at_real of_learner = AT_R(-0.0);
+            at_real of_fit = AT_R(-0.0);
+            int32_t nth;
+            for (nth = 0; nth < AT_WINDOWS; nth++) {
+                of_learner = of_learner + u->windows[2 * nth];
+                of_fit = of_fit + u->windows[(2 * nth) + 1];
+            }
+            speaks = (of_learner <= of_fit) ? AT_LEARNER : AT_WORSE;
+        }
+    }
+    return speaks;
+}
+
+/* Lets a row and its truth be learned from, unless something speaks against it. */
+static int32_t at_offer(const at_plan *p, const at_linear *l, at_memory m, const at_pupil *u, const at_real row[],
+                        at_real truth, int64_t at)
+{
+    const at_learner *g = l->learner;
+    const at_real size = at_size(truth);
+    const int64_t lesson = u->known[AT_L_LESSON];
+    int32_t became = AT_LEARNED;
+    int32_t nth;
+    for (nth = 0; nth < l->width; nth++) {
+        if (at_is_absent(row[nth]) != 0) {
+            became = AT_INCOMPLETE;
+        } else if ((became == AT_LEARNED) && !((row[nth] >= g->lowest[nth]) && (row[nth] <= g->highest[nth]))) {
+            became = AT_OUT_OF_RANGE;
+        } else {
+            /* As the others are. */
+        }
+    }
+    if ((became != AT_INCOMPLETE) && !((size < g->below) && (size >= g->above))) {
+        became = AT_OUT_OF_LIMITS;
+    }
+    if ((became == AT_LEARNED) || (became == AT_OUT_OF_RANGE)) {
+        if ((lesson != AT_NEVER) && (at >= lesson) && (at_minus(at, lesson) < g->between)) {
+            became = AT_PASSED_OVER;
+        } else {
+            u->known[AT_L_LESSON] = at;
+        }
+    }
+    if (became == AT_LEARNED) {
+        const at_real missed = truth - at_form(*u->constant, u->b, row, l->width);
+        const at_real of_fit = truth - at_form(l->constant, l->coefficients, row, l->width);
+        at_real std_dev;
+        at_standardise(p, l, m, row);
+        std_dev = at_root(at_over(u->counts[1], u->counts[0]) * (AT_R(1.0) + at_spread_of(p, l, m, u->root)));
+        if (at_admits(g, u, missed, std_dev, at) == 0) {
+            became = AT_OUTLIER;
+        } else {
+            if (at_spread_of(p, l, m, l->spread->root) < g->little) {
+                became = AT_PASSED_OVER;
+                u->known[AT_L_FADED] = at;
+            } else {
+                const int64_t faded = u->known[AT_L_FADED];
+                const at_real after = ((faded == AT_NEVER) || (at < faded)) ? AT_R(0.0) : at_seconds(at_minus(at, faded));
+                u->known[AT_L_FADED] = at;
+                if ((g->window == 0) && isfinite(missed) && (at_size(missed) > (AT_LEAP * std_dev)) && (std_dev > AT_R(0.0))) {
+                    at_leap(p, l, m, u, missed);
+                } else {
+                    const at_real most_of_it = AT_MOST_MISSED * std_dev;
+                    at_real lesson_of = truth - g->level;
+                    if (at_size(missed) > most_of_it) {
+                        lesson_of = (lesson_of - missed) + at_signed(most_of_it, missed);
+                    }
+                    at_recur(p, l, m, u, lesson_of, after);
+                }
+                at_use(l, u);
+            }
+            at_weigh_against_fit(g, u, missed, of_fit, at);
+        }
+    }
+    return became;
+}
+
+/* Learns from every truth that arrived up to `newest`: what became of the last one and when it had arrived; -1 where there was none. */
+static int32_t at_learn(const at_plan *p, const at_linear *l, at_memory m, int64_t newest, int64_t *arrived)
+{
+    const at_learner *g = l->learner;
+    const at_pupil u = at_pupil_of(l, m);
+    int32_t became = -1;
+    while ((u.known[AT_L_WAITING] > 0) && (u.arrived[u.known[AT_L_WAITING_FROM]] <= newest)) {
+        const int64_t place = u.known[AT_L_WAITING_FROM];
+        const int64_t run = u.run_of[place];
+        const int64_t at = run % (int64_t)g->runs;
+        int64_t frozen = u.known[AT_L_FROZEN];
+        u.known[AT_L_WAITING_FROM] = (place + 1) % (int64_t)g->waiting;
+        u.known[AT_L_WAITING]--;
+        if ((u.runs[AT_P_RUNS] - run) > (int64_t)g->runs) {
+            m.i[AT_FLAGS] |= (int64_t)AT_FULL;
+        } else {
+            const int64_t of_run = u.runs[AT_P_TIMES + g->runs + at];
+            frozen = (of_run > frozen) ? of_run : frozen;
+            frozen = (u.notes[place] > frozen) ? u.notes[place] : frozen;
+            *arrived = u.arrived[place];
+            became = (frozen > 0) ? (int32_t)frozen
+                                  : at_offer(p, l, m, &u, &u.rows[at * (int64_t)l->width], u.truths[place], *arrived);
+        }
+    }
+    return became;
+}
+
+/* Learns before it predicts: who speaks. */
+static int32_t at_learn_now(const at_plan *p, const at_linear *l, at_memory m)
+{
+    const at_learner *g = l->learner;
+    const at_pupil u = at_pupil_of(l, m);
+    int64_t arrived = 0;
+    int32_t speaks;
+    int32_t became;
+    int32_t nth;
+    m.i[g->ints + AT_L_FROZEN] = AT_LEARNED;
+    if (g->freeze >= 0) {
+        for (nth = 0; nth < p->gather[g->freeze].count; nth++) {
+            int64_t stamp;
+            /* Without a clear 0 it does not go on. */
+            if (!(at_port(p, m, g->freeze, nth, &stamp) == AT_R(0.0))) {
+                m.i[g->ints + AT_L_FROZEN] = AT_OF_CHANNEL;
+            }
+        }
+    }
+    became = at_learn(p, l, m, at_minus(m.i[AT_LAST], g->embargo), &arrived);
+    speaks = at_speaks(g, &u, m.i[AT_LAST]);
+    if (became >= 0) {
+        at_put(p, m, l->slot + 1, (at_real)(became + speaks), arrived);
+    } else {
+        const at_real said = at_value(p, m, l->slot + 1);
+        if (said >= AT_R(0.0)) {
+            const int32_t before = (int32_t)said;
+            if (((before / 10) * 10) != speaks) {
+                at_put(p, m, l->slot + 1, (at_real)((before % 10) + speaks), m.i[AT_LAST]);
+            }
+        }
+    }
+    return speaks;
+}
+
+/* Writes a row down, whole or none of it, unless another learner has. */
+static void at_write_row(const at_linear *l, at_memory m, const at_real row[], int whole)
+{
+    const at_learner *g = l->learner;
+    const at_pupil u = at_pupil_of(l, m);
+    int32_t nth;
+    if (u.runs[AT_P_TICK] != m.i[AT_TICK]) {
+        const int64_t at = u.runs[AT_P_RUNS] % (int64_t)g->runs;
+        u.runs[AT_P_TICK] = m.i[AT_TICK];
+        u.runs[AT_P_TIMES + at] = m.i[AT_LAST];
+        u.runs[AT_P_TIMES + g->runs + at] = u.known[AT_L_FROZEN];
+        for (nth = 0; nth < l->width; nth++) {
+            u.rows[(at * (int64_t)l->width) + nth] = (whole != 0) ? row[nth] : AT_NAN;
+        }
+        u.runs[AT_P_RUNS]++;
+    }
+}
+
+/* Takes a truth that has just been measured, now that all outputs are there. */
+static void at_note_truth(const at_plan *p, const at_linear *l, at_memory m)
+{
+    const at_learner *g = l->learner;
+    const at_pupil u = at_pupil_of(l, m);
+    const int64_t run = at_run_at(m, &u.runs[AT_P_TIMES], g->runs, u.runs[AT_P_FIRST], u.runs[AT_P_RUNS],
+                                  at_minus(m.i[AT_LAST], g->ahead), g->limit);
+    if (run >= 0) {
+        const int32_t place = at_wait(m, &u.known[AT_L_WAITING_FROM], g->waiting);
+        u.arrived[place] = m.i[AT_LAST];
+        u.run_of[place] = run;
+        u.notes[place] = u.known[AT_L_FROZEN];
+        u.truths[place] = at_value(p, m, g->truth);
+    }
+}
+
+/* Begins as it was fitted, or with another segment, in which what was learned stays. */
+static void at_begin_learner(const at_plan *p, const at_linear *l, at_memory m, int segment)
+{
+    const at_pupil u = at_pupil_of(l, m);
+    int64_t arrived = 0;
+    int32_t nth;
+    if (segment != 0) {
+        (void)at_learn(p, l, m, m.i[AT_LAST], &arrived);
+        u.runs[AT_P_FIRST] = u.runs[AT_P_RUNS];
+        return;
+    }
+    at_begin_again(l, &u);
+    for (nth = AT_L_SINCE; nth <= AT_L_TRUTH; nth++) {
+        u.known[nth] = AT_NEVER;
+    }
+    at_use(l, &u);
+}
+
+/* The clock of another segment. */
+static void at_shift_learner(const at_linear *l, at_memory m, int64_t shift)
+{
+    int32_t nth;
+    for (nth = AT_L_SINCE; nth <= AT_L_TRUTH; nth++) {
+        int64_t *instant = &m.i[l->learner->ints + nth];
+        if (*instant != AT_NEVER) {
+            *instant = at_plus(*instant, shift);
+        }
+    }
+}
+
+/* The standard deviation of the truth about a prediction, of a row of which the standardised one is there where it is needed. */
+static at_real at_std_dev_of(const at_plan *p, const at_linear *l, at_memory m, const at_real row[],
+                             const at_real known[], at_real variance)
+{
+    at_real std_dev = AT_NAN;
+    int32_t i;
+    int32_t j;
+    if (l->spread != NULL) {
+        std_dev = at_root(variance * (AT_R(1.0) + at_spread_of(p, l, m, known)));
+    } else if (l->variance != NULL) {
+        const at_real *root = l->variance->root;
+        at_real leverage = l->variance->least;
+        for (i = 0; i < l->width; i++) {
+            at_real along = AT_R(-0.0);
+            for (j = 0; j <= i; j++) {
+                along = along + (root[j] * (row[j] - l->variance->centre[j]));
+            }
+            leverage = leverage + (along * along);
+            root = &root[i + 1];
+        }
+        std_dev = at_root(l->variance->noise * (AT_R(1.0) + leverage));
+    } else {
+        /* Nobody knows it. */
+    }
+    return std_dev;
+}
+
 static void at_run_linear(const at_plan *p, const at_linear *l, at_memory m)
 {
     const int64_t now = m.i[AT_LAST];
     at_real *row = &m.r[p->scratch];
+    const at_real *b = l->coefficients;
+    const at_real *known = NULL;
+    at_real variance = AT_R(0.0);
+    at_real constant = l->constant;
+    at_real centre = l->centre;
     at_real value = AT_NAN;
     at_real novelty = AT_NAN;
+    at_real std_dev = AT_NAN;
     int64_t oldest = (l->width == 0) ? now : INT64_MAX;
     int whole = 1;
+    int32_t speaks = AT_TOO_FEW;
     int32_t nth;
+    if (AT_IS_USED(AT_LEARNS) && (l->learner != NULL)) {
+        speaks = at_learn_now(p, l, m);
+    }
     if ((l->trigger >= 0) && (at_gather_is(p, m, l->trigger, AT_FRESH) == 0)) {
         return;
     }
@@ -1570,13 +2439,43 @@ static void at_run_linear(const at_plan *p, const at_linear *l, at_memory m)
             /* Another is older. */
         }
     }
-    if ((whole != 0) && (oldest < INT64_MAX)) {
-        value = (l->same != 0) ? row[0] : at_form(l, row);
+    if (oldest == INT64_MAX) {
+        whole = 0;
+    }
+    if (AT_IS_USED(AT_STD_DEVS) && (l->spread != NULL)) {
+        known = l->spread->root;
+        variance = l->spread->variance;
+    }
+    if (AT_IS_USED(AT_LEARNS) && (l->learner != NULL)) {
+        const at_pupil u = at_pupil_of(l, m);
+        at_write_row(l, m, row, whole);
+        known = l->spread->root;
+        variance = l->spread->variance;
+        if (speaks == AT_LEARNER) {
+            b = u.b;
+            constant = *u.constant;
+            centre = u.theta[l->width] + l->learner->level;
+            known = u.root;
+            variance = at_over(u.counts[1], u.counts[0]);
+        }
+    }
+    if (whole != 0) {
+        value = (l->same != 0) ? row[0] : at_form(constant, b, row, l->width);
+        if ((known != NULL) && ((l->novelty != NULL) || (l->std_dev_slot >= 0))) {
+            at_standardise(p, l, m, row);
+        }
         if (l->novelty != NULL) {
-            novelty = at_novelty_of(l->novelty, row, l->width, &row[l->width]);
+            novelty = at_novelty_of(l->novelty, row, l->width, &row[(2 * l->width) + 1]);
+            if (AT_IS_USED(AT_LEARNS) && (speaks == AT_LEARNER) && (novelty > AT_R(1.0))) {
+                const at_real share =
+                    at_root(at_over(at_spread_of(p, l, m, known), at_spread_of(p, l, m, l->spread->root)));
+                if (isfinite(share)) {
+                    novelty = AT_R(1.0) + ((novelty - AT_R(1.0)) * share);
+                }
+            }
             if (novelty > AT_R(1.0)) {
                 if (l->outside == AT_SHRINK) {
-                    value = l->centre + ((value - l->centre) / novelty);
+                    value = centre + ((value - centre) / novelty);
                 } else if (l->outside == AT_GONE) {
                     value = AT_NAN;
                 } else {
@@ -1584,12 +2483,24 @@ static void at_run_linear(const at_plan *p, const at_linear *l, at_memory m)
                 }
             }
         }
+        if (AT_IS_USED(AT_STD_DEVS) && (l->std_dev_slot >= 0) && (at_is_absent(value) == 0)) {
+            std_dev = at_std_dev_of(p, l, m, row, known, variance);
+            if ((novelty > AT_R(1.0)) && (l->outside == AT_SHRINK)) {
+                const at_real moved = (value - centre) * (novelty - AT_R(1.0));
+                const at_real wide = novelty * std_dev;
+                std_dev = at_root((wide * wide) + (moved * moved));
+            }
+        }
     }
     if (!isfinite(value)) {
         value = AT_NAN;
+        std_dev = AT_NAN;
         oldest = now;
     }
     at_put(p, m, l->slot, value, oldest);
+    if (AT_IS_USED(AT_STD_DEVS) && (l->std_dev_slot >= 0)) {
+        at_give(p, m, l->std_dev_slot, std_dev, oldest);
+    }
     if (l->novelty_slot >= 0) {
         at_put(p, m, l->novelty_slot, novelty, oldest);
     }
@@ -2496,6 +3407,25 @@ static void at_write_run(const at_vote *v, const at_ballot *b, at_memory m)
     m.i[v->ints + AT_RUNS]++;
 }
 
+/* The standard deviation of the truth about a combination, which follows one of the votes with the probability of its weight. */
+static at_real at_std_dev_of_votes(const at_plan *p, const at_vote *v, const at_ballot *b, at_memory m, at_real value)
+{
+    at_real sum = AT_R(0.0);
+    at_real variance = AT_R(0.0);
+    int32_t voter;
+    for (voter = 0; voter < b->voters; voter++) {
+        if ((b->weights[voter] != AT_R(0.0)) && (at_is_absent(b->votes[voter]) == 0)) {
+            int64_t stamp;
+            const at_real own = at_port(p, m, v->std_devs, voter, &stamp);
+            const at_real off = b->votes[voter] - value;
+            sum = sum + b->weights[voter];
+            variance = variance + (b->weights[voter] * ((own * own) + (off * off)));
+        }
+    }
+    /* Written so that what is no number fails. */
+    return ((at_size(sum - AT_R(1.0)) < AT_R(1.0e-9)) && (variance >= AT_R(0.0))) ? at_root(variance) : AT_NAN;
+}
+
 static void at_run_vote(const at_plan *p, const at_vote *v, at_memory m)
 {
     const at_ballot b = at_ballot_of(p, v, m);
@@ -2552,49 +3482,22 @@ static void at_run_vote(const at_plan *p, const at_vote *v, at_memory m)
         }
         at_give(p, m, v->novelty_slot, at_over(sum, known), stamp);
     }
+    if (AT_IS_USED(AT_STD_DEVS) && (v->std_dev_slot >= 0)) {
+        at_give(p, m, v->std_dev_slot, at_std_dev_of_votes(p, v, &b, m, at_unless_infinite(value)), stamp);
+    }
 }
 
 /* Takes a truth that has just been measured, now that all outputs are there. */
 static void at_take_truth(const at_plan *p, const at_vote *v, at_memory m)
 {
     const at_ballot b = at_ballot_of(p, v, m);
-    const int64_t now = m.i[AT_LAST];
-    const int64_t due = at_minus(now, v->ahead);
-    const int64_t runs = m.i[v->ints + AT_RUNS];
-    int64_t low = m.i[v->ints + AT_FIRST_RUN];
-    int64_t high = runs;
-    if ((runs - low) > (int64_t)v->runs) {
-        low = runs - (int64_t)v->runs;
-    }
-    {
-        const int64_t oldest = low;
-        while (low < high) {
-            const int64_t middle = low + ((high - low) / 2);
-            if (b.run_times[middle % (int64_t)v->runs] <= due) {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        if (low == oldest) {
-            if (oldest > m.i[v->ints + AT_FIRST_RUN]) {
-                m.i[AT_FLAGS] |= (int64_t)AT_FULL;
-            }
-            return;
-        }
-    }
-    if (at_minus(due, b.run_times[(low - 1) % (int64_t)v->runs]) <= v->limit) {
-        int32_t place;
-        if (m.i[v->ints + AT_WAITING] >= (int64_t)v->waiting) {
-            m.i[v->ints + AT_WAITING_FROM] = (m.i[v->ints + AT_WAITING_FROM] + 1) % (int64_t)v->waiting;
-            m.i[v->ints + AT_WAITING]--;
-            m.i[AT_FLAGS] |= (int64_t)AT_FULL;
-        }
-        place = (int32_t)((m.i[v->ints + AT_WAITING_FROM] + m.i[v->ints + AT_WAITING]) % (int64_t)v->waiting);
-        b.arrived[place] = now;
-        b.run_of[place] = low - 1;
+    const int64_t run = at_run_at(m, b.run_times, v->runs, m.i[v->ints + AT_FIRST_RUN], m.i[v->ints + AT_RUNS],
+                                  at_minus(m.i[AT_LAST], v->ahead), v->limit);
+    if (run >= 0) {
+        const int32_t place = at_wait(m, &m.i[v->ints + AT_WAITING_FROM], v->waiting);
+        b.arrived[place] = m.i[AT_LAST];
+        b.run_of[place] = run;
         b.truths[place] = at_value(p, m, v->truth);
-        m.i[v->ints + AT_WAITING]++;
     }
 }
 
@@ -3017,20 +3920,26 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
     }
 }
 
-/* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at and since
- * when it contradicts the others, each behind whether it is known; whether it is out, whether its last value passed; whether it agrees
- * again, and since when. Within a step: the values, what of the form is left without the columns that are not there, the standardised
- * columns, and what pulls at each. */
+/* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at, since
+ * when it contradicts the others, since when it is out and since when it agrees again, each behind whether it is known; whether its last
+ * value passed, and whether a sample is new. Of numbers: the last value, its change, and the squares of what was sudden. Within a step: the
+ * values, what of the form is left without the columns that are not there, the standardised columns, and what pulls at each. */
 
 #define AT_HAS_LOOKED 0
 #define AT_LOOKED 1
 #define AT_CONTRADICTS 2
 /* 3: since when. */
 #define AT_IS_OUT 4
-#define AT_PASSES 5
+/* 5: since when. */
 #define AT_AGREES 6
 /* 7: since when. */
-#define AT_OF_SENSOR 8
+#define AT_PASSES 8
+#define AT_IS_NEW 9
+#define AT_OF_SENSOR 10
+#define AT_READS 0
+#define AT_CHANGE 1
+#define AT_SUDDEN 2
+#define AT_OF_READING 3
 
 /* Whether something has lasted for so long; it begins now where it had not. */
 static int at_lasts(int64_t since[], int64_t now, int64_t length)
@@ -3065,8 +3974,8 @@ static void at_free(at_real matrix[], int32_t columns, int32_t column)
     }
 }
 
-/* How far values are apart without the channels that are out, but with this one. */
-static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, int32_t with)
+/* How far values are apart. */
+static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m)
 {
     const int32_t n = c->columns;
     const at_real *values = &m.r[p->scratch];
@@ -3085,11 +3994,8 @@ static at_real at_apart(const at_plan *p, const at_cross_check *c, at_memory m, 
         lower = &lower[row + 1];
     }
     for (nth = 0; nth < n; nth++) {
-        const int32_t place = c->places[nth];
-        const int32_t channel = place % c->channels;
-        z[nth] = at_over(values[place] - c->mean[nth], c->scale[nth]);
-        if ((at_is_absent(z[nth]) != 0)
-            || ((channel != with) && (m.i[c->ints + (AT_OF_SENSOR * channel) + AT_IS_OUT] != 0))) {
+        z[nth] = at_over(values[c->places[nth]] - c->mean[nth], c->scale[nth]);
+        if (at_is_absent(z[nth]) != 0) {
             z[nth] = AT_R(0.0);
             at_free(matrix, n, nth);
         }
@@ -3133,11 +4039,10 @@ static at_real at_share(const at_plan *p, const at_cross_check *c, at_memory m, 
     return share;
 }
 
-/* Finds which sensors contradict the others. */
-static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
+/* The one that alone, and suddenly, makes values that are so far apart be so; -1 where there is none. */
+static int32_t at_alone(const at_plan *p, const at_cross_check *c, at_memory m, at_real apart)
 {
-    const int64_t now = m.i[AT_LAST];
-    at_real apart = at_apart(p, c, m, -1);
+    const at_real *matrix = &m.r[p->scratch + (2 * c->channels)];
     at_real most = at_share(p, c, m, 0);
     int32_t suspect = 0;
     int32_t nth;
@@ -3148,33 +4053,99 @@ static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
             suspect = nth;
         }
     }
-    if (!((apart > c->limit) && ((apart - most) <= c->limit))) {
+    nth = c->own[2 * suspect];
+    if ((nth >= 0) && (apart > c->limit) && ((apart - most) <= c->limit)) {
+        const at_real sudden = m.r[c->reals + (AT_OF_READING * suspect) + AT_SUDDEN];
+        const at_real square = at_over(sudden, c->scale[nth] * c->scale[nth]);
+        const at_real share = at_over(matrix[(nth * c->columns) + nth] * square, c->usual);
+        if (!((AT_R(10.0) * share) >= most)) {
+            suspect = -1;
+        }
+    } else {
         suspect = -1;
     }
-    for (nth = 0; nth < c->channels; nth++) {
-        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
-        if (suspect != nth) {
-            sensor[AT_CONTRADICTS] = 0;
-        } else if (at_lasts(&sensor[AT_CONTRADICTS], now, c->after) != 0) {
-            sensor[AT_IS_OUT] = 1;
-            sensor[AT_CONTRADICTS] = 0;
+    return suspect;
+}
+
+/* Takes the sensor that is out back, where it agrees again or has been out for long enough. */
+static void at_take_back(const at_cross_check *c, at_memory m, int32_t out, int there, at_real apart)
+{
+    const int64_t now = m.i[AT_LAST];
+    int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * out)];
+    int agrees = 0;
+    if (there != 0) {
+        if (apart > c->limit) {
+            sensor[AT_AGREES] = 0;
         } else {
-            /* Not for long enough. */
+            agrees = at_lasts(&sensor[AT_AGREES], now, c->recover);
         }
     }
+    if ((agrees != 0) || (at_lasts(&sensor[AT_IS_OUT], now, c->longest) != 0)) {
+        sensor[AT_IS_OUT] = 0;
+        sensor[AT_AGREES] = 0;
+    }
+}
+
+/* Finds which sensor contradicts the others. */
+static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    const at_real apart = at_apart(p, c, m);
+    int32_t there = 0;
+    int32_t out = -1;
+    int32_t suspect = -1;
+    int32_t nth;
     for (nth = 0; nth < c->channels; nth++) {
-        int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
-        if ((sensor[AT_IS_OUT] != 0) && (at_is_absent(m.r[p->scratch + nth]) == 0)) {
-            apart = at_apart(p, c, m, nth);
-            if (apart > c->limit) {
-                sensor[AT_AGREES] = 0;
-            } else if (at_lasts(&sensor[AT_AGREES], now, c->recover) != 0) {
-                sensor[AT_IS_OUT] = 0;
-                sensor[AT_AGREES] = 0;
+        there += (at_is_absent(m.r[p->scratch + nth]) == 0) ? 1 : 0;
+        if ((out < 0) && (m.i[c->ints + (AT_OF_SENSOR * nth) + AT_IS_OUT] != 0)) {
+            out = nth;
+        }
+    }
+    if (out >= 0) {
+        at_take_back(c, m, out, (at_is_absent(m.r[p->scratch + out]) == 0) ? 1 : 0, apart);
+    } else {
+        /* Half of all have to stay without it. */
+        if ((2 * there) >= (c->channels + 2)) {
+            suspect = at_alone(p, c, m, apart);
+        }
+        for (nth = 0; nth < c->channels; nth++) {
+            int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
+            if (suspect != nth) {
+                sensor[AT_CONTRADICTS] = 0;
+            } else if (at_lasts(&sensor[AT_CONTRADICTS], now, c->after) != 0) {
+                sensor[AT_IS_OUT] = 1;
+                sensor[AT_IS_OUT + 1] = now;
+                sensor[AT_CONTRADICTS] = 0;
             } else {
                 /* Not for long enough. */
             }
         }
+    }
+}
+
+/* Takes what a sensor reads. */
+static void at_take_reading(const at_cross_check *c, at_memory m, int32_t channel, at_real value, int64_t stamp)
+{
+    int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * channel)];
+    at_real *reading = &m.r[c->reals + (AT_OF_READING * channel)];
+    sensor[AT_IS_NEW] =
+        ((at_is_absent(value) == 0) && ((sensor[AT_HAS_LOOKED] == 0) || (sensor[AT_LOOKED] < stamp))) ? 1 : 0;
+    if (sensor[AT_IS_NEW] != 0) {
+        const int64_t gone = at_minus(stamp, sensor[AT_LOOKED]);
+        if ((sensor[AT_HAS_LOOKED] != 0) && (gone <= c->lag)) {
+            const at_real change = value - reading[AT_READS];
+            const at_real jump = change - reading[AT_CHANGE];
+            const at_real lag = at_seconds(c->lag);
+            reading[AT_SUDDEN] = (reading[AT_SUDDEN] * (lag / (lag + at_seconds(gone)))) + (jump * jump);
+            reading[AT_CHANGE] = change;
+        } else {
+            /* Over a hole heat may have moved it as far as it likes. */
+            reading[AT_CHANGE] = AT_R(0.0);
+            reading[AT_SUDDEN] = AT_R(0.0);
+        }
+        reading[AT_READS] = value;
+        sensor[AT_HAS_LOOKED] = 1;
+        sensor[AT_LOOKED] = stamp;
     }
 }
 
@@ -3185,6 +4156,9 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
     int32_t nth;
     for (nth = 0; nth < (2 * c->channels); nth++) {
         m.r[p->scratch + nth] = at_port(p, m, c->signal, nth, &stamp);
+        if (nth < c->channels) {
+            at_take_reading(c, m, nth, m.r[p->scratch + nth], stamp);
+        }
     }
     if (c->columns > 0) {
         at_compare(p, c, m);
@@ -3192,16 +4166,9 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
     for (nth = 0; nth < c->channels; nth++) {
         int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
         const at_real value = at_port(p, m, c->signal, nth, &stamp);
-        const int there = (at_is_absent(value) == 0) ? 1 : 0;
-        const int is_new =
-            ((there != 0) && ((sensor[AT_HAS_LOOKED] == 0) || (sensor[AT_LOOKED] < stamp))) ? 1 : 0;
-        const int passes = ((there != 0) && (sensor[AT_IS_OUT] == 0)) ? 1 : 0;
+        const int passes = ((at_is_absent(value) == 0) && (sensor[AT_IS_OUT] == 0)) ? 1 : 0;
         at_real reason = AT_R(0.0);
-        if (is_new != 0) {
-            sensor[AT_HAS_LOOKED] = 1;
-            sensor[AT_LOOKED] = stamp;
-        }
-        if ((passes != 0) && (is_new != 0)) {
+        if ((passes != 0) && (sensor[AT_IS_NEW] != 0)) {
             at_give(p, m, c->slot + nth, value, stamp);
         } else if ((passes == 0) && (sensor[AT_PASSES] != 0)) {
             at_give(p, m, c->slot + nth, AT_NAN, now);
@@ -3217,6 +4184,380 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
             /* It agrees. */
         }
         at_give(p, m, c->slot + c->channels + nth, reason, now);
+    }
+}
+
+/* ---- Samples at the instants of others. */
+
+static void at_run_sample_at(const at_plan *p, const at_sample_at *s, at_memory m)
+{
+    int any = 0;
+    int64_t stamp;
+    int32_t nth;
+    if ((at_gather_is(p, m, s->signal, AT_FRESH | AT_ENDED) == 0) && (at_gather_is(p, m, s->instants, AT_FRESH) == 0)) {
+        return;
+    }
+    for (nth = 0; nth < p->gather[s->instants].count; nth++) {
+        if (at_is_absent(at_port(p, m, s->instants, nth, &stamp)) == 0) {
+            any = 1;
+        }
+    }
+    for (nth = 0; (any != 0) && (nth < s->channels); nth++) {
+        const at_real value = at_port(p, m, s->signal, nth, &stamp);
+        at_give(p, m, s->slot + nth, value, stamp);
+    }
+}
+
+/* ---- The health of sensors. Of integers, of each channel: when it was heard last, when its last sample within the range was, since when its
+ * value is the same, when the first tick was, and since when it is in order again, each behind whether it is known; what is wrong with it;
+ * where the next square goes, and whether there are enough. Of numbers: the last sample; squares of differences, and their sums as a tree, the
+ * nth being that of the two at 2 n and 2 n + 1, with the squares behind the sums. */
+
+#define AT_HEARD 0
+#define AT_WITHIN 2
+#define AT_SAME 4
+#define AT_BEGUN 6
+#define AT_IN_ORDER 8
+#define AT_FAULT 10
+#define AT_NEXT_SQUARE 11
+#define AT_ENOUGH 12
+#define AT_OF_HEALTH 13
+
+#define AT_HEALTHY 0
+#define AT_OF_RANGE 1
+#define AT_OF_RATE 2
+#define AT_STUCK 3
+#define AT_QUIET 4
+#define AT_NOISY 5
+#define AT_SILENT 6
+#define AT_RECOVERING 7
+
+static int32_t at_numbers_of(const at_health *h)
+{
+    return 1 + (2 * h->kept);
+}
+
+/* Takes the square of a difference. */
+static void at_note_square(const at_health *h, int64_t sensor[], at_real squares[], at_real difference)
+{
+    at_real *sums = &squares[h->kept];
+    int32_t at = (int32_t)sensor[AT_NEXT_SQUARE];
+    if (h->kept > 0) {
+        squares[at] = difference * difference;
+        at = (at + h->kept) / 2;
+        while (at >= 1) {
+            const int32_t left = 2 * at;
+            const int32_t right = left + 1;
+            sums[at] = ((left < h->kept) ? sums[left] : squares[left - h->kept])
+                + ((right < h->kept) ? sums[right] : squares[right - h->kept]);
+            at = at / 2;
+        }
+        sensor[AT_NEXT_SQUARE]++;
+        if (sensor[AT_NEXT_SQUARE] == (int64_t)h->kept) {
+            sensor[AT_NEXT_SQUARE] = 0;
+            sensor[AT_ENOUGH] = 1;
+        }
+    }
+}
+
+/* What is wrong with a new sample. */
+static int64_t at_examine(const at_health *h, int32_t channel, int64_t sensor[], at_real numbers[], at_real value,
+                          int64_t now)
+{
+    const int had_heard = (sensor[AT_HEARD] != 0) ? 1 : 0;
+    const int64_t silence = at_minus(now, sensor[AT_HEARD + 1]);
+    int64_t found = AT_HEALTHY;
+    sensor[AT_HEARD] = 1;
+    sensor[AT_HEARD + 1] = now;
+    if (!isfinite(value) || (value < h->lowest[channel]) || (value > h->highest[channel])) {
+        return AT_OF_RANGE;
+    }
+    if (sensor[AT_WITHIN] != 0) {
+        const at_real difference = value - numbers[0];
+        const at_real passed = at_seconds(at_minus(now, sensor[AT_WITHIN + 1]));
+        at_note_square(h, sensor, &numbers[1], difference);
+        if ((difference != AT_R(0.0)) || ((had_heard != 0) && (h->pause >= 0) && (silence > h->pause))) {
+            sensor[AT_SAME] = 1;
+            sensor[AT_SAME + 1] = now;
+        }
+        if (at_size(difference) > (h->rate[channel] * passed)) {
+            found = AT_OF_RATE;
+        }
+    }
+    sensor[AT_WITHIN] = 1;
+    sensor[AT_WITHIN + 1] = now;
+    numbers[0] = value;
+    if (found == AT_HEALTHY) {
+        if ((at_lasts(&sensor[AT_SAME], now, h->stuck) != 0) && (h->stuck >= 0)) {
+            found = AT_STUCK;
+        } else if (sensor[AT_ENOUGH] != 0) {
+            const at_real noise = at_root(AT_R(0.5) * (numbers[2 + h->kept] / (at_real)h->kept));
+            if (noise < h->quiet[channel]) {
+                found = AT_QUIET;
+            } else if (noise > h->noisy[channel]) {
+                found = AT_NOISY;
+            } else {
+                /* As it should be. */
+            }
+        } else {
+            /* Too little is known. */
+        }
+    }
+    return found;
+}
+
+/* Goes from what was found to what is given: a channel in order again is waited for. */
+static void at_conclude(const at_health *h, int64_t sensor[], int64_t found, int64_t now)
+{
+    if (found != AT_HEALTHY) {
+        sensor[AT_IN_ORDER] = 0;
+        sensor[AT_FAULT] = found;
+    } else if (sensor[AT_FAULT] != AT_HEALTHY) {
+        if (at_lasts(&sensor[AT_IN_ORDER], now, h->recover) != 0) {
+            sensor[AT_FAULT] = AT_HEALTHY;
+            sensor[AT_IN_ORDER] = 0;
+        } else {
+            sensor[AT_FAULT] = AT_RECOVERING;
+        }
+    } else {
+        /* It stays well. */
+    }
+}
+
+static void at_run_health(const at_plan *p, const at_health *h, at_memory m)
+{
+    const int64_t now = m.i[AT_LAST];
+    int32_t nth;
+    for (nth = 0; nth < h->channels; nth++) {
+        int64_t *sensor = &m.i[h->ints + (AT_OF_HEALTH * nth)];
+        at_real *numbers = &m.r[h->reals + (at_numbers_of(h) * nth)];
+        int64_t stamp;
+        const at_real value = at_port(p, m, h->signal, nth, &stamp);
+        if (sensor[AT_BEGUN] == 0) {
+            sensor[AT_BEGUN] = 1;
+            sensor[AT_BEGUN + 1] = now;
+        }
+        if (at_is_absent(value) == 0) {
+            at_conclude(h, sensor, at_examine(h, nth, sensor, numbers, value, now), now);
+            at_give(p, m, h->slot + nth, (sensor[AT_FAULT] == AT_HEALTHY) ? value : AT_NAN, stamp);
+        } else {
+            const int64_t heard = sensor[((sensor[AT_HEARD] != 0) ? AT_HEARD : AT_BEGUN) + 1];
+            if ((h->gap >= 0) && (at_minus(now, heard) > h->gap) && (sensor[AT_FAULT] != AT_SILENT)) {
+                at_conclude(h, sensor, AT_SILENT, now);
+                at_give(p, m, h->slot + nth, AT_NAN, now);
+            }
+        }
+        at_give(p, m, h->slot + h->channels + nth, (at_real)sensor[AT_FAULT], now);
+    }
+}
+
+/* ---- Leaps: a position that is zeroed, homed or pushed. Of the integers of a series: whether there was a sample, and when; of the sample
+ * before it and of that before the last leap, and before a change that may be one, the same; whether a change is known before the newest;
+ * how many sizes there were of changes, of steps, of bends, and how many gaps; how many large steps. Of numbers: the last sample, the newest
+ * change and that before, quantiles of the sizes and of gaps, and what large steps came to. */
+
+#define AT_LAST_SAMPLE 0
+#define AT_NEWEST_CHANGE 2
+#define AT_LEAPT 4
+#define AT_SUSPECTED 6
+#define AT_BEFORE 8
+#define AT_SIZES 9 /* what stands before does not outlast a segment */
+#define AT_GAPS 12
+#define AT_HOMED 13
+#define AT_CHANGE 1
+#define AT_CHANGE_BEFORE 2
+#define AT_QUANTILES 3
+#define AT_USUAL_GAP 9
+#define AT_HOMES 10
+#define AT_CHANGES 0
+#define AT_STEPS 1
+#define AT_BENDS 2
+
+#define AT_FEWEST 20
+#define AT_MOST_HOMES 8
+#define AT_ALIKE AT_R(0.3)
+
+/* A value that a share of what comes does not exceed, as it moves with the last hundreds. */
+static at_real at_quantile(at_real was, at_real value, at_real share, int64_t nth)
+{
+    at_real is = value;
+    at_real by = AT_R(4.0) / (at_real)nth;
+    if (by < AT_R(0.05)) {
+        by = AT_R(0.05);
+    }
+    if (nth > 1) {
+        if (value > was) {
+            is = was * (AT_R(1.0) + (by * share));
+        } else {
+            is = was / (AT_R(1.0) + (by * (AT_R(1.0) - share)));
+        }
+    }
+    return is;
+}
+
+static void at_note_size(const at_course *c, at_memory m, int32_t of, at_real size)
+{
+    int64_t *seen = &m.i[c->ints + AT_SIZES + of];
+    at_real *quantiles = &m.r[c->reals + AT_QUANTILES + (2 * of)];
+    if ((size > AT_R(0.0)) && isfinite(size)) {
+        (*seen)++;
+        quantiles[0] = at_quantile(quantiles[0], size, AT_R(0.75), *seen);
+        quantiles[1] = at_quantile(quantiles[1], size, AT_R(0.95), *seen);
+    }
+}
+
+/* Changes that stand alone are leaps where they are larger. */
+static at_real at_least_change(const at_course *c, at_memory m)
+{
+    const at_real *quantiles = &m.r[c->reals + AT_QUANTILES + (2 * AT_CHANGES)];
+    const at_real spread = AT_R(10.0) * quantiles[0];
+    const at_real usual = (quantiles[1] < spread) ? quantiles[1] : spread;
+    return (m.i[c->ints + AT_SIZES + AT_CHANGES] < AT_FEWEST) ? (at_real)INFINITY : (AT_R(20.0) * usual);
+}
+
+/* Steps and bends are where they are larger than so many times what is usual. */
+static at_real at_least_step(const at_course *c, at_memory m, int32_t of, at_real times)
+{
+    const at_real *quantiles = &m.r[c->reals + AT_QUANTILES + (2 * of)];
+    const at_real part = AT_R(0.2) * quantiles[1];
+    const at_real usual = (quantiles[0] > part) ? quantiles[0] : part;
+    return (m.i[c->ints + AT_SIZES + of] < AT_FEWEST) ? (at_real)INFINITY : (times * usual);
+}
+
+/* Whether a change beside another leaves that one alone: it is small, or takes it back. */
+static int at_stands_alone(at_real change, at_real beside)
+{
+    const at_real least = AT_R(0.1) * at_size(change);
+    return ((at_size(beside) <= least) || (at_size(beside + change) <= least)) ? 1 : 0;
+}
+
+static int at_is_home(const at_course *c, at_memory m, at_real value)
+{
+    int32_t nth;
+    int32_t count = 0;
+    for (nth = 0; (nth < AT_MOST_HOMES) && ((int64_t)nth < m.i[c->ints + AT_HOMED]); nth++) {
+        if (m.r[c->reals + AT_HOMES + nth] == value) {
+            count++;
+        }
+    }
+    return (count >= 2) ? 1 : 0;
+}
+
+/* Whether the newest change is a leap, now that the next one is known. */
+static int at_was_leap(const at_course *c, at_memory m, at_real next)
+{
+    const at_real change = m.r[c->reals + AT_CHANGE];
+    const at_real before = m.r[c->reals + AT_CHANGE_BEFORE];
+    const at_real came_to = m.r[c->reals];
+    const at_real least = at_least_step(c, m, AT_STEPS, AT_R(20.0));
+    const at_real to_one = at_least_step(c, m, AT_STEPS, AT_R(8.0));
+    const int has_before = (m.i[c->ints + AT_BEFORE] != 0) ? 1 : 0;
+    int is_leap = ((at_stands_alone(change, next) != 0) && (at_size(change) > at_least_change(c, m)) &&
+                   ((has_before == 0) || (at_stands_alone(change, before) != 0))) ? 1 : 0;
+    if (has_before != 0) {
+        const at_real size = at_size(change - ((before + next) / AT_R(2.0)));
+        at_note_size(c, m, AT_STEPS, size);
+        if ((at_size(next - before) <= (AT_ALIKE * size)) && (size > to_one)) {
+            if ((size > least) || (at_is_home(c, m, came_to) != 0)) {
+                is_leap = 1;
+            }
+            m.r[c->reals + AT_HOMES + (int32_t)(m.i[c->ints + AT_HOMED] % AT_MOST_HOMES)] = came_to;
+            m.i[c->ints + AT_HOMED]++;
+        }
+    }
+    return is_leap;
+}
+
+/* Whether the change to a value may be a leap, as far as those before it say. */
+static int at_may_be_leap(const at_course *c, at_memory m, at_real value, at_real change, at_real least, const at_real steps[])
+{
+    const int has_before = (m.i[c->ints + AT_NEWEST_CHANGE] != 0) ? 1 : 0;
+    const at_real before = m.r[c->reals + AT_CHANGE];
+    const at_real bend = (has_before != 0) ? at_size(change - before) : AT_R(0.0);
+    const at_real beside = bend / (AT_R(1.0) - (AT_ALIKE / AT_R(2.0)));
+    int may_be = ((at_size(change) > least) && ((has_before == 0) || (at_stands_alone(change, before) != 0))) ? 1 : 0;
+    if ((bend > at_least_step(c, m, AT_BENDS, AT_R(20.0))) && (beside > steps[0])) {
+        may_be = 1;
+    }
+    if ((bend > at_least_step(c, m, AT_BENDS, AT_R(8.0))) && (beside > steps[1]) && (at_is_home(c, m, value) != 0)) {
+        may_be = 1;
+    }
+    at_note_size(c, m, AT_BENDS, bend);
+    return may_be;
+}
+
+/* Takes the next sample of a series that has one. */
+static void at_take_change(const at_course *c, at_memory m, at_real value)
+{
+    int64_t *known = &m.i[c->ints];
+    at_real *numbers = &m.r[c->reals];
+    const int64_t since = known[AT_LAST_SAMPLE + 1];
+    const at_real change = value - numbers[0];
+    const at_real gap = at_seconds(at_minus(m.i[AT_LAST], since));
+    const at_real least = at_least_change(c, m);
+    const at_real steps[2] = { at_least_step(c, m, AT_STEPS, AT_R(20.0)), at_least_step(c, m, AT_STEPS, AT_R(8.0)) };
+    int is_hole;
+    if (known[AT_NEWEST_CHANGE] != 0) {
+        if (at_was_leap(c, m, change) != 0) {
+            known[AT_LEAPT] = 1;
+            known[AT_LEAPT + 1] = known[AT_NEWEST_CHANGE + 1];
+        }
+        known[AT_SUSPECTED] = 0;
+    }
+    is_hole = ((known[AT_GAPS] >= AT_FEWEST) && (gap > (AT_R(3.0) * numbers[AT_USUAL_GAP]))) ? 1 : 0;
+    known[AT_GAPS]++;
+    numbers[AT_USUAL_GAP] = at_quantile(numbers[AT_USUAL_GAP], gap, AT_R(0.5), known[AT_GAPS]);
+    if (is_hole != 0) {
+        known[AT_BEFORE] = 0;
+        known[AT_NEWEST_CHANGE] = 0;
+    } else {
+        known[AT_SUSPECTED] = (int64_t)at_may_be_leap(c, m, value, change, least, steps);
+        known[AT_SUSPECTED + 1] = since;
+        at_note_size(c, m, AT_CHANGES, at_size(change));
+        known[AT_BEFORE] = known[AT_NEWEST_CHANGE];
+        numbers[AT_CHANGE_BEFORE] = numbers[AT_CHANGE];
+        known[AT_NEWEST_CHANGE] = 1;
+        known[AT_NEWEST_CHANGE + 1] = since;
+        numbers[AT_CHANGE] = change;
+    }
+}
+
+/* Takes what is new of the series of a truth, and makes it absent where its window holds a leap. */
+static void at_run_windowed(const at_plan *p, const at_windowed *w, at_memory m)
+{
+    const int64_t from = at_minus(at_stamp(p, m, w->slot), w->span);
+    int leapt = 0;
+    int32_t nth;
+    for (nth = 0; nth < w->count; nth++) {
+        const at_course *c = &w->courses[nth];
+        int64_t *known = &m.i[c->ints];
+        if ((at_is_fresh(p, m, c->slot) != 0) &&
+            ((known[AT_LAST_SAMPLE] == 0) || (known[AT_LAST_SAMPLE + 1] < m.i[AT_LAST]))) {
+            if (known[AT_LAST_SAMPLE] != 0) {
+                at_take_change(c, m, at_value(p, m, c->slot));
+            }
+            known[AT_LAST_SAMPLE] = 1;
+            known[AT_LAST_SAMPLE + 1] = m.i[AT_LAST];
+            m.r[c->reals] = at_value(p, m, c->slot);
+        }
+        if (((known[AT_LEAPT] != 0) && (known[AT_LEAPT + 1] >= from)) ||
+            ((known[AT_SUSPECTED] != 0) && (known[AT_SUSPECTED + 1] >= from))) {
+            leapt = 1;
+        }
+    }
+    if ((leapt != 0) && (at_ran(p, m, w->slot) != 0)) {
+        m.r[p->slot_reals + w->slot] = AT_NAN;
+    }
+}
+
+static void at_begin_windowed(const at_windowed *w, at_memory m)
+{
+    int32_t nth;
+    int32_t place;
+    for (nth = 0; nth < w->count; nth++) {
+        for (place = 0; place < AT_SIZES; place++) {
+            m.i[w->courses[nth].ints + place] = 0;
+        }
     }
 }
 
@@ -3288,6 +4629,21 @@ static void at_run(const at_plan *p, at_memory m, const at_step *step)
             at_run_cross_check(p, &p->cross_check[step->nth], m);
         }
         break;
+    case AT_SAMPLE_AT:
+        if (AT_IS_USED(AT_SAMPLE_AT)) {
+            at_run_sample_at(p, &p->sample_at[step->nth], m);
+        }
+        break;
+    case AT_HEALTH:
+        if (AT_IS_USED(AT_HEALTH)) {
+            at_run_health(p, &p->health[step->nth], m);
+        }
+        break;
+    case AT_WINDOWED:
+        if (AT_IS_USED(AT_WINDOWED)) {
+            at_run_windowed(p, &p->windowed[step->nth], m);
+        }
+        break;
     default:
         if (AT_IS_USED(AT_PICK)) {
             at_run_pick(p, &p->pick[step->nth], m);
@@ -3296,7 +4652,7 @@ static void at_run(const at_plan *p, at_memory m, const at_step *step)
     }
 }
 
-/* Lets what a step keeps begin anew: at the start, or with a segment, in which votes keep what they have learned. */
+/* Lets what a step keeps begin anew: at the start, or with a segment, in which what was learned stays. */
 static void at_begin(const at_plan *p, at_memory m, const at_step *step, int segment)
 {
     int32_t nth;
@@ -3336,6 +4692,21 @@ static void at_begin(const at_plan *p, at_memory m, const at_step *step, int seg
     case AT_CROSS_CHECK:
         for (nth = 0; nth < (AT_OF_SENSOR * p->cross_check[step->nth].channels); nth++) {
             m.i[p->cross_check[step->nth].ints + nth] = 0;
+        }
+        break;
+    case AT_LINEAR:
+        if (AT_IS_USED(AT_LEARNS) && (p->linear[step->nth].learner != NULL)) {
+            at_begin_learner(p, &p->linear[step->nth], m, segment);
+        }
+        break;
+    case AT_HEALTH:
+        for (nth = 0; nth < (AT_OF_HEALTH * p->health[step->nth].channels); nth++) {
+            m.i[p->health[step->nth].ints + nth] = 0;
+        }
+        break;
+    case AT_WINDOWED:
+        if (AT_IS_USED(AT_WINDOWED)) {
+            at_begin_windowed(&p->windowed[step->nth], m);
         }
         break;
     default:
@@ -3396,6 +4767,11 @@ uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in
     if (is_back != 0) {
         at_segment(plan, m);
     }
+    for (nth = 0; AT_IS_USED(AT_FAST) && (m.i[AT_LOADED] != 0) && (nth < plan->steps); nth++) {
+        if ((plan->step[nth].kind == AT_SLOPE) && (plan->slope[plan->step[nth].nth].kept >= 0)) {
+            at_rebuild(plan, &plan->slope[plan->step[nth].nth], m);
+        }
+    }
     m.i[AT_LOADED] = 0;
     if (m.i[AT_HAS_BREAK] != 0) {
         const int64_t shift = at_minus(t_ns, m.i[AT_BREAK]);
@@ -3403,6 +4779,11 @@ uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in
         for (nth = 0; nth < plan->steps; nth++) {
             if (plan->step[nth].kind == AT_VOTE) {
                 at_shift_vote(plan, &plan->vote[plan->step[nth].nth], m, shift);
+            } else if (AT_IS_USED(AT_LEARNS) && (plan->step[nth].kind == AT_LINEAR) &&
+                       (plan->linear[plan->step[nth].nth].learner != NULL)) {
+                at_shift_learner(&plan->linear[plan->step[nth].nth], m, shift);
+            } else {
+                /* Nothing else waits for truths. */
             }
         }
     }
@@ -3436,6 +4817,13 @@ uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in
             if ((v->truth >= 0) && (at_is_fresh(plan, m, v->truth) != 0)) {
                 at_take_truth(plan, v, m);
             }
+        } else if (AT_IS_USED(AT_LEARNS) && (plan->step[nth].kind == AT_LINEAR)) {
+            const at_linear *l = &plan->linear[plan->step[nth].nth];
+            if ((l->learner != NULL) && (at_is_fresh(plan, m, l->learner->truth) != 0)) {
+                at_note_truth(plan, l, m);
+            }
+        } else {
+            /* It takes no truths. */
         }
     }
     for (nth = 0; nth < plan->outputs; nth++) {
@@ -3480,7 +4868,7 @@ static uint64_t at_checksum(const uint8_t bytes[], size_t words)
 
 static size_t at_words(const at_plan *plan)
 {
-    return ((size_t)AT_HEADER + (size_t)plan->ints) + (size_t)plan->reals;
+    return ((size_t)AT_HEADER + (size_t)plan->ints) + (size_t)plan->saved;
 }
 
 size_t at_saved_size(const at_plan *plan)
@@ -3497,12 +4885,12 @@ size_t at_save(const at_plan *plan, const int64_t ints[], const at_real reals[],
         at_put_word(bytes, 0, AT_NAME);
         at_put_word(bytes, 1, plan->revision);
         at_put_word(bytes, 2, (uint64_t)plan->ints);
-        at_put_word(bytes, 3, (uint64_t)plan->reals);
+        at_put_word(bytes, 3, (uint64_t)plan->saved);
         at_put_word(bytes, 4, (uint64_t)sizeof(at_real));
         for (nth = 0; nth < count; nth++) {
             at_put_word(bytes, (size_t)AT_HEADER + nth, (nth == (size_t)AT_LOADED) ? 0u : (uint64_t)ints[nth]);
         }
-        for (nth = 0; nth < (size_t)plan->reals; nth++) {
+        for (nth = 0; nth < (size_t)plan->saved; nth++) {
             at_put_word(bytes, ((size_t)AT_HEADER + count) + nth, at_bits((double)reals[nth]));
         }
         at_put_word(bytes, at_words(plan), at_checksum(bytes, at_words(plan)));
@@ -3517,7 +4905,7 @@ int at_load(const at_plan *plan, at_memory m, const uint8_t bytes[], size_t leng
     size_t nth;
     if ((length != at_saved_size(plan)) || (at_get_word(bytes, 0) != AT_NAME)
         || (at_get_word(bytes, 1) != plan->revision) || (at_get_word(bytes, 2) != (uint64_t)plan->ints)
-        || (at_get_word(bytes, 3) != (uint64_t)plan->reals) || (at_get_word(bytes, 4) != (uint64_t)sizeof(at_real))
+        || (at_get_word(bytes, 3) != (uint64_t)plan->saved) || (at_get_word(bytes, 4) != (uint64_t)sizeof(at_real))
         || (at_get_word(bytes, at_words(plan)) != at_checksum(bytes, at_words(plan)))) {
         return 1;
     }
@@ -3525,7 +4913,7 @@ int at_load(const at_plan *plan, at_memory m, const uint8_t bytes[], size_t leng
         const uint64_t word = at_get_word(bytes, (size_t)AT_HEADER + nth);
         m.i[nth] = (word <= (uint64_t)INT64_MAX) ? (int64_t)word : (-(int64_t)(UINT64_MAX - word) - 1);
     }
-    for (nth = 0; nth < (size_t)plan->reals; nth++) {
+    for (nth = 0; nth < (size_t)plan->saved; nth++) {
         m.r[nth] = (at_real)at_number(at_get_word(bytes, ((size_t)AT_HEADER + ints) + nth));
     }
     m.i[AT_LOADED] = 1;

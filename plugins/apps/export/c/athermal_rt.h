@@ -83,6 +83,7 @@ typedef struct {
     int32_t blocks;
     int32_t ints;
     int32_t reals;
+    int32_t kept; /* where sums are kept, so that a tick does not sum all rows anew; -1 */
 } at_slope;
 
 typedef struct {
@@ -119,16 +120,67 @@ typedef struct {
 #define AT_SHRINK 1
 #define AT_GONE 2
 
+/* The variance of truths about what a fit predicts. */
+typedef struct {
+    at_real noise;
+    at_real least; /* what the mean brings */
+    const at_real *centre;
+    const at_real *root; /* a lower triangle row by row */
+} at_variance;
+
+/* How sure a recursion is of its coefficients, on regressors that are standardised so. */
+typedef struct {
+    at_real variance; /* of what is left */
+    const at_real *mean;
+    const at_real *scale;
+    const at_real *root; /* W of their covariance W'W as the fit left it, the constant last: a lower triangle row by row */
+} at_spread;
+
+/* Goes on learning: recursive least squares. Learners that read the same have one place for their past rows. */
+typedef struct {
+    int32_t freeze; /* the gather of channels that must all be 0; -1 */
+    int32_t truth;  /* the slot of the truth */
+    int64_t ahead;
+    int64_t limit;
+    int64_t embargo;
+    int32_t runs; /* room for so many rows and truths that wait */
+    int32_t waiting;
+    int32_t run_ints;
+    int32_t run_reals;
+    at_real below; /* the sizes of truths that are learned from */
+    at_real above;
+    const at_real *lowest; /* where regressors are */
+    const at_real *highest;
+    at_real outliers;
+    int64_t window;  /* that a truth tells of */
+    int64_t between; /* the time from one truth that teaches to the next */
+    int64_t silence; /* after so long without a truth the fit stands in */
+    at_real memory;  /* the same in seconds: in it what was learned fades, but for 1/e */
+    at_real share;   /* of the fit, that it goes back to */
+    at_real little;  /* a truth says little below */
+    at_real rows;    /* as how many the fit counts, and the squares of their errors */
+    at_real squares;
+    at_real level;
+    const at_real *start; /* coefficients of standardised regressors, the constant last, */
+    const at_real *information; /* and the inverse of their covariance: a lower triangle row by row */
+    int32_t ints;
+    int32_t reals;
+} at_learner;
+
 typedef struct {
     int32_t trigger; /* the gather that lets it run; -1: it runs at every tick */
     int32_t slot;
-    int32_t novelty_slot; /* -1 where nobody reads it */
+    int32_t novelty_slot; /* -1 where nobody reads it; the same of the other */
+    int32_t std_dev_slot;
     int32_t width;
     int32_t same; /* it repeats its only regressor */
     const at_entry *entries;
     at_real constant;
     const at_real *coefficients;
-    const at_novelty *novelty; /* NULL where nobody heeds it */
+    const at_novelty *novelty; /* NULL where nobody heeds it; the same of the others */
+    const at_variance *variance;
+    const at_spread *spread;
+    const at_learner *learner;
     int32_t outside;
     at_real centre;
 } at_linear;
@@ -160,6 +212,8 @@ typedef struct {
     int32_t weights_slot; /* -1 where nobody reads them; the same of the others */
     int32_t reason_slot;
     int32_t novelty_slot;
+    int32_t std_dev_slot;
+    int32_t std_devs; /* the gather of those of the votes; -1 */
     int32_t truth; /* the slot of the truth; -1 */
     int64_t ahead;
     int64_t limit;
@@ -282,10 +336,55 @@ typedef struct {
     const at_real *matrix;  /* a lower triangle row by row */
     at_real usual;
     at_real limit;
+    int64_t lag;
     int64_t after;
     int64_t recover;
+    int64_t longest;
     int32_t ints;
+    int32_t reals;
 } at_cross_check;
+
+/* Each channel at the instants at which others are measured. */
+typedef struct {
+    int32_t signal;
+    int32_t instants;
+    int32_t slot;
+    int32_t channels;
+} at_sample_at;
+
+/* Whether sensors can be trusted; times are -1 where nothing is checked. */
+typedef struct {
+    int32_t signal;
+    int32_t slot;
+    int32_t channels;
+    const at_real *lowest;
+    const at_real *highest;
+    const at_real *rate;
+    const at_real *quiet;
+    const at_real *noisy;
+    int64_t stuck;
+    int64_t gap;
+    int64_t pause; /* after which the count of the same value begins anew */
+    int64_t recover;
+    int32_t kept; /* squares of differences; 0 where noise is not looked at */
+    int32_t ints;
+    int32_t reals;
+} at_health;
+
+/* A series in which leaps are looked for. */
+typedef struct {
+    int32_t slot;
+    int32_t ints;
+    int32_t reals;
+} at_course;
+
+/* A truth over a window, which is absent where what it is taken over leapt within. */
+typedef struct {
+    int32_t slot;
+    int32_t count;
+    const at_course *courses;
+    int64_t span;
+} at_windowed;
 
 #define AT_SLOPE 0
 #define AT_LAG 1
@@ -300,11 +399,17 @@ typedef struct {
 #define AT_SETTLED 10
 #define AT_PICK 11
 #define AT_CROSS_CHECK 12
-/* Parts of votes, beside these kinds, that a graph may do without. */
-#define AT_HEDGES 13
-#define AT_ANY_POWER 14
-#define AT_FADES 15
-#define AT_GATHER 16 /* as a step: reads whether anything in a gather is new */
+#define AT_SAMPLE_AT 13
+#define AT_HEALTH 14
+#define AT_WINDOWED 15
+/* Parts of slopes, votes and estimators, beside these kinds, that a graph may do without. */
+#define AT_HEDGES 16
+#define AT_ANY_POWER 17
+#define AT_FADES 18
+#define AT_LEARNS 19
+#define AT_STD_DEVS 20
+#define AT_FAST 21
+#define AT_GATHER 22 /* as a step: reads whether anything in a gather is new */
 
 /* What is done at a tick, in order: a kind and the number of its parameters in the table of that kind. */
 typedef struct {
@@ -326,6 +431,7 @@ typedef struct {
     int32_t scratch;      /* room for what is needed within a step alone */
     int32_t ints;
     int32_t reals;
+    int32_t saved;        /* of the numbers, how many are saved: what follows is made of them */
     uint64_t revision;    /* of the graph and its fit */
     const at_real *lowest;
     const at_real *highest;
@@ -348,6 +454,9 @@ typedef struct {
     const at_settled *settled;
     const at_pick *pick;
     const at_cross_check *cross_check;
+    const at_sample_at *sample_at;
+    const at_health *health;
+    const at_windowed *windowed;
 } at_plan;
 
 /* The state of a plan. */
@@ -363,7 +472,7 @@ void at_init(const at_plan *plan, at_memory m);
  * tick after a state was loaded may have any time: before that of the state it begins another segment. */
 uint32_t at_tick(const at_plan *plan, at_memory m, int64_t t_ns, const double in[], double out[]);
 
-/* The next tick belongs to another segment: windows and lags start afresh, what votes have learned stays. */
+/* The next tick belongs to another segment: windows and lags start afresh, what was learned stays. */
 void at_segment(const at_plan *plan, at_memory m);
 
 /* The bytes that at_save writes: the state, independent of the order of bytes of the processor. */

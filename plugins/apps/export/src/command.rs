@@ -1,16 +1,15 @@
 //! The command: which graph is exported, how often samples come, and what it takes.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use athermal_command::{Answer, Command, Failure, Format, Group, Terminal, println};
+use athermal_core::compile::Rates;
 use athermal_core::engine::Engine;
 use athermal_core::time::Duration;
 use athermal_run::model::Model;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 
-use crate::lower::Rates;
 use crate::{ExportError, Exported, Form, Options, c, export_c, fmu, lower, onnx, st, state};
 
 /// What a graph is written as.
@@ -32,6 +31,7 @@ enum Target {
   athermal export c model.json --dry-run
   athermal export c model.json -o c
   athermal export c model.json -o c --rate 1s --rate position=10s --frozen
+  athermal export c model.json -o c --fast
   athermal export fmu model.json -o fmu
   athermal export onnx model.json -o onnx
   athermal export st model.json -o st")]
@@ -55,6 +55,9 @@ pub(crate) struct Export {
     /// Export what goes on learning as it was fitted
     #[arg(long)]
     frozen: bool,
+    /// Keep sums of slopes from tick to tick: a tick takes less time, and the state more room
+    #[arg(long)]
+    fast: bool,
     /// Build in single precision, and measure its error where there is a C compiler
     #[arg(long)]
     float: bool,
@@ -77,10 +80,11 @@ impl Command for Export {
         let options = Options {
             rates: self.rates(terminal, &model)?,
             frozen: self.frozen,
+            fast: self.fast,
             name: self.name.clone(),
         };
         if self.dry_run {
-            let form = lower(&engine, &options).map_err(failure)?;
+            let form = self.lowered(&engine, &options)?;
             self.foresee(terminal, &form);
             return Ok(Answer::Fine);
         }
@@ -130,36 +134,27 @@ fn rates_of(form: &Form) -> String {
 impl Export {
     /// How often samples come: as it is given, else as in the data of the fit.
     fn rates(&self, terminal: &Terminal, model: &Model) -> Result<Rates, Failure> {
-        let signals: BTreeSet<&str> = (model.plan.sources.iter())
-            .filter_map(|source| source.name.split('.').next())
-            .collect();
-        let mut usual = model
-            .card
-            .as_ref()
-            .map_or_else(BTreeMap::new, |card| card.rates.clone());
-        usual.retain(|signal, _| signals.contains(&**signal));
-        let of_data = Rates::of_data(&usual);
-        let of_all = self.rate.iter().any(|rate| !rate.contains('='));
-        if of_data.is_none() && !of_all {
+        let (rates, is_guessed) =
+            (model.rates(&self.rate)).map_err(|error| Failure::Request(error.to_string()))?;
+        if is_guessed {
             terminal.note(
                 "the model does not say how often samples come: room is made for one a second, where `--rate` says nothing else",
             );
         }
-        let mut rates = of_data.filter(|_| !of_all).unwrap_or_default();
-        for rate in &self.rate {
-            let (signal, time) = match rate.split_once('=') {
-                Some((signal, time)) => (Some(signal), time),
-                None => (None, &**rate),
-            };
-            let time: Duration = time
-                .parse()
-                .map_err(|error| Failure::Request(format!("--rate {rate}: {error}")))?;
-            match signal {
-                Some(signal) => drop(rates.signals.insert(signal.to_owned(), time)),
-                None => rates.period = time,
-            }
-        }
         Ok(rates)
+    }
+
+    /// The graph, lowered; ONNX has no place for what goes on learning.
+    fn lowered(&self, engine: &Engine, options: &Options) -> Result<Form, Failure> {
+        let form = lower(engine, options).map_err(failure)?;
+        let mut nodes = form.nodes.iter();
+        match nodes.find(|of| self.target == Target::Onnx && of.struct_of("learner").is_some()) {
+            None => Ok(form),
+            Some(of) => Err(Failure::Request(format!(
+                "`{}`: it goes on learning while it runs, which ONNX has no place for; `--frozen` exports it as it was fitted",
+                of.node
+            ))),
+        }
     }
 
     fn folder(&self) -> &Path {
@@ -183,7 +178,7 @@ impl Export {
             return;
         }
         let (state, rates) = (self.state_bytes(form), rates_of(form));
-        println!("state: {state} bytes with {rates}");
+        println!("state: {state} bytes{} with {rates}", self.kept(form));
         println!("a tick: about {} operations at worst", c::operations(form));
         if self.target != Target::St {
             let c::Flash {
@@ -195,6 +190,14 @@ impl Export {
                 "flash: about {} bytes on a Cortex-M4: {runtime} of the runtime, {tables} of tables, {self_test} of the self test",
                 runtime + tables + self_test
             );
+        }
+    }
+
+    /// What of the state `--fast` takes.
+    fn kept(&self, form: &Form) -> String {
+        match form.layout.kept * if self.float { 4 } else { 8 } {
+            0 => String::new(),
+            kept => format!(", {kept} of them sums that are kept,"),
         }
     }
 
@@ -220,6 +223,7 @@ impl Export {
             "inputs": form.sources.len(),
             "outputs": form.outputs.len(),
             "state_bytes": self.state_bytes(form),
+            "kept_bytes": form.layout.kept * if self.float { 4 } else { 8 },
             "flash_bytes": (self.target != Target::St)
                 .then(|| json!({ "runtime": runtime, "tables": tables, "self_test": self_test })),
             "operations": c::operations(form),
@@ -233,6 +237,7 @@ impl Export {
             ("--state", self.state.is_some()),
             ("--state-back", self.state_back.is_some()),
             ("--float", self.float),
+            ("--fast", self.fast && self.target != Target::Fmu),
         ];
         let refused = given.iter().find(|(_, is_given)| *is_given);
         match (self.target, refused) {
@@ -250,7 +255,8 @@ impl Export {
 
     /// Writes Structured Text.
     fn st(&self, engine: &Engine, options: &Options) -> Result<Answer, Failure> {
-        let exported = st::export(engine, options).map_err(failure)?;
+        let mut exported = st::export(engine, options).map_err(failure)?;
+        exported.files.push(st::plcopen(&exported));
         c::write(&exported.files, self.folder()).map_err(failure)?;
         let form = &exported.form;
         println!(
@@ -267,7 +273,7 @@ impl Export {
 
     /// Writes the linear parts.
     fn onnx(&self, engine: &Engine, options: &Options) -> Result<Answer, Failure> {
-        let form = lower(engine, options).map_err(failure)?;
+        let form = self.lowered(engine, options)?;
         let path = format!("{}.onnx", form.name);
         let count = onnx::estimators(&form).count();
         let bytes = onnx::model(&form);
@@ -351,12 +357,13 @@ impl Export {
             return;
         }
         println!(
-            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state with {}, about {operations} operations a tick",
+            "wrote {}: {} with {} inputs and {} outputs, {} bytes of state{} with {}, about {operations} operations a tick",
             self.folder().display(),
             form.name,
             form.sources.len(),
             form.outputs.len(),
             self.state_bytes(form),
+            self.kept(form),
             rates_of(form),
         );
         match single_precision {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use athermal_core::compile::RateError;
 use athermal_core::engine::EngineError;
 use thiserror::Error;
 
@@ -12,24 +13,9 @@ pub enum ExportError {
     /// Nodes that have no counterpart on a controller.
     #[error("{}", listed(.0))]
     Nodes(Vec<Refusal>),
-    /// The time between two samples is not above 0.
-    #[error(
-        "the rate of `{signal}` is {given}: give the time between two samples, above 0, such as --rate {signal}=1s"
-    )]
-    Rate {
-        /// The signal.
-        signal: String,
-        /// What was given.
-        given: String,
-    },
-    /// A rate of a signal that the graph does not have.
-    #[error("there is no signal `{signal}`: the graph has {known}")]
-    UnknownSignal {
-        /// The signal.
-        signal: String,
-        /// Those that there are.
-        known: String,
-    },
+    /// Samples do not come as it was said.
+    #[error(transparent)]
+    Rate(#[from] RateError),
     /// A C compiler refuses what was written.
     #[error("`{compiler}` refuses the sources: {said}")]
     Compiler {

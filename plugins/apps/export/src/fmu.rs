@@ -82,8 +82,8 @@ fn unit(form: &Form, token: &str) -> String {
         .replace("@token@", token)
 }
 
-/// Text within an attribute.
-fn escaped(text: &str) -> String {
+/// Text within an element, or an attribute, where the end of a line is read as a space.
+pub(crate) fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for c in text.chars() {
         match c {
@@ -91,7 +91,7 @@ fn escaped(text: &str) -> String {
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
-            c if c.is_control() => escaped.push(' '),
+            c if c.is_control() && c != '\n' => escaped.push(' '),
             c => escaped.push(c),
         }
     }

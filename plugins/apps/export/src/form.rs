@@ -82,9 +82,17 @@ pub struct Layout {
     pub ints: usize,
     /// All numbers.
     pub reals: usize,
+    /// The last of them, which are made of the others and not saved.
+    pub kept: usize,
 }
 
 impl Layout {
+    /// How many numbers are saved.
+    #[must_use]
+    pub fn saved(&self) -> usize {
+        self.reals - self.kept
+    }
+
     /// Bytes of the state, each number having so many.
     #[must_use]
     pub fn bytes(&self, of_number: usize) -> usize {
@@ -118,6 +126,12 @@ impl Form {
             *known = period.min(*known);
         }
         rates
+    }
+
+    /// The series in which leaps are looked for, of each truth its own.
+    pub(crate) fn courses(&self) -> impl Iterator<Item = &Record> {
+        let truths = self.nodes.iter().filter(|of| of.kind == "windowed");
+        truths.flat_map(|of| of.structs_of("courses"))
     }
 
     /// How many votes a vote has, and of how many it keeps errors: a guard compares each with predicting zero.
@@ -239,6 +253,12 @@ impl Record {
         self.with(name, Field::Int(value as i64))
     }
 
+    /// The same with another whole number.
+    pub fn set(&mut self, name: &'static str, value: usize) {
+        self.fields.retain(|(own, _)| *own != name);
+        self.fields.push((name, Field::Int(value as i64)));
+    }
+
     /// And this number of a slot or gather, -1 where there is none.
     #[must_use]
     pub fn maybe(self, name: &'static str, value: Option<usize>) -> Self {
@@ -261,6 +281,23 @@ impl Record {
     fn field(&self, name: &str) -> Option<&Field> {
         let mut fields = self.fields.iter();
         fields.find(|(own, _)| *own == name).map(|(_, field)| field)
+    }
+
+    /// Another structure of it, where there is one.
+    #[must_use]
+    pub fn struct_of(&self, name: &str) -> Option<&Record> {
+        match self.field(name) {
+            Some(Field::Struct(inner)) => inner.as_deref(),
+            _ => None,
+        }
+    }
+
+    /// Other structures of it; none where the kind has none of the name.
+    pub(crate) fn structs_of(&self, name: &str) -> &[Record] {
+        match self.field(name) {
+            Some(Field::Structs(all)) => all,
+            _ => &[],
+        }
     }
 
     /// A whole number; -1 where the kind has none of the name.

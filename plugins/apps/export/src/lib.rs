@@ -20,11 +20,12 @@ pub mod st;
 pub mod state;
 mod ticks;
 
+pub use athermal_core::compile::Rates;
 use athermal_core::engine::Engine;
 
 pub use error::{ExportError, Refusal};
 pub use form::{Bundle, Entry, Field, Form, History, Layout, Port, Record, Step};
-pub use lower::{Options, Rates, identifier, lower};
+pub use lower::{Options, identifier, lower};
 pub use ticks::{TICKS, Ticks, self_test};
 
 /// A graph as files.

@@ -3,7 +3,9 @@
 //! What stands in both goes over to the bit. An output that is passing over from one graph to the next does so no more in C, which has no
 //! graph to pass over to.
 
+mod courses;
 mod image;
+mod learners;
 mod nodes;
 mod snapshot;
 mod votes;
@@ -85,6 +87,11 @@ pub fn to_c(engine: &Engine, form: &Form) -> Result<Vec<u8>, CarryError> {
             image.put_history(history, past);
         }
     }
+    for course in form.courses() {
+        if let Some(known) = state.courses.get(&course.node) {
+            image.put_course(course, known);
+        }
+    }
     for node in &form.nodes {
         if let Some(known) = state.nodes.get(&node.node) {
             nodes::put(&mut image, form, node, known)?;
@@ -134,6 +141,10 @@ pub fn from_c(engine: &mut Engine, form: &Form, saved: &[u8]) -> Result<(), Carr
         if let Some(past) = name.and_then(|name| state.histories.get_mut(name)) {
             past.entries = image.history(history);
         }
+    }
+    for course in form.courses() {
+        let known = image.course(course);
+        state.courses.insert(course.node.clone(), known);
     }
     for node in &form.nodes {
         if let Some(known) = state.nodes.get_mut(&node.node) {

@@ -16,7 +16,7 @@ pub struct Flash {
 }
 
 /// What each part of the runtime takes beside what all share, as `size` has it for a Cortex-M4.
-const PARTS: [(&str, usize); 16] = [
+const PARTS: [(&str, usize); 22] = [
     ("AT_SLOPE", 4_900),
     ("AT_LAG", 200),
     ("AT_FIRST_ORDER", 1_300),
@@ -30,9 +30,15 @@ const PARTS: [(&str, usize); 16] = [
     ("AT_SETTLED", 700),
     ("AT_PICK", 100),
     ("AT_CROSS_CHECK", 2_100),
+    ("AT_SAMPLE_AT", 250),
+    ("AT_HEALTH", 1_400),
+    ("AT_WINDOWED", 2_700),
     ("AT_HEDGES", 2_800),
     ("AT_ANY_POWER", 3_400),
     ("AT_FADES", 3_300),
+    ("AT_FAST", 1_900),
+    ("AT_LEARNS", 4_150),
+    ("AT_STD_DEVS", 900),
 ];
 const SHARED: usize = 6_400;
 /// The functions of a graph, without and with those of the self test.

@@ -9,7 +9,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
 
-use athermal_features::slope::kernel::FEWEST_ROWS;
+use athermal_features::slope::kernel::{FEWEST_ROWS, MOST_ROWS};
 pub use flash::{Flash, flash};
 use thiserror::Error;
 
@@ -162,23 +162,30 @@ pub fn operations(form: &Form) -> usize {
             let (rows, channels) = (node.place_of("room"), node.place_of("channels"));
             let (blocks, windows) = (node.place_of("blocks"), node.place_of("windows"));
             // A window that begins within the current block is summed by itself, over as many rows as the smallest blocks have.
-            let rows = rows + windows * FEWEST_ROWS as usize;
+            let short = windows * FEWEST_ROWS as usize;
+            // Of sums that are kept those of one block are made, and fewer than a block's fewest rows added for each window.
+            let rows = match node.int_of("kept") {
+                0.. => MOST_ROWS as usize + 2 * short,
+                _ => rows + short,
+            };
             rows * (4 + 7 * channels) + blocks * (12 + 14 * channels) + windows * channels * 50
         }
         "linear" => {
             let width = node.place_of("width");
-            let novelty = node.fields.iter().find_map(|(_, field)| match field {
-                crate::form::Field::Struct(Some(novelty)) => Some(novelty.place_of("directions")),
-                _ => None,
-            });
-            2 * width + novelty.map_or(0, |directions| width * (4 + 2 * directions))
+            let novelty = node.struct_of("novelty");
+            let novelty = novelty.map_or(0, |of| width * (4 + 2 * of.place_of("directions")));
+            let has = |part| usize::from(node.struct_of(part).is_some());
+            // Of a covariance the triangle is gone through for each variance; its root is found anew for a row that is learned.
+            let squares = has("variance") + 3 * has("spread") + (width + 10) * has("learner");
+            2 * width + novelty + squares * (width + 1) * (width + 1)
         }
+        "health" => node.place_of("channels") * 60,
         // The memory of every voter is summed anew, and each weight is a power or an exponential.
         "vote" => form.voters(node).1 * (2 * node.place_of("errors") + 80) + 40,
-        // Of every column that is not there the form is made anew, once for all and once for each sensor that is out.
+        // Of every column that is not there the form is made anew.
         "cross_check" => {
-            let (columns, channels) = (node.place_of("columns"), node.place_of("channels"));
-            (channels + 1) * columns * columns * (2 * columns + 4)
+            let columns = node.place_of("columns");
+            columns * columns * (2 * columns + 4)
         }
         _ => 40,
     };
@@ -245,7 +252,7 @@ fn header(form: &Form) -> String {
         operations(form),
         8 * layout.ints,
         layout.reals,
-        8 * (layout.ints + layout.reals + 6),
+        8 * (layout.ints + layout.saved() + 6),
         crate::ticks::TICKS,
         form.period_ns,
         window_ticks(form),
@@ -286,7 +293,7 @@ fn header(form: &Form) -> String {
          /* Begins cold. */\nvoid {name}_init({name}_state *state);\n\n\
          /* One instant: samples in, NaN where there is no new value; outputs, NaN where there is none. 0, or AT_REFUSED, AT_FULL, AT_REJECTED, AT_RESTARTED. */\n\
          int {name}_step({name}_state *state, int64_t t_ns, const double in[], double out[]);\n\n\
-         /* The next tick begins another segment: windows start afresh, what votes have learned stays. */\n\
+         /* The next tick begins another segment: windows start afresh, what was learned stays. */\n\
          void {name}_segment({name}_state *state);\n\n\
          /* The state as {upper}_SAVED_BYTES bytes, the same on every processor; 0 where there is too little room. */\n\
          size_t {name}_save(const {name}_state *state, uint8_t bytes[], size_t room);\n\n\

@@ -7,7 +7,7 @@ use athermal_core::engine::fnv_1a;
 use crate::form::{Bundle, Entry, Field, Form, HEDGE, Record, Step};
 
 /// The kinds of the runtime, in the order of its table of plans, and as its steps name them.
-const KINDS: [(&str, &str); 13] = [
+const KINDS: [(&str, &str); 16] = [
     ("slope", "AT_SLOPE"),
     ("lag", "AT_LAG"),
     ("first_order", "AT_FIRST_ORDER"),
@@ -21,17 +21,20 @@ const KINDS: [(&str, &str); 13] = [
     ("settled", "AT_SETTLED"),
     ("pick", "AT_PICK"),
     ("cross_check", "AT_CROSS_CHECK"),
+    ("sample_at", "AT_SAMPLE_AT"),
+    ("health", "AT_HEALTH"),
+    ("windowed", "AT_WINDOWED"),
 ];
 
 /// The rule of votes, and their form of weights, that take a power.
 const AUTO_WEIGHTED: i64 = 0;
 const INVERSE_POWER: i64 = 0;
 
-/// What a graph uses of the runtime: the kinds of its nodes, and of votes what not all of them need.
+/// What a graph uses of the runtime: the kinds of its nodes, and of votes and estimators what not all of them need.
 pub(super) fn used(form: &Form) -> Vec<&'static str> {
     let any = |is: &dyn Fn(&Record) -> bool| form.nodes.iter().any(is);
     let kinds = KINDS.iter().filter(|(kind, _)| any(&|of| of.kind == *kind));
-    let of_votes = [
+    let parts = [
         ("AT_HEDGES", any(&|of| of.int_of("rule") == HEDGE)),
         (
             "AT_ANY_POWER",
@@ -41,11 +44,17 @@ pub(super) fn used(form: &Form) -> Vec<&'static str> {
             }),
         ),
         ("AT_FADES", any(&|of| of.real_of("half_life") > 0.0)),
+        (
+            "AT_FAST",
+            any(&|of| of.int_of("kept") >= 0 && of.kind == "slope"),
+        ),
+        ("AT_LEARNS", any(&|of| of.struct_of("learner").is_some())),
+        ("AT_STD_DEVS", any(&|of| of.int_of("std_dev_slot") >= 0)),
     ];
-    let of_votes = of_votes.into_iter().filter(|(_, is)| *is);
+    let parts = parts.into_iter().filter(|(_, is)| *is);
     kinds
         .map(|(_, part)| *part)
-        .chain(of_votes.map(|(part, _)| part))
+        .chain(parts.map(|(part, _)| part))
         .collect()
 }
 
@@ -324,6 +333,7 @@ fn plan(form: &Form, text: &mut String) {
         ("scratch", layout.scratch),
         ("ints", layout.ints),
         ("reals", layout.reals),
+        ("saved", layout.saved()),
         ("recorded", form.recorded),
     ];
     text.push_str("static const at_plan plan = {\n");

@@ -1,8 +1,8 @@
 //! Features: what runs on a controller of each kind, with its limits in the units of its channels.
 
 use athermal_control::{
-    Compensate, CrossCheck, OpticalLoss, SafeState, Settled, Stability, Uncorrected, UntilFirst,
-    WhenLost, optical_loss,
+    Compensate, CrossCheck, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
+    UntilFirst, WhenLost, optical_loss,
 };
 use athermal_core::channel::Channel;
 use athermal_core::compile::{PlannedFit, PlannedNode, PlannedRole};
@@ -21,7 +21,9 @@ use super::{Lowering, Refused, SPARE, first, refuse, samples, unfitted, unknown,
 use crate::form::{Field, Record};
 
 /// Sums over a run of rows of each channel.
-const SUMS: usize = 5;
+pub(super) const SUMS: usize = 5;
+/// Of so many rows one has its sums kept.
+pub(super) const EACH: usize = 8;
 
 /// A feature as it is planned.
 struct Planned<'a> {
@@ -139,6 +141,16 @@ impl Lowering<'_> {
                     .int("slot", planned.slot())
                     .int("channels", channels.len()))
             }
+            ("athermal-features", "sample_at") => {
+                let (channels, signal) = planned.port("signal");
+                Ok(planned
+                    .record("sample_at")
+                    .int("signal", signal)
+                    .int("instants", planned.port("instants").1)
+                    .int("slot", planned.slot())
+                    .int("channels", channels.len()))
+            }
+            ("athermal-control", "health") => self.health(&planned, &parameters(node)?),
             ("athermal-control", "compensate") => self.compensate(&planned, &parameters(node)?),
             ("athermal-control", "stability") => self.stability(&planned, &parameters(node)?),
             ("athermal-control", "safe_state") => self.safe_state(&planned, &parameters(node)?),
@@ -195,9 +207,67 @@ impl Lowering<'_> {
             .reals("matrix", agreement.matrix)
             .real("usual", agreement.usual)
             .real("limit", spec.limit)
+            .with("lag", Field::Int(spec.lag.as_ns()))
             .with("after", Field::Int(spec.after.as_ns()))
             .with("recover", Field::Int(spec.recover.as_ns()))
-            .int("ints", self.ints(8 * count)))
+            .with("longest", Field::Int(spec.longest.as_ns()))
+            .int("ints", self.ints(10 * count))
+            .int("reals", self.reals(3 * count)))
+    }
+
+    fn health(&mut self, of: &Planned<'_>, spec: &Health) -> Result<Record, Refused> {
+        let (channels, signal) = of.port("signal");
+        let infinite = f64::INFINITY;
+        let mut limits = [const { Vec::new() }; 5];
+        for channel in channels {
+            let unit = &channel.unit;
+            let per_second = unit.difference().per(&Unit::second());
+            let point = |at: usize, none: f64| match &spec.range {
+                Some(range) => fits(range[at].in_unit(unit)),
+                None => Ok(none),
+            };
+            let size = |of: Option<&Quantity>, unit: &Unit, none: f64| {
+                of.map_or(Ok(none), |of| fits(of.as_difference(unit)))
+            };
+            let own = [
+                point(0, -infinite)?,
+                point(1, infinite)?,
+                size(spec.max_rate.as_ref(), &per_second, infinite)?,
+                size(spec.noise_above.as_ref(), &unit.difference(), 0.0)?,
+                size(spec.noise_below.as_ref(), &unit.difference(), infinite)?,
+            ];
+            limits
+                .iter_mut()
+                .zip(own)
+                .for_each(|(of, own)| of.push(own));
+        }
+        let [lowest, highest, rate, quiet, noisy] = limits;
+        let watched = spec.noise_above.is_some() || spec.noise_below.is_some();
+        let kept = match watched {
+            true => spec.noise_samples.clamp(3, 100_000) - 1,
+            false => 0,
+        };
+        let time = |of: Option<Duration>| Field::Int(of.map_or(-1, Duration::as_ns));
+        let pause = spec.stuck_after.into_iter().chain(spec.max_gap).min();
+        let ints = self.ints(13 * channels.len());
+        let reals = self.reals((1 + 2 * kept) * channels.len());
+        Ok(of
+            .record("health")
+            .int("signal", signal)
+            .int("slot", of.slot())
+            .int("channels", channels.len())
+            .reals("lowest", lowest)
+            .reals("highest", highest)
+            .reals("rate", rate)
+            .reals("quiet", quiet)
+            .reals("noisy", noisy)
+            .with("stuck", time(spec.stuck_after))
+            .with("gap", time(spec.max_gap))
+            .with("pause", time(pause))
+            .with("recover", Field::Int(spec.recover.as_ns()))
+            .int("kept", kept)
+            .int("ints", ints)
+            .int("reals", reals))
     }
 
     fn slope(&mut self, of: &Planned<'_>, spec: &Slope) -> Result<Record, Refused> {
@@ -240,7 +310,7 @@ impl Lowering<'_> {
         let count = channels.len();
         let ints = self.ints((5 + blocks + widths.len() + 3 * count).saturating_add(room));
         let reals = self.reals(room.saturating_add(1).saturating_mul(count));
-        self.scratch(4 * SUMS * count);
+        self.scratch(4 * SUMS * count + 6);
         Ok(of
             .record("slope")
             .int("gather", gather)
@@ -258,6 +328,7 @@ impl Lowering<'_> {
             .int("min_samples", spec.min_samples)
             .int("room", room)
             .int("blocks", blocks)
+            .maybe("kept", None)
             .int("ints", ints)
             .int("reals", reals))
     }
@@ -416,6 +487,19 @@ impl Lowering<'_> {
     fn uncorrected(&mut self, of: &Planned<'_>, spec: &Uncorrected) -> Result<Record, Refused> {
         let (positions, position) = of.port("position");
         let (corrections, applied) = of.port("applied");
+        if spec.differs.is_some() || of.wanted.get(1) == Some(&true) {
+            return refuse(
+                "what was commanded, and the port `reason`, of `uncorrected` cannot be exported"
+                    .to_owned(),
+                "leave `differs` and what reads `reason` out of the graph that is exported",
+            );
+        }
+        if corrections.is_empty() {
+            return refuse(
+                "`uncorrected` without `applied` cannot be exported".to_owned(),
+                "read the position itself in the graph that is exported",
+            );
+        }
         let mut factors = Vec::new();
         for (position, applied) in positions.iter().zip(corrections) {
             factors.push(fits(applied.unit.factor_to(&position.unit))?);

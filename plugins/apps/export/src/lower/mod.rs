@@ -2,22 +2,21 @@
 
 mod estimators;
 mod features;
-mod rates;
 mod votes;
 mod ways;
+mod windowed;
 
 use std::ops::Range;
 
-use athermal_core::compile::{Plan, PlannedNode, PlannedRole, Step as PlannedStep};
+use athermal_core::compile::{Periods, Plan, PlannedNode, PlannedRole, Rates, Step as PlannedStep};
 use athermal_core::engine::Engine;
 use athermal_core::node::Read;
 use athermal_core::time::Duration;
 
-pub use rates::Rates;
+pub(crate) use estimators::{KNOWN, WINDOWS};
 
 use crate::error::{ExportError, Refusal};
 use crate::form::{Bundle, Entry, Form, History, Layout, Port, Record, Step};
-use rates::Periods;
 
 /// Room beyond what regular ticks take.
 const SPARE: usize = 8;
@@ -29,6 +28,8 @@ pub struct Options {
     pub rates: Rates,
     /// Whether what goes on learning is exported as it was fitted.
     pub frozen: bool,
+    /// Whether sums of slopes are kept from tick to tick.
+    pub fast: bool,
     /// The name of the files and functions; by default that of the graph.
     pub name: Option<String>,
 }
@@ -72,19 +73,43 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
     if !refusals.is_empty() {
         return Err(ExportError::Nodes(refusals));
     }
+    let windowed = lowering.windowed(&nodes);
     // What is needed within a step lies behind all else.
     let scratch = lowering.layout.scratch;
     lowering.layout.scratch = lowering.reals(scratch);
+    // And what is made of the rest behind that.
+    let saved = lowering.layout.reals;
+    for node in nodes
+        .iter_mut()
+        .filter(|of| options.fast && of.kind == "slope")
+    {
+        let slots = node.place_of("room") / features::EACH + 2;
+        let width = 3 + features::SUMS * node.place_of("channels");
+        let kept = lowering.reals((1 + 3 * slots).saturating_mul(width));
+        node.set("kept", kept);
+    }
+    lowering.layout.kept = lowering.layout.reals - saved;
     let layout = lowering.layout;
     if layout.ints.max(layout.reals) > i32::MAX as usize {
         let bytes = layout.bytes(8);
         return Err(ExportError::TooLarge { bytes });
     }
-    let steps = plan.steps.iter().filter_map(|step| match *step {
-        PlannedStep::Gather(gather) => Some(Step::Gather(gather)),
-        PlannedStep::Run(node) => Some(Step::Run(places[node])),
-        PlannedStep::Capture(_) => None,
-    });
+    let mut steps = Vec::new();
+    for step in &plan.steps {
+        match *step {
+            PlannedStep::Gather(gather) => steps.push(Step::Gather(gather)),
+            PlannedStep::Run(node) => {
+                steps.push(Step::Run(places[node]));
+                // Before anybody reads a truth it is known whether it is one.
+                let own = |of: &Record| plan.nodes[node].slots.contains(&of.place_of("slot"));
+                for truth in windowed.iter().filter(|of| own(of)) {
+                    steps.push(Step::Run(nodes.len()));
+                    nodes.push(truth.clone());
+                }
+            }
+            PlannedStep::Capture(_) => {}
+        }
+    }
     let port = |slot: usize, name: &str| Port {
         name: name.to_owned(),
         unit: plan.channels[slot].channel.unit.to_string(),
@@ -104,7 +129,7 @@ pub fn lower(engine: &Engine, options: &Options) -> Result<Form, ExportError> {
             .map(|output| port(output.slot, &output.name))
             .collect(),
         output_slots: plan.outputs.iter().map(|output| output.slot).collect(),
-        steps: steps.collect(),
+        steps,
         nodes,
         recorded: lowering.recorded,
         period_ns: lowering.periods.tick,
@@ -156,6 +181,8 @@ struct Lowering<'a> {
     histories: Vec<History>,
     recorded: usize,
     layout: Layout,
+    /// Where past rows of learners lie, of all that read the same alike.
+    rows: Vec<(estimators::Rows, [usize; 2])>,
     /// Why the node at hand is not exported, beside what ends its lowering: all of it is said at once.
     also: Vec<Refused>,
 }
@@ -168,6 +195,7 @@ impl<'a> Lowering<'a> {
             gathers: Vec::new(),
             histories: Vec::new(),
             recorded: 0,
+            rows: Vec::new(),
             also: Vec::new(),
             layout: Layout {
                 // The first eight are those of the tick.

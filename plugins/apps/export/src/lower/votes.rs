@@ -128,9 +128,6 @@ impl Lowering<'_> {
             return refuse("it is no combiner", "report this");
         };
         let rule = rule_of(node)?;
-        if beside.std_dev.is_some() {
-            self.unread(node, "std_dev");
-        }
         let period = self.periods.of_votes(self.plan, *voters, *state);
         let rooms = self.rooms(&rule, truth.as_ref(), period);
         let count = self.gathers[*voters].entries.len();
@@ -165,6 +162,8 @@ impl Lowering<'_> {
             .maybe("weights_slot", beside.weights)
             .maybe("reason_slot", beside.reason)
             .maybe("novelty_slot", beside.novelty)
+            .maybe("std_dev_slot", beside.std_dev.map(|(slot, _)| slot))
+            .maybe("std_devs", beside.std_dev.map(|(_, of_votes)| of_votes))
             .maybe("truth", truth.as_ref().map(|link| link.slot))
             .with("ahead", time(|link| link.ahead))
             .with("limit", time(|link| link.limit))

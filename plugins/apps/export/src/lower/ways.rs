@@ -6,15 +6,7 @@ const ARX: &str = "put `arx` of the same inputs in its place, whose fit is a lin
 const WATCH: &str = "leave it out: errors are watched where the data are kept, by `athermal serve`";
 
 /// Kinds with the way around each.
-const WAYS: [(&str, &str); 15] = [
-    (
-        "sample_at",
-        "read the signal itself in its place, as `linear-axis-sensor` does",
-    ),
-    (
-        "health",
-        "put `cross_check` in its place, as `linear-axis-compensate` has it",
-    ),
+const WAYS: [(&str, &str); 13] = [
     ("remeasure", "leave it out, as `die-tester-compensate` does"),
     (
         "moving",

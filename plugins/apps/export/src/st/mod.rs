@@ -1,6 +1,7 @@
 //! Writes a lowered plan as Structured Text (IEC 61131-3): the runtime as it is, the tables of the graph, its function block and its self
-//! test. Promised are results within 1e-9 of the largest size of an output, not their bits: compilers may fuse products with sums.
+//! test, and a program that calls it. Promised are results within 1e-9 of the largest size of an output, not their bits: compilers may fuse products with sums.
 
+mod plcopen;
 mod runtime;
 mod tables;
 
@@ -13,6 +14,7 @@ use crate::error::ExportError;
 use crate::form::{Form, Port, each_once};
 use crate::ticks::{TICKS, Ticks, self_test};
 use crate::{Exported, Options, lower};
+pub use plcopen::plcopen;
 use runtime::Parts;
 use tables::{list, long, plain, real};
 
@@ -32,6 +34,7 @@ pub fn export(engine: &Engine, options: &Options) -> Result<Exported, ExportErro
     let files = vec![
         file("athermal_rt.st", parts.shared),
         file(&format!("{}.st", form.name), own),
+        file(&format!("{}_main.st", form.name), program(&form)),
     ];
     Ok(Exported { form, ticks, files })
 }
@@ -96,6 +99,48 @@ fn source(form: &Form, ticks: &Ticks, parts: &Parts) -> String {
     let blocks = include_str!("blocks.st.in").replace("@block@", &block(form));
     text.push_str(&blocks.replace("@test@", &self_test_block(form)));
     head + &parts.named(&text, &graph)
+}
+
+/// A program that calls the block in a task.
+fn program(form: &Form) -> String {
+    let graph = word(&form.name);
+    // Constants of channels, and variables of the program that have their names.
+    let named = |what: &str, ports: &[Port]| -> Vec<(String, String, String)> {
+        let prefix = format!("{graph}_{what}");
+        let own = |(constant, port): (String, &Port)| {
+            let variable = constant[graph.len() + 1..].to_lowercase();
+            let remark = format!("{}, in {}", plain(&port.name), plain(&port.unit));
+            (constant, variable, remark)
+        };
+        let constants = constants(&prefix, ports).into_iter();
+        constants.zip(ports).map(own).collect()
+    };
+    let (inputs, outputs) = (named("IN", &form.sources), named("OUT", &form.outputs));
+    let lines = |of: &[(String, String, String)], line: &dyn Fn(&str, &str, &str) -> String| {
+        let lines = of
+            .iter()
+            .map(|(constant, own, remark)| line(constant, own, remark));
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let declared = |own: &str, remark: &str, flag: &str| {
+        format!("    {own} : LREAL; (* {remark} *)\n    {own}_{flag} : BOOL;")
+    };
+    let period = athermal_core::time::Duration::from_ns(form.period_ns);
+    let text = include_str!("program.st.in");
+    let text = text
+        .replace("@inputs@", &lines(&inputs, &|_, own, remark| declared(own, remark, "is_new")))
+        .replace("@outputs@", &lines(&outputs, &|_, own, remark| declared(own, remark, "has_value")))
+        .replace("@take@", &lines(&inputs, &|at, own, _| {
+            format!("    samples[{at}] := {own};\n    is_new[{at}] := {own}_is_new;")
+        }))
+        .replace("@give@", &lines(&outputs, &|at, own, _| {
+            format!("    {own}_has_value := graph.has_value[{at}];\n    IF {own}_has_value THEN\n        {own} := graph.out[{at}];\n    END_IF;")
+        }));
+    text.replace("@graph@", &graph)
+        .replace("@block@", &block(form))
+        .replace("@test@", &self_test_block(form))
+        .replace("@period_ns@", &form.period_ns.to_string())
+        .replace("@period@", &period.to_string())
 }
 
 /// What the self test compares with.

@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use crate::form::{Entry, Field, Form, Record, Step};
+use crate::lower::{KNOWN, WINDOWS};
 
 /// Kinds with their types and tables, in the order of the numbers by which steps name them.
-const KINDS: [(&str, &str, &str); 13] = [
+const KINDS: [(&str, &str, &str); 16] = [
     ("slope", "AT_Slope", "AT_SLOPES"),
     ("lag", "AT_Lag", "AT_LAGS"),
     ("first_order", "AT_FirstOrder", "AT_FIRST_ORDERS"),
@@ -19,6 +20,23 @@ const KINDS: [(&str, &str, &str); 13] = [
     ("settled", "AT_Settled", "AT_SETTLES"),
     ("pick", "AT_Pick", "AT_PICKS"),
     ("cross_check", "AT_CrossCheck", "AT_CROSS_CHECKS"),
+    ("sample_at", "AT_SampleAt", "AT_SAMPLE_ATS"),
+    ("health", "AT_Health", "AT_HEALTHS"),
+    ("windowed", "AT_Windowed", "AT_WINDOWEDS"),
+];
+
+/// Structures within nodes, likewise.
+const PARTS: [(&str, &str, &str); 6] = [
+    ("course", "AT_Course", "AT_COURSES"),
+    ("novelty", "AT_Novelty", "AT_NOVELTIES"),
+    ("variance", "AT_Variance", "AT_VARIANCES"),
+    ("spread", "AT_Spread", "AT_SPREADS"),
+    ("learner", "AT_Learner", "AT_LEARNERS"),
+    (
+        "compensate_limits",
+        "AT_CompensateLimits",
+        "AT_COMPENSATE_LIMITS",
+    ),
 ];
 
 /// The step that looks whether anything of a gather is new.
@@ -97,8 +115,7 @@ struct Lists {
     longs: Vec<i64>,
     numbers: Vec<f64>,
     entries: Vec<Entry>,
-    novelties: Vec<String>,
-    limits: Vec<String>,
+    parts: [Vec<String>; PARTS.len()],
 }
 
 /// Puts elements at the end of a list; where the first one is.
@@ -125,15 +142,8 @@ impl Lists {
                 Field::Reals(values, _) => put(&mut self.numbers, values),
                 Field::Entries(values) => put(&mut self.entries, values),
                 Field::Struct(None) => -1,
-                Field::Struct(Some(inner)) => {
-                    let inner = self.structure(form, inner);
-                    put(&mut self.novelties, &[inner])
-                }
-                Field::Structs(inner) => {
-                    let inner: Vec<String> =
-                        inner.iter().map(|of| self.structure(form, of)).collect();
-                    put(&mut self.limits, &inner)
-                }
+                Field::Struct(Some(inner)) => self.inner(form, std::slice::from_ref(inner)),
+                Field::Structs(inner) => self.inner(form, inner),
             };
             fields.push((name, long(first)));
         }
@@ -143,6 +153,15 @@ impl Lists {
             .iter()
             .map(|(name, value)| format!("{name} := {value}"));
         format!("({})", written.collect::<Vec<_>>().join(", "))
+    }
+
+    /// Structures of one kind within one; where the first one is.
+    fn inner(&mut self, form: &Form, records: &[impl std::borrow::Borrow<Record>]) -> i64 {
+        let texts = records.iter().map(|of| self.structure(form, of.borrow()));
+        let texts: Vec<String> = texts.collect();
+        let kind = records.first().map_or("", |of| of.borrow().kind);
+        let part = PARTS.iter().position(|(own, ..)| *own == kind);
+        put(&mut self.parts[part.unwrap_or(0)], &texts)
     }
 }
 
@@ -178,6 +197,27 @@ fn places(form: &Form, node: &Record) -> Vec<(&'static str, usize)> {
                 ("means", next(&mut number, judged)),
                 ("counts", next(&mut number, judged)),
                 ("trust", next(&mut number, judged)),
+            ]
+        }
+        "learner" => {
+            let order = node.reals_of("start").len();
+            let cells = order * (order + 1) / 2;
+            let (mut times, waiting) = (of("run_ints"), of("waiting"));
+            vec![
+                ("arrived", next(&mut place, KNOWN)),
+                ("run_of", next(&mut place, waiting)),
+                ("notes", next(&mut place, waiting)),
+                ("times", next(&mut times, 3)),
+                ("run_notes", next(&mut times, of("runs"))),
+                ("cells", next(&mut number, 1)),
+                ("back_to", next(&mut number, cells)),
+                ("pull", next(&mut number, order)),
+                ("counts", next(&mut number, order)),
+                ("root", next(&mut number, 2)),
+                ("theta", next(&mut number, cells)),
+                ("in_use", next(&mut number, order)),
+                ("windows", next(&mut number, order)),
+                ("truths", next(&mut number, 2 * WINDOWS)),
             ]
         }
         "cross_check" => {
@@ -248,20 +288,9 @@ pub(super) fn write(form: &Form, text: &mut String) {
         }
         list(text, table, name, &nodes, String::clone);
     }
-    list(
-        text,
-        "AT_NOVELTIES",
-        "AT_Novelty",
-        &lists.novelties,
-        String::clone,
-    );
-    list(
-        text,
-        "AT_COMPENSATE_LIMITS",
-        "AT_CompensateLimits",
-        &lists.limits,
-        String::clone,
-    );
+    for ((_, name, table), part) in PARTS.iter().zip(&lists.parts) {
+        list(text, table, name, part, String::clone);
+    }
     list(text, "AT_ENTRIES", "AT_Entry", &lists.entries, entry);
     list(text, "AT_INDICES", "DINT", &lists.indices, i64::to_string);
     list(text, "AT_LONGS", "LINT", &lists.longs, |&value| long(value));

@@ -21,7 +21,7 @@ impl Image {
     pub(super) fn new(form: &Form) -> Self {
         Self {
             ints: vec![0; form.layout.ints],
-            reals: vec![0.0; form.layout.reals],
+            reals: vec![0.0; form.layout.saved()],
         }
     }
 
@@ -44,14 +44,14 @@ impl Image {
         let (words, rest) = bytes.as_chunks::<8>();
         let words: Vec<u64> = words.iter().map(|word| u64::from_le_bytes(*word)).collect();
         let layout = form.layout;
-        if !rest.is_empty() || words.len() != HEADER + layout.ints + layout.reals + 1 {
+        if !rest.is_empty() || words.len() != HEADER + layout.ints + layout.saved() + 1 {
             return Err("another length than its states have");
         }
         let (last, body) = words.split_last().ok_or("there are none")?;
         if fnv_1a(&bytes[..8 * body.len()]) != *last {
             return Err("the checksum does not fit");
         }
-        let (ints, reals) = (layout.ints as u64, layout.reals as u64);
+        let (ints, reals) = (layout.ints as u64, layout.saved() as u64);
         if body[..HEADER] != [NAME, revision, ints, reals, 8] {
             return Err("another graph, fit or precision");
         }

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::CarryError;
 use super::image::Image;
+use super::learners::Pupil;
 use super::snapshot::{Node, Past};
 use super::votes::Ballot;
 use crate::form::{Form, Record};
@@ -109,6 +110,25 @@ struct Settled {
 }
 
 #[derive(Serialize, Deserialize)]
+struct Health {
+    state: String,
+    sensors: Vec<Watched>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Watched {
+    heard: Option<i64>,
+    newest: Option<(i64, f64)>,
+    same_since: Option<i64>,
+    begun: Option<i64>,
+    fault: u8,
+    in_order_since: Option<i64>,
+    squares: Vec<f64>,
+    next: usize,
+    full: bool,
+}
+
+#[derive(Serialize, Deserialize)]
 struct CrossCheck {
     state: String,
     sensors: Vec<Sensor>,
@@ -117,8 +137,11 @@ struct CrossCheck {
 #[derive(Serialize, Deserialize)]
 struct Sensor {
     last: Option<i64>,
+    value: f64,
+    change: f64,
+    sudden: f64,
     since: Option<i64>,
-    is_out: bool,
+    out: Option<i64>,
     passes: bool,
     agrees_since: Option<i64>,
 }
@@ -143,12 +166,12 @@ pub(super) fn places(node: &Record) -> (usize, usize) {
 }
 
 impl Image {
-    fn put_time(&mut self, place: usize, time: Option<i64>) {
+    pub(super) fn put_time(&mut self, place: usize, time: Option<i64>) {
         self.ints[place] = i64::from(time.is_some());
         self.ints[place + 1] = time.unwrap_or(0);
     }
 
-    fn time(&self, place: usize) -> Option<i64> {
+    pub(super) fn time(&self, place: usize) -> Option<i64> {
         (self.ints[place] != 0).then_some(self.ints[place + 1])
     }
 
@@ -255,6 +278,10 @@ pub(super) fn put(
         ballot.begin(image);
         ballot.put(image, known);
     }
+    if let Some(pupil) = Pupil::new(node) {
+        pupil.begin(image);
+        return pupil.put(image, form, known);
+    }
     let Some(own) = &known.own else {
         return Ok(());
     };
@@ -328,12 +355,40 @@ pub(super) fn put(
         "cross_check" => {
             let state: CrossCheck = read(node, own)?;
             for (nth, sensor) in state.sensors.iter().enumerate() {
-                let place = ints + 8 * nth;
-                image.put_time(place, sensor.last);
-                image.put_time(place + 2, sensor.since);
-                image.ints[place + 4] = i64::from(sensor.is_out);
-                image.ints[place + 5] = i64::from(sensor.passes);
-                image.put_time(place + 6, sensor.agrees_since);
+                let place = ints + 10 * nth;
+                let times = [sensor.last, sensor.since, sensor.out, sensor.agrees_since];
+                for (nth, time) in times.into_iter().enumerate() {
+                    image.put_time(place + 2 * nth, time);
+                }
+                image.ints[place + 8] = i64::from(sensor.passes);
+                image.ints[place + 9] = 0;
+                let read = [sensor.value, sensor.change, sensor.sudden];
+                image.reals[reals + 3 * nth..][..3].copy_from_slice(&read);
+            }
+        }
+        "health" => {
+            let state: Health = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter().enumerate() {
+                let kept = sensor.squares.len();
+                let (place, number) = (ints + 13 * nth, reals + (1 + 2 * kept) * nth);
+                let newest = sensor.newest.map(|(at, _)| at);
+                let times = [sensor.heard, newest, sensor.same_since, sensor.begun];
+                for (nth, time) in times.into_iter().chain([sensor.in_order_since]).enumerate() {
+                    image.put_time(place + 2 * nth, time);
+                }
+                let rest = [sensor.fault.into(), sensor.next as i64, sensor.full.into()];
+                image.ints[place + 10..][..3].copy_from_slice(&rest);
+                image.reals[number] = sensor.newest.map_or(0.0, |(_, value)| value);
+                image.reals[number + 1..][..kept].copy_from_slice(&sensor.squares);
+                // Sums stand before what they are of, as a tree.
+                let part = |image: &Image, at: usize| match at < kept {
+                    true => image.reals[number + 1 + kept + at],
+                    false => image.reals[number + 1 + at - kept],
+                };
+                for at in (1..kept).rev() {
+                    let sum = part(image, 2 * at) + part(image, 2 * at + 1);
+                    image.reals[number + 1 + kept + at] = sum;
+                }
             }
         }
         _ => {}
@@ -352,6 +407,9 @@ pub(super) fn take(
     let ballot = (node.kind == "vote").then(|| Ballot::new(form, node));
     if let Some(ballot) = &ballot {
         ballot.take(image, known);
+    }
+    if let Some(pupil) = Pupil::new(node) {
+        return pupil.take(image, known);
     }
     let Some(own) = &known.own else {
         return Ok(());
@@ -436,12 +494,31 @@ pub(super) fn take(
         "cross_check" => {
             let mut state: CrossCheck = read(node, own)?;
             for (nth, sensor) in state.sensors.iter_mut().enumerate() {
-                let place = ints + 8 * nth;
+                let (place, number) = (ints + 10 * nth, reals + 3 * nth);
                 sensor.last = image.time(place);
                 sensor.since = image.time(place + 2);
-                sensor.is_out = image.ints[place + 4] != 0;
-                sensor.passes = image.ints[place + 5] != 0;
+                sensor.out = image.time(place + 4);
                 sensor.agrees_since = image.time(place + 6);
+                sensor.passes = image.ints[place + 8] != 0;
+                sensor.value = image.reals[number];
+                sensor.change = image.reals[number + 1];
+                sensor.sudden = image.reals[number + 2];
+            }
+            written(node, &state)?
+        }
+        "health" => {
+            let mut state: Health = read(node, own)?;
+            for (nth, sensor) in state.sensors.iter_mut().enumerate() {
+                let kept = sensor.squares.len();
+                let (place, number) = (ints + 13 * nth, reals + (1 + 2 * kept) * nth);
+                let time = |nth: usize| image.time(place + 2 * nth);
+                (sensor.heard, sensor.same_since) = (time(0), time(2));
+                (sensor.begun, sensor.in_order_since) = (time(3), time(4));
+                sensor.newest = time(1).map(|at| (at, image.reals[number]));
+                sensor.fault = u8::try_from(image.ints[place + 10]).unwrap_or(0);
+                sensor.next = image.ints[place + 11] as usize;
+                sensor.full = image.ints[place + 12] != 0;
+                sensor.squares = image.reals[number + 1..][..kept].to_vec();
             }
             written(node, &state)?
         }

@@ -22,7 +22,32 @@ pub(super) struct Snapshot {
     pub(super) histories: BTreeMap<String, Past>,
     pub(super) nodes: BTreeMap<String, Node>,
     blending: BTreeMap<String, Value>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) courses: BTreeMap<String, Course>,
     frozen: bool,
+}
+
+/// A series in which leaps are looked for.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Course {
+    pub(super) last: Option<(i64, f64)>,
+    pub(super) newest: Option<(i64, f64)>,
+    pub(super) before: Option<f64>,
+    pub(super) changes: Sizes,
+    pub(super) steps: Sizes,
+    pub(super) bends: Sizes,
+    pub(super) gap: f64,
+    pub(super) gaps: u32,
+    pub(super) leapt: Option<i64>,
+    pub(super) suspected: Option<i64>,
+    pub(super) homes: [f64; 8],
+    pub(super) homed: usize,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Sizes {
+    pub(super) of: [f64; 2],
+    pub(super) seen: u32,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -51,7 +76,29 @@ pub(super) struct Node {
     pub(super) own: Option<Vec<u8>>,
     pub(super) learning: Option<Embargo>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    recent: Option<Value>,
+    pub(super) recent: Option<Recent>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) standing: Option<Standing>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Recent {
+    pub(super) seen: u32,
+    pub(super) mean_square: f64,
+    pub(super) refused: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) since: Option<i64>,
+    pub(super) weighed: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) lesson: Option<i64>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Standing {
+    pub(super) squares: Vec<[f64; 2]>,
+    pub(super) newest: usize,
+    pub(super) from: Option<i64>,
+    pub(super) last: Option<i64>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]

@@ -79,6 +79,10 @@ fn the_command_writes_all_files_and_carries_states_to_c_and_back() {
         "{readme}"
     );
 
+    run(&["--rate", "240ms", "--rate", "position=480ms", "--fast"]).unwrap();
+    let header = std::fs::read_to_string(folder.join("random_graph.h")).unwrap();
+    assert!(header.contains("(1u << AT_FAST)"), "{header}");
+
     let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted).unwrap();
     let events = events(&mut Prng::stream(12, "events"), &model.plan, 2_000);
     stepped(&mut engine, &events[..1_500]);
@@ -178,9 +182,9 @@ fn a_dry_run_writes_nothing_and_needs_no_folder() {
         let words = [target, path.to_str().unwrap()];
         let error = export(&words).unwrap_err();
         assert!(error.contains("--output"), "{error}");
-        export(&[&words[..], &["--dry-run"]].concat()).unwrap();
+        export(&[&words[..], &["--dry-run", "--frozen"]].concat()).unwrap();
         let folder = scratch.path("out");
-        let more = ["--dry-run", "-o", folder.to_str().unwrap()];
+        let more = ["--dry-run", "--frozen", "-o", folder.to_str().unwrap()];
         export(&[&words[..], &more].concat()).unwrap();
         assert!(!folder.exists());
     }
@@ -197,13 +201,24 @@ fn onnx_and_units_for_co_simulation_take_no_state_and_no_single_precision() {
         let folder = scratch.path(target);
         let first = [target, path.to_str().unwrap(), "-o"];
         let first = [&first[..], &[folder.to_str().unwrap()]].concat();
-        for words in [&["--state", "a"][..], &["--state-back", "a"], &["--float"]] {
+        let mut all = vec![&["--state", "a"][..], &["--state-back", "a"], &["--float"]];
+        all.extend((target == "onnx").then_some(&["--fast"][..]));
+        for words in all {
             let error = export(&[&first[..], words].concat()).unwrap_err();
             let begun = format!("`{}` is for `export c`", words[0]);
             assert!(error.contains(&begun), "{error}");
             assert!(!folder.exists());
         }
-        export(&first).unwrap();
+        // What learns has no place in ONNX.
+        let found = export(&first);
+        if target == "onnx" {
+            let error = found.unwrap_err();
+            assert!(
+                error.contains("`learner.X`: it goes on learning"),
+                "{error}"
+            );
+            export(&[&first[..], &["--frozen"]].concat()).unwrap();
+        }
         assert!(folder.join(written).exists());
     }
 }
@@ -221,7 +236,7 @@ fn structured_text_is_written_with_its_runtime_and_takes_no_state() {
     );
     assert!(!folder.exists());
     export(&[&first[..], &["--rate", "10s"]].concat()).unwrap();
-    for file in ["athermal_rt.st", "random_graph.st"] {
+    for file in ["athermal_rt.st", "random_graph.st", "random_graph.xml"] {
         assert!(folder.join(file).exists(), "{file}");
     }
 }

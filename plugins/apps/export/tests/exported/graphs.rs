@@ -167,12 +167,13 @@ lag = "{}s"
 limit = {}
 after = "{}s"
 recover = "{}s"
+longest = "200s"
 "#,
             5 + random.between(0.0, 60.0) as u64,
             1 + random.between(0.0, 60.0) as u64,
-            one_of(random, &["1.0", "6.0", "20.0"]),
+            one_of(random, &["6.0", "60.0", "600.0"]),
             random.between(0.0, 20.0) as u64,
-            random.between(0.0, 40.0) as u64,
+            20 + random.between(0.0, 100.0) as u64,
         );
     }
     // What is measured rarely and counts long does not age what is made of it and of gradients.
@@ -199,7 +200,9 @@ ahead = "{ahead}s"
     // What is made of drift may not choose who predicts it while windows overlap.
     let state = if legal > 0 { "mark" } else { "state.{axis}" };
     votes(random, state, &mut text);
+    learning(random, ahead, legal, &mut text);
     control(random, &mut text);
+    text.push_str(OF_LEARNING);
     if is_checked {
         text.push_str("trusted = \"trusted\"\nwhy_trusted = \"trusted:reason\"\n");
     }
@@ -425,3 +428,88 @@ since = "settled:since"
         random.between(0.0, 5.0) as u64,
     );
 }
+
+/// Sensors that are watched, what is sampled at the instants of positions, and what goes on learning.
+fn learning(random: &mut Prng, ahead: u64, legal: u64, text: &mut String) {
+    let mut checks = String::new();
+    for check in [
+        "range = [\"17 Cel\", \"23 Cel\"]\n",
+        "max_rate = \"0.15 K/s\"\n",
+        "stuck_after = \"20s\"\n",
+        "max_gap = \"7s\"\n",
+    ] {
+        checks.push_str(if chance(random, 0.75) { check } else { "" });
+    }
+    checks += one_of(
+        random,
+        &[
+            "",
+            "noise_above = \"1 mK\"\nnoise_below = \"0.4 K\"\nnoise_samples = 9\n",
+            "noise_below = \"0.2 K\"\nnoise_samples = 4\n",
+        ],
+    );
+    let forgets = one_of(random, &["", "memory = \"60s\"\n", "memory = \"10min\"\n"]);
+    let _ = write!(
+        text,
+        r#"[nodes.sound]
+type = "health"
+inputs.signal = "temperature"
+{checks}recover = "{}s"
+[nodes.aligned]
+type = "sample_at"
+each = "axis"
+inputs.signal = {{ from = "sound", max_age = "{}s" }}
+inputs.instants = "position.{{axis}}"
+[nodes.growth]
+type = "slope"
+each = "axis"
+inputs.signal = "aligned.{{axis}}*"
+windows = ["25s"]
+unit = "mK/min"
+[nodes.learner]
+type = "rls"
+each = "axis"
+inputs.features = ["chosen", "late", "voltage"]
+inputs.truth = "drift.{{axis}}"
+inputs.freeze = {{ from = "mark", max_age = "60s" }}
+ahead = "{ahead}s"
+learn = {{ outliers = {}, margin = {} }}
+{forgets}outside = "{}"
+[nodes.autoregression]
+type = "rls"
+each = "axis"
+inputs.features = {{ from = "growth.{{axis}}*", max_age = "30s" }}
+inputs.truth = "drift.{{axis}}"
+ahead = "{ahead}s"
+lags = ["{legal}s", "{}s"]
+learn = {{ margin = 100.0 }}
+[nodes.pupils]
+type = "auto_weighted"
+each = "axis"
+inputs.voters = ["learner.{{axis}}", "autoregression.{{axis}}", "thermal.{{axis}}"]
+inputs.truth = "drift.{{axis}}"
+memory = "1min"
+"#,
+        one_of(random, &["0", "5", "30"]),
+        one_of(random, &["2", "10"]),
+        one_of(random, &["1.5", "6.0"]),
+        one_of(random, &["0.0", "0.5", "100.0"]),
+        one_of(random, &["shrink", "absent", "pass"]),
+        legal + 20,
+    );
+}
+
+const OF_LEARNING: &str = r#"sound = "sound"
+why_sound = "sound:reason"
+aligned = "aligned"
+growth = "growth"
+learner = "learner"
+became = "learner:learning"
+unsure = "learner:std_dev"
+far = "learner:novelty"
+autoregression = "autoregression"
+learned = "autoregression:learning"
+pupils = "pupils"
+off = "pupils:std_dev"
+off_thermal = "thermal:std_dev"
+"#;

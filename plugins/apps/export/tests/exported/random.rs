@@ -22,6 +22,9 @@ pub fn events(random: &mut Prng, plan: &Plan, ticks: usize) -> Vec<Event> {
     let mut level: Vec<f64> = sources.iter().map(|_| 20.0 + random.normal()).collect();
     let mut speed = vec![0.0; sources.len()];
     let mut silent_until = vec![0; sources.len()];
+    // Sensors come off after a third: by numbers of their own, so that what is before stays as it was.
+    let mut loose = Prng::stream(ticks as u64, "sensors that come off");
+    let mut leaps = vec![(0.0, 0); sources.len()];
     let mut calm = 0;
     for tick in 0..ticks {
         let regular = tick / 500 % 2 == 0;
@@ -53,6 +56,15 @@ pub fn events(random: &mut Prng, plan: &Plan, ticks: usize) -> Vec<Event> {
                     level[nth] = level[nth].clamp(-60.0, 160.0);
                 }
             }
+            if temperature && tick > ticks / 3 && chance(&mut loose, 0.005) {
+                let long = loose.between(5.0, 30.0) as usize;
+                leaps[nth] = (60.0 * loose.normal(), tick + long);
+            }
+            let leap = if tick < leaps[nth].1 {
+                leaps[nth].0
+            } else {
+                0.0
+            };
             if chance(random, 0.0005) {
                 silent_until[nth] = tick + random.between(1.0, 120.0) as usize;
             }
@@ -73,11 +85,44 @@ pub fn events(random: &mut Prng, plan: &Plan, ticks: usize) -> Vec<Event> {
             } else if chance(random, 0.0005) {
                 [f64::INFINITY, 1e9, -1e120, 0.0, -0.0][random.between(0.0, 5.0) as usize % 5]
             } else {
-                level[nth]
+                level[nth] + leap
             };
             row.push(value);
         }
         events.push(Event::Tick(now, row));
+    }
+    events
+}
+
+/// The same where positions leap: they are zeroed, or pushed for some ticks, or leap again soon after; each in the middle too.
+pub fn leaping(events: &[Event], plan: &Plan, seed: u64) -> Vec<Event> {
+    let mut events = events.to_vec();
+    let mut random = Prng::stream(seed, "leaps");
+    let middle = events.len() / 2;
+    let sources = plan.sources.iter().enumerate();
+    for (nth, _) in sources.filter(|(_, of)| of.name.starts_with("position")) {
+        let (mut by, mut pushed, mut again) = (0.0, 0, middle);
+        for (tick, event) in events.iter_mut().enumerate() {
+            let Event::Tick(_, samples) = event else {
+                continue;
+            };
+            let sample = &mut samples[nth];
+            if sample.is_nan() {
+                continue;
+            }
+            if tick >= again || chance(&mut random, 0.004) {
+                again = if tick < middle { middle } else { usize::MAX };
+                match random.between(0.0, 3.0) as u64 {
+                    0 => by = -*sample,
+                    1 => pushed = tick + 4,
+                    _ => {
+                        by += 1e3 * random.normal();
+                        again = tick + 1 + random.between(0.0, 15.0) as usize;
+                    }
+                }
+            }
+            *sample += by + if tick < pushed { 3e3 } else { 0.0 };
+        }
     }
     events
 }
@@ -107,8 +152,8 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
     }
     let (seeds, ticks) = cases();
     let scratch = Scratch::new("random");
-    let mut values = 0;
-    let mut reasons = [0; 4];
+    let (mut values, mut outputs) = (0, 0);
+    let (mut reasons, mut became, mut faults) = ([0; 4], [0; 40], [0; 8]);
     for seed in seeds {
         let mut random = Prng::stream(seed, "an exported graph");
         let text = graph(&mut random);
@@ -117,41 +162,114 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
         let fitted = made_up(&plan, &mut random);
         let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
         let exported = export_c(&engine, &options(), false).unwrap();
-        let exhibit = Exhibit::new(&exported, &scratch.path(&seed.to_string()));
+        let options = Options {
+            fast: true,
+            ..options()
+        };
+        let fast = export_c(&engine, &options, false).unwrap();
+        let exhibits = [(&exported, "as it is"), (&fast, "fast")]
+            .map(|(of, how)| Exhibit::new(of, &scratch.path(&format!("{seed} {how}"))));
+        let saved = [&exported, &fast].map(|of| state::to_c(&engine, &of.form).unwrap());
+        assert!(saved[0] == saved[1], "what is kept is not saved");
         let events = events(&mut random, &plan, ticks);
+        let leaping = leaping(&events, &plan, seed);
         let expected = stepped(&mut engine, &events);
-        let outputs = plan.outputs.iter().enumerate();
-        for (nth, _) in outputs.filter(|(_, of)| of.name.starts_with("why_trusted")) {
-            for row in &expected {
-                reasons[f64::from_bits(row[nth]) as usize] += 1;
+        let over_leaps = stepped(&mut Engine::new(plan.clone(), &fitted).unwrap(), &leaping);
+        let count = |outputs: &[&str], of: &mut [usize]| {
+            let all = plan.outputs.iter().enumerate();
+            let is_of = |name: &str| outputs.iter().any(|of| name.starts_with(of));
+            for (nth, _) in all.filter(|(_, of)| is_of(&of.name)) {
+                let both = expected.iter().chain(&over_leaps);
+                let values = both.map(|row| f64::from_bits(row[nth]));
+                values
+                    .filter(|value| !value.is_nan())
+                    .for_each(|value| of[value as usize] += 1);
             }
-        }
+        };
+        count(&["why_trusted"], &mut reasons);
+        count(&["became", "learned"], &mut became);
+        count(&["why_sound"], &mut faults);
         let there = expected.iter().flatten();
         values += there
             .filter(|&&bits| !f64::from_bits(bits).is_nan())
             .count();
         for (nth, compiler) in compilers.iter().enumerate() {
             // Each seed takes two of the levels with each compiler, the two together all of them.
-            for level in [
+            for (exhibit, level) in exhibits.iter().zip([
                 LEVELS[(seed as usize + 2 * nth) % 4],
                 LEVELS[(seed as usize + 2 * nth + 1) % 4],
-            ] {
+            ]) {
                 let program = exhibit.built(compiler, &[level], "driver.c");
-                let (found, said) = exhibit.stepped(&program, &events);
-                let differs = difference(&exhibit.form, &expected, &found);
-                assert_eq!(differs, None, "seed {seed}, {compiler} {level}\n{text}");
-                assert_eq!(said & 3, 0, "seed {seed}: refused or full");
-                assert_eq!(
-                    handed_over(&exhibit, &program, &plan, &fitted, &events),
-                    None,
-                    "seed {seed}"
-                );
+                for (events, expected) in [(&events, &expected), (&leaping, &over_leaps)] {
+                    let (found, said) = exhibit.stepped(&program, events);
+                    let differs = difference(&exhibit.form, expected, &found);
+                    assert_eq!(differs, None, "seed {seed}, {compiler} {level}\n{text}");
+                    outputs += found.iter().map(Vec::len).sum::<usize>();
+                    assert_eq!(said & 3, 0, "seed {seed}: refused or full");
+                    assert_eq!(
+                        handed_over(exhibit, &program, &plan, &fitted, events),
+                        None,
+                        "seed {seed}"
+                    );
+                }
             }
         }
     }
     assert!(values > 50_000, "{values}");
-    println!("sensors by what is known of them: {reasons:?}");
+    println!("{outputs} outputs compared, 0 differ");
+    assert!(outputs > 1_000_000, "{outputs}");
+    println!(
+        "sensors by what is known of them: {reasons:?}, and by what is wrong with them: {faults:?}"
+    );
     assert!(reasons[..3].iter().all(|&count| count > 200), "{reasons:?}");
+    assert!(faults.iter().all(|&count| count > 10), "{faults:?}");
+    println!("truths by what became of them: {became:?}");
+    // By ones what became of truths, by tens who spoke.
+    let of = |code: usize| became.iter().skip(code).step_by(10).sum::<usize>();
+    let happened = [0, 2, 3, 4, 6, 7].map(of);
+    assert!(happened.iter().all(|&count| count > 10), "{became:?}");
+    let spoke = became.chunks(10).map(|of| of.iter().sum::<usize>());
+    assert!(
+        spoke.into_iter().take(3).all(|count| count > 10),
+        "{became:?}"
+    );
+}
+
+#[test]
+fn random_graphs_give_the_bits_of_the_engine_on_processors_of_32_bits() {
+    let scratch = Scratch::new("narrow");
+    let (_, ticks) = cases();
+    let mut outputs = 0;
+    for (compiler, flags) in [
+        ("i686-linux-gnu-gcc", &["-msse2", "-mfpmath=sse"][..]),
+        ("arm-linux-gnueabihf-gcc", &[]),
+    ] {
+        if !has(compiler) || !has("qemu-arm") {
+            continue;
+        }
+        for (seed, level) in [(1, "-O0"), (2, "-O3")] {
+            let mut random = Prng::stream(seed, "an exported graph");
+            let plan = plan(&graph(&mut random));
+            let fitted = made_up(&plan, &mut random);
+            let mut engine = Engine::new(plan.clone(), &fitted).unwrap();
+            let options = Options {
+                fast: level == "-O3",
+                ..options()
+            };
+            let exported = export_c(&engine, &options, false).unwrap();
+            let exhibit = Exhibit::new(&exported, &scratch.path(&format!("{compiler}{level}")));
+            let events = events(&mut random, &plan, ticks / 2);
+            let expected = stepped(&mut engine, &events);
+            let flags = [&[level, "-static"], flags].concat();
+            let program = exhibit.built(compiler, &flags, "driver.c");
+            let (found, said) = exhibit.stepped(&program, &events);
+            let differs = difference(&exhibit.form, &expected, &found);
+            assert_eq!(differs, None, "seed {seed}, {compiler} {level}");
+            assert_eq!(said & 3, 0, "seed {seed}: refused or full");
+            outputs += expected.iter().map(Vec::len).sum::<usize>();
+        }
+    }
+    println!("{outputs} outputs of processors of 32 bits compared, 0 differ");
 }
 
 /// An engine goes on in C from the middle, and C goes on in an engine: the first difference from the engine that went all the way.
@@ -274,6 +392,7 @@ fn no_byte_is_touched_that_is_not_of_the_state_as_valgrind_and_sanitizers_see_it
     for (name, period) in [("roomy", 240_000_000), ("tight", 2_400_000_000)] {
         let options = Options {
             rates: Rates::every(Duration::from_ns(period)),
+            fast: true,
             ..Options::default()
         };
         let exported = export_c(&engine, &options, false).unwrap();

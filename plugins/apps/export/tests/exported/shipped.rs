@@ -8,9 +8,10 @@ use athermal_core::time::Duration;
 use athermal_export::c::{SinglePrecisionError, single_precision_error};
 use athermal_export::{Exported, Options, Rates, export_c};
 
-use crate::random::{events, options};
+use crate::random::{events, leaping, options};
 use crate::support::{
-    Exhibit, Scratch, SelfTest, compilers, difference, has, made_up, plan, project, ran, stepped,
+    Event, Exhibit, Scratch, SelfTest, compilers, difference, has, made_up, plan, project, ran,
+    stepped,
 };
 
 pub fn second(seconds: f64) -> Duration {
@@ -39,23 +40,39 @@ pub const GRAPHS: [&str; 4] = [
 ];
 
 /// Others that are exported.
-const MORE: [&str; 6] = [
+const MORE: [&str; 11] = [
     "die-tester-fleet.toml",
     "die-tester-redundant.toml",
     "linear-axis.toml",
     "linear-axis-sensor.toml",
     "linear-axis-compensate.toml",
     "z-probe.toml",
+    "die-tester-virtual-sensor.toml",
+    "linear-axis-virtual-sensor.toml",
+    "linear-axis-control.toml",
+    "machine-temperature.toml",
+    "ambient-temperature.toml",
 ];
 
 #[test]
 fn the_shipped_graphs_give_the_bits_of_the_engine() {
     let scratch = Scratch::new("shipped");
     for compiler in compilers().into_iter().take(1) {
-        for name in GRAPHS.into_iter().chain(MORE) {
+        for (nth, name) in GRAPHS.into_iter().chain(MORE).enumerate() {
             let (mut engine, exported) = shipped(name, Rates::every(second(0.2)));
             let exhibit = Exhibit::new(&exported, &scratch.path(name));
-            let events = events(&mut Prng::stream(5, name), engine.plan(), 6_000);
+            // Others have windows of hours, which take as long to be saved.
+            let ticks = if MORE[6..].contains(&name) {
+                1_500
+            } else {
+                6_000
+            };
+            let events = events(&mut Prng::stream(5, name), engine.plan(), ticks);
+            // Every second of them leaps.
+            let events = match nth % 2 {
+                0 => events,
+                _ => leaping(&events, engine.plan(), nth as u64),
+            };
             let expected = stepped(&mut engine, &events);
             // With no more of the runtime than the graph uses.
             let part = format!("-DATHERMAL_PLAN=\"{}.h\"", exhibit.form.name);
@@ -65,6 +82,39 @@ fn the_shipped_graphs_give_the_bits_of_the_engine() {
             assert_eq!(said & 3, 0, "{name}: refused or full");
         }
     }
+}
+
+#[test]
+fn sums_that_are_kept_are_those_of_the_engine_after_origins_have_been_chosen_anew() {
+    let Some(compiler) = compilers().into_iter().next() else {
+        return;
+    };
+    let scratch = Scratch::new("kept");
+    let (mut engine, _) = shipped("die-tester.toml", Rates::every(second(0.2)));
+    let options = Options {
+        rates: Rates::every(second(0.24)),
+        fast: true,
+        ..Options::default()
+    };
+    let exported = export_c(&engine, &options, false).unwrap();
+    let exhibit = Exhibit::new(&exported, &scratch.path("c"));
+    // Origins are chosen anew after 8,192 rows.
+    let events = events(&mut Prng::stream(6, "kept"), engine.plan(), 20_000);
+    let events: Vec<Event> = (events.into_iter())
+        .filter(|event| matches!(event, Event::Tick(..)))
+        .scan(0, |last, event| {
+            let Event::Tick(_, samples) = event else {
+                return None;
+            };
+            *last += 1_000_000_000;
+            Some(Event::Tick(*last, samples))
+        })
+        .collect();
+    let expected = stepped(&mut engine, &events);
+    let program = exhibit.built(compiler, &["-O2"], "driver.c");
+    let (found, said) = exhibit.stepped(&program, &events);
+    assert_eq!(difference(&exhibit.form, &expected, &found), None);
+    assert_eq!(said & 3, 0, "refused or full");
 }
 
 /// A graph of the shape that `athermal init` writes, with its predictions as they stand there.
@@ -119,6 +169,7 @@ sensors = "gradients"
 half-1 = ["gradients.a@*", "gradients.c@*"]
 half-2 = ["gradients.b@*", "gradients.d@*"]
 drift = "drift.{{axis}}"
+more = []
 "#
         )
     };

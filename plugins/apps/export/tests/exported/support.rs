@@ -64,6 +64,11 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
         let scales: Vec<f64> = all(5.0).iter().map(|scale| scale.abs() + 0.1).collect();
         let directions = used.len().min(3);
         let parts: Vec<f64> = (0..directions).flat_map(|_| all(0.4)).collect();
+        if node.kind.name == "rls" {
+            let predictor = going_on(used, random);
+            fitted.insert(node.instance(), Arc::from(predictor));
+            continue;
+        }
         let mut written = json!({
             "type": "linear",
             "regressors": used,
@@ -78,11 +83,78 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
                 "directions": parts,
             });
         }
+        if random.between(0.0, 1.0) < 0.8 {
+            let width = used.len();
+            let mut parts = (0..width * (width + 1) / 2).map(|_| 0.05 * random.normal());
+            written["variance"] = json!({
+                "root": parts.by_ref().collect::<Vec<f64>>(),
+                "centre": means,
+                "rows": 70,
+                "noise": random.between(0.0, 4.0).exp(),
+            });
+        }
         let predictor: Box<dyn Predictor> = serde_json::from_value(written).unwrap();
         assert!(predictor.mistakes().is_empty());
         fitted.insert(node.instance(), Arc::from(predictor));
     }
     fitted
+}
+
+/// What goes on learning, made up: with information and a range of any size.
+fn going_on(uses: Vec<String>, random: &mut Prng) -> Box<dyn Predictor> {
+    let width = uses.len();
+    // One that predicts next to nothing may err less than what it learns.
+    let size = if random.between(0.0, 1.0) < 0.3 {
+        30.0
+    } else {
+        0.01
+    };
+    let mut all = |scale: f64, count: usize| -> Vec<f64> {
+        (0..count).map(|_| scale * random.normal()).collect()
+    };
+    let (means, theta) = (all(10.0, width), all(size, width + 1));
+    let scales: Vec<f64> = all(5.0, width).iter().map(|of| of.abs() + 0.1).collect();
+    let directions = [all(0.3, width + 1), all(0.1, width + 1)];
+    let information: Vec<f64> = (0..=width)
+        .flat_map(|i| (0..=i).map(move |j| (i, j)))
+        .map(|(i, j)| {
+            let along = directions.iter().map(|of| of[i] * of[j]).sum::<f64>();
+            60.0 * along + if i == j { 20.0 } else { 0.0 }
+        })
+        .collect();
+    let parts = all(0.4, 2 * width);
+    let (wide, noise) = (random.between(2.0, 60.0), random.between(1.0, 6.0).exp());
+    let end = |by: f64| -> Vec<f64> {
+        let ends = means.iter().zip(&scales);
+        ends.map(|(mean, scale)| mean + by * scale).collect()
+    };
+    let written = json!({
+        "type": "online_linear",
+        "coefficients": theta[..width],
+        "intercept": theta[width],
+        "frame": { "regressors": uses, "means": means, "scales": scales, "level": random.normal() },
+        "recursion": { "rls": {
+            "rls": {
+                "memory_s": random.between(20.0, 2000.0),
+                "share": 0.1,
+                "coefficients": theta,
+                "information": information,
+                "rows": random.between(20.0, 200.0),
+                "variance": noise * noise,
+            },
+            "little": random.between(0.0, 0.1),
+        } },
+        "range": { "lowest": end(-wide), "highest": end(wide) },
+        "novelty": {
+            "edge": random.between(0.1, 0.9),
+            "means": means,
+            "scales": scales,
+            "directions": parts,
+        },
+    });
+    let predictor: Box<dyn Predictor> = serde_json::from_value(written).unwrap();
+    assert!(predictor.mistakes().is_empty());
+    predictor
 }
 
 /// How sensors go together, made up; in some fits nothing was learned, or a channel never had a value.
@@ -321,7 +393,13 @@ impl Exhibit {
         std::fs::write(&from, bytes).unwrap();
         let none = Path::new("-");
         let states = [begin.unwrap_or(none), end.unwrap_or(none)];
-        ran(Command::new(program).args([&from, &to]).args(states));
+        let is_for_arm = program.to_string_lossy().contains("-arm-linux-");
+        let mut command = match is_for_arm {
+            true => Command::new("qemu-arm"),
+            false => Command::new(program),
+        };
+        command.args(is_for_arm.then_some(program));
+        ran(command.args([&from, &to]).args(states));
         let words = std::fs::read(&to).unwrap();
         let words: Vec<u64> = words
             .chunks_exact(8)

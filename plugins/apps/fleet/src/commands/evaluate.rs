@@ -20,8 +20,9 @@ use crate::pool::{Event, run};
 /// Score the model of each machine on recorded data
 ///
 /// Outputs that predict a measured truth are scored as by `athermal evaluate`. The table shows of each machine the output
-/// with the largest error beside the fleet: on how many instants, its error, that over the median error of this output over
-/// all machines, the geometric mean of these ratios over all outputs of the machine, and the error over that of no model.
+/// with the largest error beside the fleet: on how many instants, and its error. That stands also over the median error of
+/// this output over all machines. The table has the geometric mean of these ratios over all outputs of the machine, and the error over that of no
+/// model.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fleet evaluate models --data 'new/machine=*/*.csv'\n  \

@@ -34,8 +34,8 @@ use athermal_jobs::blocks::BlockOptions;
 /// With `--blocks day` each machine is fitted as `athermal fit --blocks day` does it, on the sums of each UTC day in place of rows. With
 /// `--keep-blocks FOLDER` these are kept, and the next fit of years reads them and the days that are new.
 ///
-/// The table shows of each machine the estimator with the largest error beside the fleet: on how many rows, its error on
-/// them, that over the median error of this estimator over all machines, and the geometric mean of these ratios over all
+/// The table shows of each machine the estimator with the largest error beside the fleet: on how many rows, and its error on
+/// them. It also has that over the median error of this estimator over all machines, and the geometric mean of these ratios over all
 /// estimators of the machine.
 #[derive(Debug, Args)]
 #[command(
@@ -68,7 +68,7 @@ pub(crate) struct Fit {
         value_parser = numbers::read::<usize>("a whole number of megabytes, such as 64")
     )]
     memory: usize,
-    /// The date on the models, as RFC 3339 writes it; else the present time, or that of a fit that is gone on with
+    /// The date on the models, as RFC 3339 writes it; else the present time, or that of a fit that is resumed
     #[arg(long, value_name = "DATE", value_parser = date)]
     date: Option<String>,
     /// Find what the machines have in common instead, as a prior for a new one: its file is `--output`
