@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::machine::{KnownMachine, Schedule, Setup, Simulated};
+use crate::machine::{Change, KnownMachine, Schedule, Setup, Simulated};
 use crate::recording::Recording;
 use crate::registry::{NotFound, find};
 
@@ -26,6 +26,8 @@ pub struct Simulation {
     pub seed: u64,
     /// Set points over time; none is the machine's own schedule.
     pub schedule: Option<Schedule>,
+    /// What of it becomes another.
+    pub changes: Vec<Change>,
 }
 
 impl Simulation {
@@ -38,6 +40,7 @@ impl Simulation {
             days: self.days,
             seed: self.seed,
             schedule: self.schedule.clone(),
+            changes: self.changes.clone(),
             ..Setup::default()
         };
         let machine = find::<KnownMachine>(self.machine)?.machine;

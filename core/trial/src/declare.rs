@@ -294,6 +294,7 @@ impl Declaring<'_> {
             days: table.days,
             seed: table.seed,
             schedule,
+            changes: table.change,
         }))
     }
 

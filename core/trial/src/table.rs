@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 
 use crate::fault::FaultSpec;
+use crate::machine::Change;
 use crate::node::Forms;
 use crate::quantity::Quantity;
 use crate::time::Duration;
@@ -59,6 +60,9 @@ pub(super) struct SimulationTable {
     pub(super) seed: u64,
     /// A file of set points over time, as `athermal simulate --schedule` takes it, relative to the file in which it stands; without it the machine's own schedule.
     pub(super) schedule: Option<String>,
+    /// What of it becomes another, as `athermal simulate --change` takes it: `["expansion=30%@2d"]`.
+    #[serde(default)]
+    pub(super) change: Vec<Change>,
 }
 
 fn one_day() -> f64 {

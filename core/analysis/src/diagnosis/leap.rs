@@ -11,34 +11,15 @@
 use std::fmt;
 
 use athermal_core::compile::{Plan, PlannedChannel};
+use athermal_core::engine::leap::{
+    FEWEST_CHANGES, LONGEST_GAP, SHARES, Usual, goes_on, stands_alone,
+};
 use athermal_core::unit::Unit;
 use serde::Serialize;
 
 use super::of_truths;
 use crate::figures::apart;
 
-/// So many times as large as nineteen in twenty changes is a leap. In the largest measured and simulated sets of data without one,
-/// what stands alone is at most 2.1 times as large.
-const TIMES: f64 = 20.0;
-/// The share of changes that define what is usual.
-const USUAL: f64 = 0.95;
-/// The share of those that do where leaps are many, and so many times what they do not exceed is usual at most. In measured and
-/// simulated data without leaps, what nineteen in twenty do not exceed is at most 2.1 times that, and 11 times in a heater.
-const MOSTLY: f64 = 0.75;
-const SPREAD: f64 = 10.0;
-/// The share of a leap that the changes beside it do not reach.
-const BESIDE: f64 = 0.1;
-/// Fewer changes do not define what is usual.
-const FEWEST_CHANGES: usize = 20;
-/// A change over a time so many times as long as the median is no leap, for much may have happened.
-const LONGEST_GAP: f64 = 3.0;
-/// By how much the changes before and after a zeroing may differ, as a share of what it differs from them.
-const ALIKE: f64 = 0.3;
-/// So many times as much as usual a zeroing differs from the changes on both sides; in measured and simulated data, what goes on alike
-/// differs by at most 11 times that. Usual is what three in four do not exceed, and a part of what nineteen in twenty do not.
-const STEP: f64 = 20.0;
-const STEP_TO_ONE: f64 = 8.0;
-const PART_OF_MOST: f64 = 0.2;
 /// So many that come to one and the same number are homings.
 const HOMINGS: usize = 3;
 /// So many of the largest changes are kept.
@@ -148,10 +129,10 @@ impl Finder {
             steps.push(leap, gap_s, self.met);
         }
         let before = self.newest.take();
-        let alone = before.is_none_or(|(before, ..)| is_small(before.change(), change));
+        let alone = before.is_none_or(|(before, ..)| stands_alone(change, before.change()));
         self.newest = Some((leap, gap_s, alone));
         if let Some((before, gap_s, true)) = before
-            && is_small(change, before.change())
+            && stands_alone(before.change(), change)
         {
             self.keep(before, gap_s);
         }
@@ -183,8 +164,7 @@ impl Finder {
         if self.changes.kept.len() < FEWEST_CHANGES {
             return None;
         }
-        let usual = self.changes.quantile(USUAL);
-        let least = TIMES * usual.min(SPREAD * self.changes.quantile(MOSTLY));
+        let least = self.changes.usual().least_change();
         let longest_s = LONGEST_GAP * self.gaps.quantile(0.5);
         let is_leap = |(leap, gap_s, _): &&(Leap, f64, u64)| {
             leap.change().abs() > least && *gap_s <= longest_s
@@ -220,12 +200,12 @@ struct Steps {
 impl Steps {
     fn push(&mut self, next: Leap, gap_s: f64, met: u64) {
         if let [(before, ..), (step, ..)] = self.last[..] {
-            let size = (step.change() - (before.change() + next.change()) / 2.0).abs();
+            let changes = [before.change(), step.change(), next.change()];
+            let (size, is_alike) = goes_on(changes);
             if size != 0.0 {
                 self.sizes.push(size);
             }
             let at = self.kept.partition_point(|(kept, ..)| *kept >= size);
-            let is_alike = (next.change() - before.change()).abs() <= ALIKE * size;
             if is_alike && at < KEPT && size > 0.0 {
                 let longest = self
                     .last
@@ -244,35 +224,22 @@ impl Steps {
         if self.sizes.kept.len() < FEWEST_CHANGES {
             return Vec::new();
         }
-        let usual = self
-            .sizes
-            .quantile(MOSTLY)
-            .max(PART_OF_MOST * self.sizes.quantile(USUAL));
-        let far = |times: f64| {
+        let [least, to_one] = self.sizes.usual().least_step();
+        let far = || {
             let of = move |(size, _, longest, _): &&(f64, Leap, f64, u64)| {
-                *size > times * usual && *longest <= longest_s
+                *size > to_one && *longest <= longest_s
             };
             self.kept.iter().filter(of)
         };
-        let comes_back = |leap: &Leap| {
-            far(STEP_TO_ONE)
-                .filter(|(_, of, ..)| of.to == leap.to)
-                .count()
-                >= HOMINGS
-        };
+        let comes_back =
+            |leap: &Leap| far().filter(|(_, of, ..)| of.to == leap.to).count() >= HOMINGS;
         let is_zeroing =
-            |(size, leap, ..): &&(f64, Leap, f64, u64)| *size > STEP * usual || comes_back(leap);
-        far(STEP_TO_ONE)
+            |(size, leap, ..): &&(f64, Leap, f64, u64)| *size > least || comes_back(leap);
+        far()
             .filter(is_zeroing)
             .map(|(_, leap, _, met)| (*leap, *met))
             .collect()
     }
-}
-
-/// Whether a change beside another leaves that one alone: it is small, or takes it back.
-fn is_small(change: f64, beside: f64) -> bool {
-    let least = BESIDE * beside.abs();
-    change.abs() <= least || (change + beside).abs() <= least
 }
 
 /// Every so many of what comes, evenly, so that they stay few.
@@ -302,6 +269,11 @@ impl Thinned {
             }
         }
         self.seen += 1;
+    }
+
+    /// What is usual of them.
+    fn usual(&self) -> Usual {
+        Usual(SHARES.map(|share| self.quantile(share)))
     }
 
     /// What the share `share` does not exceed; of at least one value.

@@ -8,6 +8,7 @@ pub mod day;
 mod gap;
 pub mod lag;
 pub mod leap;
+pub mod noise;
 mod observation;
 pub mod offset;
 mod plot;
@@ -28,8 +29,6 @@ pub(crate) use plot::{
     with_truth as truth_picture,
 };
 pub use rest::SilentNode;
-
-pub use athermal_run::live::monitor::feedback;
 
 use athermal_core::compile::origins::{inputs, of_truths, upstream};
 use athermal_core::time::Duration;

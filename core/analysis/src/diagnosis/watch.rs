@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use athermal_core::compile::origins::{health_reasons, of_truths};
+use athermal_core::compile::origins::{applied, health_reasons, of_truths};
 use athermal_core::compile::{Plan, SourceChannel};
 use athermal_core::engine::SampleRange;
 use athermal_core::time::Instant;
@@ -119,14 +119,14 @@ impl Recording for FaultWatch<'_> {
 impl ChannelWatch {
     /// Watches the channels of this plan.
     pub fn at(plan: &Plan) -> Self {
-        let watched = health_reasons(plan);
+        let (watched, applied) = (health_reasons(plan), applied(plan));
         let channels = plan.sources.iter().zip(leap::finders(plan));
         let channels = channels.zip(of_truths(plan)).enumerate();
         let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
             let rests = source.rests();
-            let steps = source.planned.is_some() || source.is_instant;
+            let steps = source.planned.is_some() || source.is_instant || applied[slot];
             // Such a node takes out what is stuck.
-            let stuck = !rests && !watched.contains_key(&slot);
+            let stuck = !rests && !applied[slot] && !watched.contains_key(&slot);
             WatchedChannel {
                 source: source.clone(),
                 of_truth,

@@ -6,6 +6,8 @@ pub mod mermaid;
 pub mod plan;
 pub mod svg;
 
+pub use layout::Layout;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnosis::text::grouped;
@@ -53,6 +55,20 @@ pub enum Class {
     Combiner,
     /// What comes out.
     Output,
+}
+
+impl Class {
+    /// Its name among the classes of a picture.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Signal => "signal",
+            Self::Feature => "feature",
+            Self::Estimator => "estimator",
+            Self::Combiner => "combiner",
+            Self::Output => "output",
+        }
+    }
 }
 
 /// From one box to another.

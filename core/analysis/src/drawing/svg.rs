@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::layout::layout;
+use super::layout::{Layout, layout};
 use super::{Box, Class, Diagram, Flow};
 use crate::markup::escaped;
 
@@ -47,11 +47,17 @@ const STYLE: &str = "
   }
 ";
 
+/// Where boxes and arrows are in the picture.
+#[must_use]
+pub fn places(diagram: &Diagram) -> Layout {
+    let sizes: Vec<[f64; 2]> = diagram.boxes.iter().map(size).collect();
+    layout(diagram, &sizes)
+}
+
 /// The text of the picture.
 #[must_use]
 pub fn text(diagram: &Diagram) -> String {
-    let sizes: Vec<[f64; 2]> = diagram.boxes.iter().map(size).collect();
-    let layout = layout(diagram, &sizes);
+    let layout = places(diagram);
     let width = (layout.size[0] + 2.0 * MARGIN).max(560.0);
     let height = layout.size[1] + 2.0 * MARGIN + TITLE + LEGEND;
     let mut text = format!(
@@ -100,21 +106,11 @@ fn size(shown: &Box) -> [f64; 2] {
     [width.max(90.0), height]
 }
 
-fn class(class: Class) -> &'static str {
-    match class {
-        Class::Signal => "signal",
-        Class::Feature => "feature",
-        Class::Estimator => "estimator",
-        Class::Combiner => "combiner",
-        Class::Output => "output",
-    }
-}
-
 fn drawn(shown: &Box, [x, y, width, height]: [f64; 4]) -> String {
     let round = if shown.class == Class::Signal { 16 } else { 6 };
     let mut text = format!(
         "<rect class=\"{}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" rx=\"{round}\"/>\n",
-        class(shown.class)
+        shown.class.word()
     );
     let left = x + PADDING;
     let mut at = y + 0.6 * PADDING + 15.0;

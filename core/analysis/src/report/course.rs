@@ -64,6 +64,9 @@ pub struct Axis {
     pub main: usize,
     /// How far ahead that looks, in s.
     pub ahead_s: f64,
+    /// The same of each prediction.
+    #[serde(skip)]
+    pub(super) aheads_s: Vec<f64>,
     /// The weights of a vote's voters at each truth; empty where nothing is weighed.
     pub weights: Vec<Weight>,
     /// Below this absolute truth the axis is stable, and from the second on transient, by a `stability` node; none without one,
@@ -104,6 +107,9 @@ pub struct Voter {
     /// Its type.
     #[serde(rename = "type")]
     pub kind: &'static str,
+    /// The output that it goes out as.
+    #[serde(skip)]
+    pub(super) output: Option<String>,
     /// Its value for each truth.
     pub value: Vec<f64>,
     /// Both ends of the interval about each, where it has any.
@@ -192,6 +198,10 @@ pub(super) fn follow(
 /// Every truth with its predictions, in the order of the first of these.
 fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
     let put_out: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
+    let output_of = |slot: usize| {
+        let output = plan.outputs.iter().find(|output| output.slot == slot);
+        output.map(|output| output.name.clone())
+    };
     let rates: Vec<usize> = track.axes.iter().map(|axis| axis.predicted.1).collect();
     // What is integrated counts most, then what is put out, of several the first.
     let stands =
@@ -244,6 +254,7 @@ fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
                 slot: of.slot,
                 called: called.clone(),
                 kind: node.kind.name,
+                output: output_of(of.slot),
                 value: of.values.clone(),
                 interval: of.ends.clone(),
             }
@@ -265,6 +276,7 @@ fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
                 .predictions
                 .get(main)
                 .map_or(0.0, |of| of.ahead.secs()),
+            aheads_s: all().map(|of| of.ahead.secs()).collect(),
             weights: weights.collect(),
             states: states(plan, truth.slot, &of.unit),
         };
@@ -281,6 +293,12 @@ impl Axis {
     /// The prediction that the graph puts out.
     pub(super) fn put_out(&self) -> &Voter {
         &self.voters[self.main]
+    }
+
+    /// The places of what the graph puts out beside what is shown of the axis.
+    pub(super) fn other_outputs(&self) -> impl Iterator<Item = usize> {
+        let is_other = |nth: &usize| *nth != self.main && self.voters[*nth].output.is_some();
+        (0..self.voters.len()).filter(is_other)
     }
 
     fn look(&mut self, places: &Places, engine: &Engine, now_s: f64) {

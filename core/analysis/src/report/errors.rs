@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Axis, rms};
+use super::{Axis, Voter, rms};
 use crate::diagnosis::residual::Residuals;
 
 const BINS: usize = 41;
@@ -26,11 +26,13 @@ impl Axis {
     /// Prediction minus truth of what is put out, for each truth.
     #[must_use]
     pub fn errors(&self) -> Vec<f64> {
-        let main = &self.put_out().value;
-        main.iter()
-            .zip(&self.truth.value)
-            .map(|(p, y)| p - y)
-            .collect()
+        self.errors_of(self.put_out())
+    }
+
+    /// The same of any prediction of it.
+    pub(super) fn errors_of(&self, voter: &Voter) -> Vec<f64> {
+        let pairs = voter.value.iter().zip(&self.truth.value);
+        pairs.map(|(p, y)| p - y).collect()
     }
 }
 

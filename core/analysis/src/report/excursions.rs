@@ -7,7 +7,7 @@ use athermal_core::engine::Engine;
 use athermal_core::node::{Duty, Predictor, Role};
 use athermal_run::model::Model;
 
-use super::novelty::{Contradiction, Excursion, Novelty, Stretch};
+use super::novelty::{Contradiction, Excursion, Novelty, Spoken, Stretch};
 
 /// Stretches no farther apart are one.
 const APART_S: f64 = 600.0;
@@ -32,6 +32,47 @@ pub(super) fn ask_for_novelty(plan: &mut Plan) {
 pub(super) struct NoveltyWatch {
     estimators: Vec<Watched>,
     checks: Vec<Check>,
+    learners: Vec<Learner>,
+}
+
+/// An estimator that goes on learning: the slots of its prediction and of its port `learning`, and how often who spoke.
+struct Learner {
+    node: String,
+    slots: [usize; 2],
+    spoke: [u64; 4],
+}
+
+impl Learner {
+    fn new(node: &PlannedNode) -> Option<Self> {
+        let says = node.says_of_learning()?;
+        Some(Self {
+            node: node.instance(),
+            slots: [node.slots.start, says],
+            spoke: [0; 4],
+        })
+    }
+
+    fn look(&mut self, engine: &Engine) {
+        let [prediction, says] = self.slots.map(|slot| engine.value(slot));
+        if engine.ran(self.slots[0]) && !prediction.is_nan() {
+            // Before its first truth it says nothing.
+            let who = if says.is_nan() { 1 } else { says as usize / 10 };
+            self.spoke[who.min(3)] += 1;
+        }
+    }
+
+    fn finish(self) -> Option<Spoken> {
+        let all = self.spoke.iter().sum::<u64>() as f64;
+        let [learner, too_few, worse, silence] = self.spoke.map(|count| count as f64 / all);
+        // Those that never yield to their fit are not worth a word.
+        (learner < 1.0).then_some(Spoken {
+            node: self.node,
+            learner,
+            too_few,
+            worse,
+            silence,
+        })
+    }
 }
 
 /// An estimator that is watched.
@@ -72,6 +113,7 @@ impl NoveltyWatch {
                 .filter_map(|node| Watched::new(plan, node, model))
                 .collect(),
             checks: plan.nodes.iter().flat_map(|of| checks(plan, of)).collect(),
+            learners: plan.nodes.iter().filter_map(Learner::new).collect(),
         }
     }
 
@@ -79,6 +121,7 @@ impl NoveltyWatch {
         self.estimators
             .iter_mut()
             .for_each(|of| of.look(engine, now_s));
+        self.learners.iter_mut().for_each(|of| of.look(engine));
         for check in &mut self.checks {
             let reason = engine.value(check.reason);
             let is_out = reason == 1.0 || reason == 2.0;
@@ -108,6 +151,11 @@ impl NoveltyWatch {
         let novelty = Novelty {
             estimators,
             contradictions,
+            learners: self
+                .learners
+                .into_iter()
+                .filter_map(Learner::finish)
+                .collect(),
             ..Novelty::default()
         };
         (novelty, periods)

@@ -25,6 +25,20 @@ impl Hours {
         Self { from_s, label }
     }
 
+    /// The first date and the last, where there are dates.
+    pub(super) fn dates(&self, last_s: f64) -> Option<String> {
+        let date = |at_s: f64| {
+            let date = Timestamp::from_second(at_s as i64).ok()?.to_string();
+            Some(date.get(..16)?.replace('T', " "))
+        };
+        let dated = self.from_s > 0.0;
+        Some(format!(
+            "{} to {} UTC",
+            date(dated.then_some(self.from_s)?)?,
+            date(last_s)?
+        ))
+    }
+
     /// An instant in hours.
     pub(super) fn at(&self, time_s: f64) -> f64 {
         (time_s - self.from_s) / 3600.0

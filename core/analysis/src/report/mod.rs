@@ -16,6 +16,7 @@ mod realignment;
 mod recomputed;
 mod scores;
 mod sensors;
+mod stays;
 mod text;
 mod track;
 mod verdict;
@@ -28,11 +29,12 @@ pub use errors::Errors;
 use excursions::NoveltyWatch;
 use hours::Hours;
 pub use light::Light;
-pub use novelty::{Compared, Contradiction, Effect, Excursion, Novelty, Stretch};
+pub use novelty::{Compared, Contradiction, Effect, Excursion, Novelty, Spoken, Stretch};
 pub use page::{page, plots};
 pub use realignment::Realignment;
-pub use scores::scores;
+pub use scores::{outputs, scores};
 pub use sensors::SensorFacts;
+pub use stays::Stays;
 pub use text::text;
 pub use track::Unjudged;
 pub use verdict::Verdict;
@@ -166,12 +168,17 @@ pub fn gather(
     let (mut novelty, periods) = watch.finish();
     novelty.compare(model, recording, &course.axes, &periods)?;
     let worth = worth::worth(track, &mut unjudged)?;
-    let verdict = |axis| Verdict::of(axis, &scores, worth.as_ref());
+    let verdict = |axis, nth| Verdict::of(axis, nth, &scores, worth.as_ref());
+    let shown = course.axes.iter().map(|axis| verdict(axis, axis.main));
+    let others = course.axes.iter().flat_map(|axis| {
+        let others = axis.other_outputs();
+        others.map(move |nth| verdict(axis, nth))
+    });
     let residuals = residuals(&model.plan, &observation);
     Ok(Facts {
         graph: model.plan.name.clone().unwrap_or_default(),
         data,
-        verdicts: course.axes.iter().map(verdict).collect(),
+        verdicts: shown.chain(others).collect(),
         novelty,
         errors: course
             .axes

@@ -23,6 +23,23 @@ pub struct Novelty {
     pub effects: Vec<Effect>,
     /// When a sensor contradicted the others, by a `cross_check` node.
     pub contradictions: Vec<Contradiction>,
+    /// Who spoke for each estimator that went on learning.
+    pub learners: Vec<Spoken>,
+}
+
+/// Who spoke for an estimator that went on learning, as shares of its predictions: it, or its fit and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spoken {
+    /// The estimator: `learner.Z1`.
+    pub node: String,
+    /// What has learned.
+    pub learner: f64,
+    /// The fit, before there had been 20 windows of truth.
+    pub too_few: f64,
+    /// The fit, since it erred less.
+    pub worse: f64,
+    /// The fit, since no truth came for a memory.
+    pub silence: f64,
 }
 
 /// How far an estimator went outside of its fit.
@@ -189,6 +206,7 @@ impl Novelty {
         contradictions
             .chain(nodes)
             .chain(changed.map(Effect::sentence))
+            .chain(self.learners.iter().map(Spoken::sentence))
             .collect()
     }
 }
@@ -254,6 +272,22 @@ impl Excursion {
             self.node,
             figure(Some(share)),
             self.done()
+        )
+    }
+}
+
+impl Spoken {
+    /// For people.
+    #[must_use]
+    pub(super) fn sentence(&self) -> String {
+        let percent = |share: f64| figure(Some(100.0 * share));
+        format!(
+            "{} speaks {} % of the time; its fit does {} % before 20 windows of truth, {} % since it erred less, {} % without truths.",
+            self.node,
+            percent(self.learner),
+            percent(self.too_few),
+            percent(self.worse),
+            percent(self.silence)
         )
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use athermal_core::compile::Plan;
 use athermal_run::score::{Score, Scores};
 
 use crate::figures::{count, counted, number, or_dash, paragraph, stated, table};
@@ -64,6 +65,22 @@ pub fn scores(scores: &Scores, asked: &[String]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// Which predictions go out under other names than their own, for people; none where all have their own.
+#[must_use]
+pub fn outputs(plan: &Plan) -> Option<String> {
+    let of = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+    let mut pairs: Vec<String> = Vec::new();
+    for output in &plan.outputs {
+        let shown = &plan.channels[output.slot];
+        let (name, node) = (of(&output.name), of(&shown.name));
+        let pair = format!("`{name}` is {node}");
+        if shown.predicts.is_some() && name != node && !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    (!pairs.is_empty()).then(|| format!("what goes out: {}", pairs.join(", ")))
 }
 
 /// How far off the truth of before is, for each horizon where that differs.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_run::score::{NoModel, Score};
 use serde::Serialize;
 
-use super::{Axis, Worth, figure, rms};
+use super::{Axis, Stays, Worth, figure, rms};
 use crate::figures::apart_by;
 
 /// The share of predictions from which on those that lack are not spoken of; the first windows of a recording are among them.
@@ -42,6 +42,14 @@ pub struct Verdict {
     pub measured: bool,
     /// The share of the instants at which it was measured that have a prediction.
     pub valid: f64,
+    /// What it goes out as, or else its channel.
+    #[serde(skip)]
+    pub(super) output: String,
+    /// How far ahead the prediction looks, in s.
+    #[serde(skip)]
+    pub(super) ahead_s: f64,
+    /// How near the axis stays that is not measured again for a while; none of too few truths.
+    pub stays: Option<Stays>,
     /// The standard error of the measured drift, in which scatter and curvature within its windows both count.
     #[serde(rename = "truth_noise")]
     pub noise: Option<f64>,
@@ -52,8 +60,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    pub(super) fn of(axis: &Axis, scores: &[Score], worth: Option<&Worth>) -> Self {
-        let errors = axis.errors();
+    /// Of the prediction of an axis at a place among its voters.
+    pub(super) fn of(axis: &Axis, nth: usize, scores: &[Score], worth: Option<&Worth>) -> Self {
+        let put_out = &axis.voters[nth];
+        let errors = axis.errors_of(put_out);
         let both = || {
             axis.truth
                 .value
@@ -61,7 +71,6 @@ impl Verdict {
                 .zip(&errors)
                 .filter(|(_, e)| !e.is_nan())
         };
-        let put_out = axis.put_out();
         let score = scores
             .iter()
             .find(|score| score.output == put_out.prediction);
@@ -77,6 +86,7 @@ impl Verdict {
         };
         let figures = scored.or_else(own);
         let measured = axis.truth.value.iter().filter(|y| !y.is_nan()).count();
+        let worth = worth.filter(|_| nth == axis.main);
         let corrected = worth.and_then(|worth| {
             let i = worth.place_of(axis)?;
             let pairs = worth.drift_without[i]
@@ -98,6 +108,13 @@ impl Verdict {
             error: figures.map(|of| of.0),
             baseline_zero: figures.map(|of| of.1),
             measured: measured > 0,
+            stays: Stays::of(axis, put_out, no_model),
+            output: put_out
+                .output
+                .as_ref()
+                .unwrap_or(&put_out.prediction)
+                .clone(),
+            ahead_s: axis.aheads_s[nth],
             valid: both().count() as f64 / measured.max(1) as f64,
             noise: score.and_then(|score| score.truth_noise),
             without_correction: corrected.map(|both| both.0),
@@ -110,11 +127,27 @@ impl Verdict {
     pub fn is_good(&self) -> bool {
         let better = |with: Option<f64>, without: Option<f64>| {
             with.zip(without)
-                .is_some_and(|(with, without)| with < without)
+                .is_some_and(|(with, without)| !is_worse(with, without))
         };
         better(self.error, self.baseline_zero)
             && (self.with_correction.is_none()
                 || better(self.with_correction, self.without_correction))
+    }
+
+    /// What is left, of what, and how near that keeps a position: for who looks first.
+    #[must_use]
+    pub fn short(&self) -> String {
+        let (Some(error), Some(no_model)) = (self.error, self.baseline_zero) else {
+            return self.sentence();
+        };
+        let [left, all] = apart_by([error, no_model], |value| figure(Some(value)));
+        let unit = super::spelled(&self.unit);
+        let mut text = format!("left of {all} {unit}: {left}");
+        if let Some(with) = self.with_correction {
+            let _ = write!(text, "; corrected, {} remain", figure(Some(with)));
+        }
+        let stays = self.stays.as_ref().map(Stays::sentence);
+        stays.map_or(format!("{text}."), |stays| format!("{text}. {stays}"))
     }
 
     /// The sentence, after the name of the axis.
@@ -164,8 +197,16 @@ impl Verdict {
             };
         }
         text.push('.');
+        if let Some(stays) = &self.stays {
+            let _ = write!(text, " {}", stays.sentence());
+        }
         text
     }
+}
+
+/// Whether an error is worse than another by the digits that people see: what is equal to them is not.
+pub(super) fn is_worse(error: f64, than: f64) -> bool {
+    error > than && figure(Some(error)) != figure(Some(than))
 }
 
 #[cfg(test)]
@@ -186,12 +227,17 @@ mod tests {
             error: Some(20.0),
             baseline_zero: Some(50.0),
             measured: true,
+            output: "predicted.Z1".into(),
+            ahead_s: 0.0,
+            stays: None,
             valid: 0.97,
             noise: Some(3.85),
             without_correction: Some(60.0),
             with_correction: Some(15.0),
         };
         assert!(verdict.is_good());
+        let short = "left of 50.0 nm/min: 20.0; corrected, 15.0 remain.";
+        assert_eq!(verdict.short(), short);
         assert_eq!(
             verdict.sentence(),
             "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the standard error of what was measured is 3.85); \
@@ -215,6 +261,11 @@ mod tests {
         let sentence = verdict.sentence();
         let of_level = "vote predicts the departure from the mean of the fit of 50.0 K RMS to 20.0, 60 % less than no model, and gives";
         assert!(sentence.starts_with(of_level), "{sentence}");
+        (verdict.error, verdict.with_correction) = (Some(50.01), None);
+        assert!(verdict.is_good(), "equal to three digits is not worse");
+        verdict.error = Some(50.1);
+        assert!(!verdict.is_good());
+        assert_eq!(verdict.short(), "left of 50.0 K: 50.1.");
         verdict.error = None;
         assert_eq!(verdict.sentence(), "vote gave no prediction on these data.");
         verdict.measured = false;

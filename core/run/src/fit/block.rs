@@ -55,6 +55,8 @@ pub(super) struct Examples {
     pub(super) ran: bool,
     pub(super) without_run: u64,
     pub(super) outside_limits: u64,
+    #[serde(default)]
+    pub(super) leapt: u64,
     pub(super) groups: Vec<Group>,
 }
 

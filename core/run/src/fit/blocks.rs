@@ -345,6 +345,7 @@ impl FromBlocks<'_> {
             let examples = Self::examples(plan, trainee, block)?;
             trainee.dropped.without_run += examples.without_run;
             trainee.dropped.outside_limits += examples.outside_limits;
+            trainee.dropped.leapt += examples.leapt;
             for group in &examples.groups {
                 let values = group.states.iter().map(|state| state.value());
                 trainee.validity.count_alike(values, group.count());

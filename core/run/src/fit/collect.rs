@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::between::Between;
 use super::candidates::Validity;
 use super::report::Dropped;
+use crate::channel::is_leapt;
 use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing, When, naming_one};
 use crate::node::{Role, Runs, TrainingError};
@@ -220,6 +221,8 @@ impl Collector {
             let slot = self.trainees[index].link.slot;
             let truth = engine.value(slot);
             if truth.is_nan() || !share.contains(tick) {
+                let leapt = is_leapt(truth) && share.contains(tick);
+                self.trainees[index].dropped.leapt += u64::from(leapt);
                 continue;
             }
             let Self { taps, trainees, .. } = self;

@@ -17,7 +17,7 @@ use crate::channel::Extremes;
 use crate::compile::{Plan, TruthLink};
 use crate::engine::{Engine, Fitted, Fnv1a, When, naming_one};
 use crate::node::{Trainer, TrainingError};
-use crate::recording::{Event, Recording, Samples, Steps, drive};
+use crate::recording::{AHEAD, Event, Recording, Samples, Steps, drive};
 use crate::score::Means;
 use crate::time::{Duration, Instant};
 
@@ -54,7 +54,7 @@ pub fn blocks_of(
     };
     let mut source = recording.open(plan)?;
     let mut stepped = 0;
-    drive::<_, FitError>(&mut cutter, &mut *source, |_, event, _| {
+    drive::<_, FitError>(&mut cutter, &mut *source, AHEAD, |_, event, _| {
         stepped += u64::from(matches!(event, Event::Row(_)));
         if stepped.is_multiple_of(4096) {
             progress(stepped);
@@ -231,6 +231,7 @@ impl DayInWork {
                 ran: self.collector.ran(trainee),
                 without_run: trainee.dropped.without_run,
                 outside_limits: trainee.dropped.outside_limits,
+                leapt: trainee.dropped.leapt,
                 groups: groups.map_err(|error| BlockError::NoSums {
                     node: node.clone(),
                     error,

@@ -86,6 +86,10 @@ impl FitReport {
     }
 }
 
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 /// Rows that did not take part in a fit, by reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dropped {
@@ -93,6 +97,9 @@ pub struct Dropped {
     pub without_run: u64,
     /// Truths outside the limits of `train.abs_truth`.
     pub outside_limits: u64,
+    /// Truths whose windows hold a leap.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub leapt: u64,
     /// Rows in which a regressor had no value.
     pub incomplete: u64,
 }

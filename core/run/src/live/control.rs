@@ -233,6 +233,14 @@ impl Control {
     /// From now on `look` sees each tick. Ticks that are missed are not seen.
     pub fn look_on(&mut self, look: impl FnMut(&TickView<'_>) + Send + 'static) {
         self.look = Some(Box::new(look));
+        self.look_into();
+    }
+
+    /// What runs is known with all that whoever looks on may ask for.
+    fn look_into(&mut self) {
+        if let (Some(replica), Some(_)) = (&mut self.replica, &self.look) {
+            replica.look_into();
+        }
     }
 
     /// Takes in what there is. What happened is kept for whoever pumps.
@@ -477,7 +485,8 @@ impl Control {
             return Err(StageError::Busy);
         }
         live.follow(&self.running);
-        let engine = live.engine.twin().map_err(StageError::NotCopied)?;
+        let engine = live.engine.twin_on(&live.plan);
+        let engine = engine.map_err(StageError::NotCopied)?;
         let mut copy = LiveEngine::new(engine, &self.feed, live.event)
             .expect("a twin reads what its twin reads");
         copy.outputs.clone_from(&live.outputs);
@@ -490,7 +499,7 @@ impl Committed {
     fn new(live: LiveEngine, origin: Origin) -> Self {
         Self {
             revision: live.revision.clone(),
-            plan: Arc::clone(live.engine.plan()),
+            plan: Arc::clone(&live.plan),
             shown: Arc::clone(&live.shown),
             live: Some(live),
             origin,

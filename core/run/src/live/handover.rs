@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::tick_view::shown;
+use super::tick_view::mirrored;
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
@@ -39,6 +39,8 @@ impl Feed {
 #[derive(Debug)]
 pub(super) struct LiveEngine {
     pub(super) engine: Engine,
+    /// What the engine thread steps of it.
+    pub(super) plan: Arc<Plan>,
     pub(super) revision: String,
     /// For each channel that the engine reads, where its sample stands among those given.
     pub(super) places: Vec<usize>,
@@ -73,12 +75,13 @@ impl LiveEngine {
             return Err(missing);
         }
         Ok(Self {
+            plan: Arc::clone(engine.plan()),
             revision: engine.revision().to_owned(),
             samples: vec![f64::NAN; wanted.len()],
             places: places.into_iter().flatten().collect(),
             outputs: vec![None; engine.plan().outputs.len()],
             event,
-            shown: shown(engine.plan()),
+            shown: mirrored(engine.plan()),
             usual: Vec::new(),
             refused: false,
             is_replica: false,
@@ -98,6 +101,13 @@ impl LiveEngine {
         self.engine.step(time, &self.samples)?;
         self.event += 1;
         Ok(())
+    }
+
+    /// Computes more from now on, for whoever looks on; where that cannot be, it stays as it is.
+    pub(super) fn look_into(&mut self) {
+        if let Ok(engine) = self.engine.twin_on(&Arc::new(self.plan.looked_into())) {
+            self.engine = engine;
+        }
     }
 
     /// The next tick belongs to another segment.

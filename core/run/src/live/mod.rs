@@ -53,7 +53,7 @@ pub use stage_error::StageError;
 pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};
 pub use store::{StateError, StateStore};
-pub use tick_view::{Slots, TickView};
+pub use tick_view::{Slots, TickView, mirrored};
 
 use std::sync::Arc;
 

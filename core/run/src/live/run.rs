@@ -18,7 +18,7 @@ pub fn run(
     sink: &mut dyn Sink,
 ) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
-    let ended = drive(engine, source, |engine, event, samples| {
+    let ended = drive(engine, source, 1, |engine, event, samples| {
         let Event::Row(time) = event else {
             return Ok(());
         };

@@ -141,6 +141,7 @@ impl Stepper {
             return false;
         };
         let copy = LiveEngine {
+            plan: Arc::clone(&self.live.plan),
             revision: self.live.revision.clone(),
             samples: self.live.samples.clone(),
             places: places.clone(),

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::compile::{Plan, PlannedRole};
+use crate::compile::{Plan, PlannedNode, PlannedRole};
 use crate::engine::Engine;
+use crate::node::Duty;
 use crate::score::link;
 use crate::time::Instant;
 
@@ -29,15 +30,35 @@ impl Slots for Engine {
     }
 }
 
-/// The slots that are mirrored with each tick, in order: all that predict, their truths, and novelties.
-pub(super) fn shown(plan: &Plan) -> Arc<[usize]> {
+/// The slots that are mirrored with each tick, in order: what is measured, all that predict, their truths, novelties, what learners say,
+/// and what judges of drifts and sensors says, with what it says that of.
+#[must_use]
+pub fn mirrored(plan: &Plan) -> Arc<[usize]> {
     let predicts = |slot: usize| Some([slot, link(plan, slot)?.slot]);
     let novelty = plan.nodes.iter().filter_map(|node| match &node.role {
         PlannedRole::Estimator { novelty, .. } => *novelty,
         _ => None,
     });
+    let learning = plan.nodes.iter().filter_map(PlannedNode::says_of_learning);
     let predict = (0..plan.channels.len()).filter_map(predicts).flatten();
-    let mut slots: Vec<usize> = predict.chain(novelty).collect();
+    let says = |node: &&PlannedNode| {
+        matches!(
+            node.kind.duty(),
+            Duty::Grade { .. } | Duty::Correct | Duty::Loss { .. } | Duty::Watch
+        )
+    };
+    let read = |node: &PlannedNode| {
+        let entries = node.role.inputs().flat_map(|of| &plan.gathers[of].entries);
+        entries.map(|of| of.slot).collect::<Vec<_>>()
+    };
+    let said = plan.nodes.iter().filter(says);
+    let said = said.flat_map(|node| node.slots.clone().chain(read(node)));
+    let mut slots: Vec<usize> = (0..plan.sources.len())
+        .chain(predict)
+        .chain(novelty)
+        .chain(learning)
+        .chain(said)
+        .collect();
     slots.sort_unstable();
     slots.dedup();
     slots.into()
@@ -61,6 +82,8 @@ pub(super) fn values<'a>(engine: &'a Engine, shown: &'a [usize]) -> impl Iterato
 pub struct TickView<'a> {
     /// The instant.
     pub at: Instant,
+    /// How many ticks, breaks and freezes there were in this run, with it.
+    pub event: u64,
     /// The revision of the graph.
     pub revision: &'a str,
     /// Its plan.
@@ -73,7 +96,7 @@ pub struct TickView<'a> {
     pub(super) values: &'a [f64],
 }
 
-/// Of slots that predict, their truths and novelties; of others where there is a replica.
+/// Of the slots that are [mirrored](TickView::is_mirrored); of others where there is a replica.
 impl Slots for TickView<'_> {
     fn ran(&self, slot: usize) -> bool {
         match self.engine {
@@ -97,6 +120,7 @@ impl<'a> TickView<'a> {
     pub fn of(at: Instant, engine: &'a Engine) -> Self {
         Self {
             at,
+            event: 0,
             revision: engine.revision(),
             plan: engine.plan(),
             outputs: engine.outputs(),
@@ -104,6 +128,12 @@ impl<'a> TickView<'a> {
             shown: &[],
             values: &[],
         }
+    }
+
+    /// Whether the value of a slot is known where there is no replica.
+    #[must_use]
+    pub fn is_mirrored(&self, slot: usize) -> bool {
+        self.shown.binary_search(&slot).is_ok()
     }
 
     fn mirrored(&self, slot: usize) -> f64 {

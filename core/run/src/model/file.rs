@@ -8,8 +8,11 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::shared::shared;
 use super::{Card, ModelError};
-use crate::compile::{Change, Plan, PlanDiff, PlannedNode, Wanted, compile_part, diff};
+use crate::compile::{
+    Change, Plan, PlanDiff, PlannedNode, RateError, Rates, Wanted, compile_part, diff,
+};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, Fitted, SampleRange, When, naming_one};
@@ -25,8 +28,8 @@ const LARGEST: u64 = 1_000_000_000;
 /// A graph with what was fitted: all that is needed to run.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// The graph as declared.
-    pub graph: GraphFile,
+    /// The graph as declared; models that were read of the same one share it.
+    pub graph: Arc<GraphFile>,
     /// The graph as compiled.
     pub plan: Arc<Plan>,
     /// The fitted estimators.
@@ -126,19 +129,45 @@ impl Model {
         doubts: &mut Diagnostics,
     ) -> Result<Self, ModelError> {
         let path = path.as_ref();
-        let mut model = Self::load_to_fit(path, wanted, sources, doubts)?;
-        if is_graph(path) {
-            let mut diagnostics = Diagnostics::new();
-            model.take_named(path, wanted, sources, &mut diagnostics);
-            if diagnostics.has_errors() {
-                return Err(ModelError::Graph {
-                    diagnostics: Box::new(diagnostics),
-                    sources: Box::new(std::mem::take(sources)),
-                });
-            }
-            doubts.extend(diagnostics);
+        let model = Self::load_to_fit(path, wanted, sources, doubts)?;
+        match is_graph(path) {
+            true => model.with_named(path, wanted, sources, doubts),
+            false => Ok(model),
         }
-        Ok(model)
+    }
+
+    /// Reads a graph from its text, as if it stood at a path: with the fits of the model that it names, as far as it names one.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn load_text(
+        path: &Path,
+        text: &str,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let name = path.display().to_string();
+        let model = Self::graph_of_text(&name, text, sources, doubts)?;
+        model.with_named(path, Wanted::default(), sources, doubts)
+    }
+
+    fn with_named(
+        mut self,
+        path: &Path,
+        wanted: Wanted,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let mut diagnostics = Diagnostics::new();
+        self.take_named(path, wanted, sources, &mut diagnostics);
+        if diagnostics.has_errors() {
+            return Err(ModelError::Graph {
+                diagnostics: Box::new(diagnostics),
+                sources: Box::new(std::mem::take(sources)),
+            });
+        }
+        doubts.extend(diagnostics);
+        Ok(self)
     }
 
     /// The same without the fits of a model that the graph names, as for one that is about to be fitted.
@@ -191,26 +220,21 @@ impl Model {
             });
         }
         let read: ReadBack = serde_json::from_str(&text).map_err(not_a_model)?;
-        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-        let source = sources.add(path.display().to_string(), text);
-        // A model has no places worth pointing at: all of its graph stands at its beginning.
-        let place = Place {
-            source,
-            start: 0,
-            end: 0,
-        };
-        let tree = Value::from_json(&read.graph, place)
-            .map_err(|error| not_a_model(serde::de::Error::custom(error)))?;
-        let graph = document::declare(Document::new(source, tree), &mut diagnostics);
-        let plan = graph
-            .as_ref()
-            .and_then(|graph| compile_part(graph, wanted, &mut diagnostics).ok());
-        let (Some(graph), Some(plan)) = (graph, plan) else {
-            return Err(ModelError::Graph {
+        let (graph, plan) = shared(read.graph.to_string(), wanted, || {
+            let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+            let source = sources.add(path.display().to_string(), text);
+            // A model has no places worth pointing at: all of its graph stands at its beginning.
+            let tree = Value::from_json(&read.graph, Place::new(source, 0, 0))
+                .map_err(|error| not_a_model(serde::de::Error::custom(error)))?;
+            let graph = document::declare(Document::new(source, tree), &mut diagnostics);
+            let plan = graph
+                .as_ref()
+                .and_then(|graph| compile_part(graph, wanted, &mut diagnostics).ok());
+            graph.zip(plan).ok_or_else(|| ModelError::Graph {
                 diagnostics: Box::new(diagnostics),
                 sources: Box::new(sources),
-            });
-        };
+            })
+        })?;
         let instances = plan.nodes.iter().map(PlannedNode::instance);
         let numbers: HashMap<_, _> = instances.zip(0..).collect();
         let (mut fitted, mut refused) = (Fitted::new(), Vec::new());
@@ -232,7 +256,7 @@ impl Model {
         }
         Ok(Self {
             graph,
-            plan: Arc::new(plan),
+            plan,
             fitted,
             card: read.card,
         })
@@ -318,7 +342,7 @@ impl Model {
             (Some(graph), Some(plan)) if !diagnostics.has_errors() => {
                 doubts.extend(diagnostics);
                 Ok(Self {
-                    graph,
+                    graph: Arc::new(graph),
                     plan: Arc::new(plan),
                     fitted: Fitted::new(),
                     card: None,
@@ -335,6 +359,19 @@ impl Model {
     #[must_use]
     pub fn sample_ranges(&self) -> &[SampleRange] {
         self.card.as_ref().map_or(&[], |card| &card.ranges)
+    }
+
+    /// How often samples come: [as given](Rates::given), else as in the data of the fit, as far as the card knows.
+    ///
+    /// # Errors
+    /// Where what was given is no time.
+    pub fn rates(&self, given: &[String]) -> Result<(Rates, bool), RateError> {
+        let names = self.plan.sources.iter().map(|source| &*source.name);
+        let signals: Vec<&str> = names.filter_map(|name| name.split('.').next()).collect();
+        let card = self.card.as_ref();
+        let mut usual = card.map_or_else(BTreeMap::new, |card| card.rates.clone());
+        usual.retain(|signal, _| signals.contains(&&**signal));
+        Rates::given(given, Rates::of_data(&usual))
     }
 
     /// The means of levels over the fit, as far as the card knows.

@@ -6,6 +6,7 @@ mod error;
 mod file;
 mod named;
 pub mod problem;
+mod shared;
 
 pub use card::{Card, DataCard, EstimatorCard, Period, content_of};
 pub use coefficients::{Coefficient, EstimatorParts, FittedEstimator, ProductFactor};

@@ -43,36 +43,53 @@ pub struct Passed {
     pub period: Option<(Instant, Instant)>,
 }
 
-/// Drives a source to its end. `look` sees each event that has been taken, before the next is asked for.
+/// Rows of a recording that are read before the first of them is stepped: what reads and what steps each find the caches of the processor
+/// as they left them.
+pub const AHEAD: usize = 16;
+
+/// Drives a source to its end, so many rows read at a time: one where each is to be answered before the next is there. `look` sees each
+/// event that has been taken, before the next is.
 ///
 /// # Errors
-/// When the source can give no more, an event cannot be taken, or `look` fails.
+/// When the source can give no more, an event cannot be taken, or `look` fails; the rows before it have been taken.
 pub fn drive<S: Steps, E: From<SourceError> + From<S::Error>>(
     steps: &mut S,
     source: &mut dyn Source,
+    ahead: usize,
     mut look: impl FnMut(&mut S, Event, &Samples) -> Result<(), E>,
 ) -> Result<Passed, E> {
-    let mut samples = Samples::default();
+    let mut rows = vec![Samples::default(); ahead.max(1)];
+    let mut read = Vec::with_capacity(rows.len());
     let mut passed = Passed {
         ticks: 0,
         segments: 1,
         period: None,
     };
-    while let Some(event) = source.next(&mut samples)? {
-        if !steps.take(event, &samples)? {
-            continue;
-        }
-        match event {
-            Event::Segment => passed.segments += 1,
-            Event::Row(time) => {
-                passed.ticks += 1;
-                let (from, to) = passed.period.unwrap_or((time, time));
-                passed.period = Some((from.min(time), to.max(time)));
+    loop {
+        for samples in &mut rows {
+            read.push(source.next(samples));
+            if !matches!(read.last(), Some(Ok(Some(_)))) {
+                break;
             }
         }
-        look(steps, event, &samples)?;
+        for (next, samples) in read.drain(..).zip(&rows) {
+            let Some(event) = next? else {
+                return Ok(passed);
+            };
+            if !steps.take(event, samples)? {
+                continue;
+            }
+            match event {
+                Event::Segment => passed.segments += 1,
+                Event::Row(time) => {
+                    passed.ticks += 1;
+                    let (from, to) = passed.period.unwrap_or((time, time));
+                    passed.period = Some((from.min(time), to.max(time)));
+                }
+            }
+            look(steps, event, samples)?;
+        }
     }
-    Ok(passed)
 }
 
 /// Drives a recording through an engine from its beginning to its end.
@@ -85,7 +102,7 @@ pub fn pass(
     mut look: impl FnMut(&Engine, Event, &Samples),
 ) -> Result<Passed, SourceError> {
     let mut source = recording.open(engine.plan())?;
-    drive(engine, &mut *source, |engine, event, samples| {
+    drive(engine, &mut *source, AHEAD, |engine, event, samples| {
         look(engine, event, samples);
         Ok(())
     })

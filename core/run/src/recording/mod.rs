@@ -6,7 +6,7 @@ mod source;
 mod table;
 mod thin;
 
-pub use drive::{Passed, Steps, drive, pass};
+pub use drive::{AHEAD, Passed, Steps, drive, pass};
 pub use source::{Event, Samples, Source, SourceError};
 pub use table::Table;
 pub use thin::{Left, ThinnedChannels, Thinner, Thinning, thin};

@@ -5,6 +5,7 @@
 //! simulated by its name from the command line and from the tests of graph files. [`Simulated`] is a recording of it,
 //! [`ClosedLoop`] the machine under the correction of a graph.
 
+mod change;
 mod closed_loop;
 mod faulty;
 mod individual;
@@ -14,6 +15,7 @@ mod registry;
 pub mod schedule;
 mod simulation;
 
+pub use change::{Change, ChangeError, Changing};
 pub use closed_loop::ClosedLoop;
 pub use faulty::Faulty;
 pub use individual::{Individual, Spread, SpreadError};
@@ -110,6 +112,8 @@ pub struct Setup {
     pub schedule: Option<Schedule>,
     /// Which machine of its type it is.
     pub individual: Individual,
+    /// What of it becomes another, of [machines that can change](Machine::can_change).
+    pub changes: Vec<Change>,
 }
 
 impl Default for Setup {
@@ -120,6 +124,7 @@ impl Default for Setup {
             seed: 1,
             schedule: None,
             individual: Individual::DESIGN,
+            changes: Vec::new(),
         }
     }
 }
@@ -131,6 +136,11 @@ pub enum SetupError {
     Days {
         /// What was asked for.
         days: f64,
+    },
+    /// The machine cannot change.
+    Unchanging {
+        /// The machine.
+        machine: &'static str,
     },
     /// The schedule sets something that the machine does not have.
     UnknownSetPoint {
@@ -153,6 +163,9 @@ impl fmt::Display for SetupError {
                 f,
                 "a recording of {days} days: the length must be above 0 and at most {LONGEST_DAYS} days"
             ),
+            Self::Unchanging { machine } => {
+                write!(f, "`{machine}` cannot change: leave `change` out")
+            }
             Self::UnknownSetPoint {
                 machine,
                 name,

@@ -49,6 +49,10 @@ impl<'a> Simulated<'a> {
     /// # Errors
     /// The machine refuses the setup, or a fault does not fit the machine.
     pub fn start(&self) -> Result<Box<dyn Simulation>, MachineError> {
+        if !(self.setup.changes.is_empty() || self.machine.can_change()) {
+            let machine = self.machine.name();
+            return Err(SetupError::Unchanging { machine }.into());
+        }
         let simulation = self.machine.start(&self.setup)?;
         if self.faults.is_empty() {
             return Ok(simulation);

@@ -79,6 +79,11 @@ pub trait Machine: Sync {
         None
     }
 
+    /// Whether it follows the [changes](Setup::changes) of a setup; where it does not, a setup with any is refused.
+    fn can_change(&self) -> bool {
+        false
+    }
+
     /// A simulation at time 0, settled as if the machine had stood there for half a day.
     ///
     /// # Errors

@@ -78,13 +78,13 @@ impl<'de> Deserialize<'de> for Cut {
 /// A fit on sums in place of rows.
 #[derive(Debug, Clone, Default, Args, Serialize, Deserialize, JsonSchema)]
 pub struct BlockOptions {
-    /// Fit on the sums of UTC days in place of rows (`day`), or of stretches of another length, such as `6h` where there are few days: folds
+    /// Fit on the sums of UTC days in place of rows (`day`), or of stretches of another length, such as `6h` where there are few days. Folds
     /// end with them, and windows at the beginning of one know the one before. For estimators that are fitted by least squares
     #[arg(long, value_name = "LENGTH")]
     #[serde(default)]
     #[schemars(with = "Option<String>")]
     pub blocks: Option<Cut>,
-    /// Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of the data only
+    /// Keep the blocks in this folder, of a fleet in a folder inside it for each machine. The next fit reads them, and of the data only
     /// what is new or changed
     #[arg(long, value_name = "FOLDER", requires = "blocks", conflicts_with_all = ["from", "to"])]
     pub keep_blocks: Option<PathBuf>,

@@ -32,7 +32,7 @@ pub use reading::{Joining, Reading, Times};
 /// Recorded data.
 #[derive(Debug, Args, Deserialize, JsonSchema)]
 pub struct Data {
-    /// CSV or JSON lines, or a folder of them; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given; files of different columns whose times overlap are merged by time; `journal:FOLDER` is what a service took, by its state folder, alone
+    /// CSV or JSON lines, or a folder of them. Several files of one clock are joined in the order of time. Those whose times start again are segments, in the order given. Files of different columns whose times overlap are merged by time. `journal:FOLDER` is what a service took, by its state folder, alone
     #[arg(long = "data", short = 'd', required = true, num_args = 1.., value_name = "FILE", value_parser = recording().map(Given::from))]
     #[serde(rename = "data")]
     #[schemars(with = "Vec<String>")]
@@ -189,6 +189,22 @@ impl Data {
         others.thinned = self.thinned.clone();
         others.lend(&self.tables);
         others
+    }
+
+    /// These data of a stretch of time alone.
+    #[must_use]
+    pub fn within(&self, from: Option<String>, to: Option<String>) -> Self {
+        let names = self.given.iter().map(|given| given.name.clone());
+        let mut within = self.others(names.collect());
+        within.reading.times = Times { from, to };
+        within
+    }
+
+    /// The rows that a fit up to a time has left out: these data from there on.
+    #[must_use]
+    pub fn rest(&self) -> Option<Self> {
+        let to = self.reading.times.to.clone()?;
+        Some(self.within(Some(to), None))
     }
 
     /// The data set.

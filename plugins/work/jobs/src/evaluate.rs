@@ -100,9 +100,16 @@ impl Evaluate {
             );
         }
         Ok(Found {
-            text: report::scores(&scores, &self.in_words()),
+            text: report::scores(&scores, &self.head(model)),
             facts,
         })
+    }
+
+    /// What goes out, and how it is scored where otherwise than usual.
+    fn head(&self, model: &Model) -> Vec<String> {
+        let outputs = report::outputs(&model.plan);
+        let outputs = outputs.map(|of| format!("{of}; the other rows are beside it"));
+        outputs.into_iter().chain(self.in_words()).collect()
     }
 
     /// How it is scored, where otherwise than usual.

@@ -82,13 +82,14 @@ fn of_leaps(faulty: &ChannelFaults, leaps: &Leaps) -> String {
     if faulty.of_truth {
         let then = match faulty.purpose {
             Purpose::Fit => {
-                "That is learned as drift: begin another file there and give all of them with `--segments`, or leave the rows of \
-                 the largest drifts out by `train.abs_truth`"
+                "That is no drift: truths whose window holds it are left out. Begin another file there and give all of them with \
+                 `--segments`, so that windows begin afresh"
             }
             Purpose::Scores => {
-                "That counts as drift: begin another file there and give all of them with `--segments`"
+                "That is no drift: truths whose window holds it are not scored. Begin another file there and give all of them with \
+                 `--segments`, so that windows begin afresh"
             }
-            Purpose::Run => "That was taken for drift",
+            Purpose::Run => "That is no drift: nothing was learned of truths whose window holds it",
         };
         return format!("was it moved, or zeroed anew? {then}");
     }

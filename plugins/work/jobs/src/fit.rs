@@ -22,7 +22,7 @@ use crate::Threads;
 use crate::blocks::{BlockOptions, OfFiles, Sums};
 use crate::data::Data;
 use crate::faults::{self, ChannelFaults, FaultWatch, Purpose};
-use crate::remarks;
+use crate::{noise, remarks};
 use athermal_analysis::figures::{count, counted, number, paragraph, table};
 use athermal_command::numbers;
 use athermal_core::failure::Failure;
@@ -156,6 +156,8 @@ pub struct FitOutcome {
     pub bare: Vec<BareOutput>,
     /// What is wrong with channels.
     pub faults: Vec<ChannelFaults>,
+    /// The warnings of fits that are better than the noise of their truths allows.
+    pub below_noise: Vec<Message>,
     /// What was met in each file that was read.
     pub files: Vec<(String, Report)>,
     /// Blocks that were kept although their rows are gone.
@@ -187,7 +189,9 @@ impl FitOutcome {
                 progress.doing(format!("fitting `{node}`, order {nth} of {of}"));
             }
         });
-        Ok(Self::with(plan, fitted?, watch.found()))
+        let mut outcome = Self::with(plan, fitted?, watch.found());
+        outcome.below_noise = noise::warnings(rows, plan, &outcome.fitted, &outcome.report);
+        Ok(outcome)
     }
 
     /// One of a fit that was made, with what is wrong with channels of its rows.
@@ -202,6 +206,7 @@ impl FitOutcome {
             fitted,
             report,
             faults,
+            below_noise: Vec::new(),
             files: Vec::new(),
             lost: Vec::new(),
         }
@@ -250,6 +255,7 @@ impl FitOutcome {
             all.push(words.into());
         }
         all.extend(faults::messages(&self.faults));
+        all.extend(self.below_noise.iter().cloned());
         all
     }
 
@@ -386,6 +392,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     };
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),
+        (fit.dropped.leapt, "over a leap"),
         (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];

@@ -13,7 +13,8 @@ use crate::data::{Data, Joining, Reading};
 use crate::path::new_log;
 use athermal_core::failure::Failure;
 use athermal_files::Tables;
-use athermal_starter::{NoStarter, Request, Starter, starter};
+pub use athermal_starter::Starter;
+use athermal_starter::{NoStarter, Request, starter};
 
 /// What is known of logs that a starter graph is written for.
 #[derive(Debug, Args, Deserialize, JsonSchema)]
@@ -35,6 +36,14 @@ pub struct Init {
     #[arg(long, num_args = 1.., value_name = "COLUMN")]
     #[serde(default)]
     drifts: Vec<String>,
+    /// Columns that are inputs although they seem to repeat what drifts, or to count
+    #[arg(long, num_args = 1.., value_name = "COLUMN")]
+    #[serde(default)]
+    keep: Vec<String>,
+    /// The columns of what a correction applied, beside those that are called so
+    #[arg(long, num_args = 1.., value_name = "COLUMN")]
+    #[serde(default)]
+    applied: Vec<String>,
     /// How the text is laid out where that is not found, as `[table]` of a graph says it: skip=2 names=1 separator=; decimal=,
     #[arg(long, num_args = 1.., value_name = "KEY=VALUE")]
     #[serde(default)]
@@ -62,6 +71,8 @@ impl Init {
             time: self.time.clone(),
             format: self.time_format.clone(),
             drifting: self.drifts.clone(),
+            keep: self.keep.clone(),
+            applied: self.applied.clone(),
             table: self.table()?,
         };
         let data = self.data();

@@ -29,6 +29,7 @@ pub mod faults;
 pub mod fit;
 pub mod init;
 pub mod model;
+mod noise;
 pub mod path;
 pub mod predict;
 pub mod refused;

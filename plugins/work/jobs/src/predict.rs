@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use athermal_analysis::diagnosis::feedback;
 use athermal_core::failure::{Failure, outside};
 use athermal_core::watch::Watch;
 use athermal_run::live::{Sink, run};
@@ -38,9 +37,6 @@ impl Predict {
         check_fitted(model, name)?;
         warn_unfitted(host, model, name);
         warn_without_novelty(host, model, name);
-        if let Some(words) = feedback::in_words(&model.plan) {
-            host.warning(words);
-        }
         let mut engine = model.engine()?;
         engine.freeze(self.frozen);
         self.data.check_offsets(&[])?;

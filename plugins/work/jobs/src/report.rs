@@ -4,8 +4,7 @@ use athermal_core::watch::Watch;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use athermal_analysis::diagnosis::feedback;
-use athermal_analysis::report::{Facts, gather, text};
+use athermal_analysis::report::{Facts, gather, outputs, text};
 use athermal_core::engine::SampleRange;
 use athermal_run::fit::FitError;
 use athermal_run::model::Model;
@@ -52,9 +51,6 @@ impl Report {
             &course.rejected,
         );
         self.data.warn_fitted_on(host, model, course.period_s);
-        if let Some(message) = feedback::in_words(&model.plan) {
-            host.warning(message);
-        }
         let fell_back = FellBack::warnings(&facts.fell_back);
         for message in Lack::warnings(&facts.lacks).into_iter().chain(fell_back) {
             host.warning(message);
@@ -83,7 +79,7 @@ impl Report {
             json[key] = found;
         }
         let found = Found {
-            text: text(&facts),
+            text: outputs(&model.plan).map_or_else(String::new, |of| of + "\n\n") + &text(&facts),
             facts: json,
         };
         Ok((found, facts))

@@ -12,8 +12,8 @@ use athermal_core::watch::{Progress, Watch};
 use athermal_simulation::{Disturbance, disturbed, table_columns};
 use athermal_trial::fault::FaultSpec;
 use athermal_trial::machine::{
-    ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation,
-    Spread,
+    Change, ClosedLoop, Individual, KnownMachine, Machine, Row, Schedule, Setup, Simulated,
+    Simulation, Spread,
 };
 use clap::Args;
 use schemars::JsonSchema;
@@ -50,8 +50,8 @@ pub struct Simulate {
     pub seed: u64,
     /// One machine of a fleet: its parameters lie around those of the design, by so much
     ///
-    /// Expansion, conductivity and heat capacity of each body, its skin, joints and views, the time constant of the chuck, the power of
-    /// motors and creep are each multiplied with exp(SPREAD n), `n` standard normal: a log-normal distribution. Sensors of temperature
+    /// Each parameter is multiplied with exp(SPREAD n), `n` standard normal: a log-normal distribution. These are expansion, conductivity
+    /// and heat capacity of each body, its skin, joints and views, the time constant of the chuck, the power of motors, and creep. Sensors of temperature
     /// have offsets of SPREAD times 0.5 K. Measures are those of the drawing. 0% is the design.
     #[arg(long, default_value = "0%", requires = "machine")]
     #[serde(default = "of_design", deserialize_with = "by_text")]
@@ -92,6 +92,12 @@ pub struct Simulate {
     #[serde(default, rename = "disturb", deserialize_with = "all_by_text")]
     #[schemars(with = "Vec<String>")]
     disturbances: Vec<Disturbance>,
+    /// The machine becomes another for good: `expansion=30%@2d`, `contact` (of joints), `load` (of motors), `season=4 K@2d..9d`
+    ///
+    /// `@2d` is a step two days after the start, `@2d..5d` a ramp. Comments at the beginning of a CSV file say what was changed.
+    #[arg(long = "change", value_name = "SPEC", requires = "machine")]
+    #[serde(default, rename = "change")]
+    pub changes: Vec<Change>,
 }
 
 /// Takes a row, by its time in ns and its values.
@@ -215,6 +221,7 @@ impl Simulate {
                 spread: self.spread,
                 seed: self.machine_seed,
             },
+            changes: self.changes.clone(),
         })
     }
 

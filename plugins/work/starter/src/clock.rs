@@ -1,6 +1,6 @@
 //! Decides which column of a log gives the time, or which two, and in which form.
 
-use athermal_core::time::{Duration, TimeColumns, TimeFormat};
+use athermal_core::time::{Duration, Instant, TimeColumns, TimeFormat};
 use athermal_files::{
     Description, NumberForm, TimeColumn, TimeForm, is_time_of_day, zone_in_name, zone_of,
 };
@@ -9,7 +9,7 @@ use super::dates::{self, Dates};
 use super::name::{ends_in_unit, words};
 use super::texts::Texts;
 use super::time_form;
-use athermal_analysis::figures::{number, time};
+use athermal_analysis::figures::{exact, number, time};
 
 /// The time of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +82,45 @@ impl Clock {
             return self.length(seconds);
         }
         time(seconds)
+    }
+
+    /// The time at which the last fifth of a log begins, as `--from` and `--to` take it; none where the log is too short for that.
+    #[must_use]
+    pub fn last_fifth(&self, (first, last): (i64, i64)) -> Option<String> {
+        const MINUTE_NS: i128 = 60_000_000_000;
+        let (from, length) = (i128::from(first), i128::from(last) - i128::from(first));
+        let (unit, origin) = match self.form {
+            TimeForm::Numbers { ns_per_unit } => (i128::from(ns_per_unit), 0),
+            TimeForm::Samples { step_ns } => (i128::from(step_ns), 0),
+            TimeForm::Since {
+                ns_per_unit,
+                origin_ns,
+            } => (i128::from(ns_per_unit), origin_ns),
+            _ if length > 3000 * MINUTE_NS => (60 * MINUTE_NS, 0),
+            _ if length > 100 * MINUTE_NS => (MINUTE_NS, 0),
+            _ => (1_000_000_000, 0),
+        };
+        // A round number of the log's own units, of which a fifth has many.
+        let mut step = unit;
+        let is_number = matches!(
+            self.form,
+            TimeForm::Numbers { .. } | TimeForm::Since { .. } | TimeForm::Samples { .. }
+        );
+        while step > length / 100 && step % 10 == 0 && is_number && !self.counts_samples() {
+            step /= 10;
+        }
+        while step * 10 <= length / 100 && is_number {
+            step *= 10;
+        }
+        let at = (from + length * 4 / 5 + origin).div_euclid(step) * step - origin;
+        let at = i64::try_from(at)
+            .ok()
+            .filter(|at| (first + 1..=last).contains(at))?;
+        let text = self.column().write(Instant::from_ns(at));
+        Some(match text.is_empty() {
+            true => exact(at as f64 / 1e9),
+            false => text,
+        })
     }
 
     pub(super) fn dated(columns: TimeColumns, dates: Dates) -> Self {

@@ -16,6 +16,8 @@ pub enum Kind {
     Drifting,
     /// Something else that may explain a drift, such as the power of a heater.
     Drive,
+    /// What a correction applied to what drifts.
+    Applied,
     /// Left out.
     Unused,
 }
@@ -39,6 +41,8 @@ pub struct Column {
     guess: Guess,
     /// What its name alone says.
     named: Guess,
+    /// The column, by number, of what a correction applied to it.
+    pub applied: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,13 +50,16 @@ enum Guess {
     Temperature,
     Position,
     Drive,
+    /// What a correction applied.
+    Applied,
     /// The air or the pressure around it.
     Ambient,
     Other,
     Unused,
 }
 
-const SET_POINTS: &str = "target setpoint set sp goal";
+const SET_POINTS: &str =
+    "target setpoint set sp goal cmd command commanded demand demanded requested soll sollwert";
 const TEMPERATURES: &str = "t temp temperature tc";
 const FACTORS: &str = "scale gain factor ratio coefficient coeff";
 const DRIVES: &str = "drive voltage heater lamp power current duty pwm input speed rpm bat batt battery batterie vbat supply akku";
@@ -74,6 +81,7 @@ impl Column {
             Kind::Temperature => "temperature",
             Kind::Drifting => "drifts",
             Kind::Drive => "input",
+            Kind::Applied => "applied",
             Kind::Unused => return Some(format!("{}: left out, {}", self.called(), self.why)),
         };
         let unit = if self.unit_known { "" } else { " (a guess)" };
@@ -109,6 +117,7 @@ impl Column {
             Kind::Temperature => "temperature",
             Kind::Drifting => "drifting",
             Kind::Drive => "input",
+            Kind::Applied => "applied",
             Kind::Unused => "left_out",
         };
         let used = self.kind != Kind::Unused;
@@ -143,6 +152,13 @@ impl Column {
     pub fn is_measured(&self) -> bool {
         let unit = Unit::parse(&self.unit).ok().filter(|_| self.unit_known);
         unit.is_some_and(|unit| measures(&unit, "K") || measures(&unit, "m"))
+    }
+
+    /// Whether its unit is that of a length, an angle or a number, so that it may be another reading of a position.
+    #[must_use]
+    pub fn may_be_a_reading(&self) -> bool {
+        let unit = Unit::parse(&self.unit).ok();
+        unit.is_some_and(|unit| ["m", "rad", "1"].iter().any(|of| measures(&unit, of)))
     }
 
     /// How little its name and unit speak for a position: lengths come before what is called one, that before what has a unit, as a
@@ -288,7 +304,10 @@ fn guess(name: &str, below: &str) -> Column {
     let is_no_position = unit.is_some_and(|unit| unit.text() == "km" || unit.text().contains('/'));
     let measures = |what: &str| unit.is_some_and(|unit| measures(unit, what));
     let is_number = unit.is_none_or(is_count);
-    let (guess, why) = if has(SET_POINTS) {
+    let may_be_applied = unit.is_none_or(is_count) || measures("m") || measures("rad");
+    let (guess, why) = if has("applied") && may_be_applied && !temp_named {
+        (Guess::Applied, "what a correction applied")
+    } else if has(SET_POINTS) {
         (
             Guess::Unused,
             "a set point, which says what was asked for and not what was",
@@ -314,7 +333,7 @@ fn guess(name: &str, below: &str) -> Column {
     };
     let fallback = match guess {
         Guess::Temperature => "Cel",
-        Guess::Position => "um",
+        Guess::Position | Guess::Applied => "um",
         _ => "1",
     };
     Column {
@@ -335,6 +354,7 @@ fn guess(name: &str, below: &str) -> Column {
         unit_known: unit.is_some(),
         guess,
         named: guess,
+        applied: None,
     }
 }
 
@@ -353,7 +373,8 @@ fn spelt(unit: &Unit) -> &str {
 /// # Errors
 /// A text that says what is missing.
 pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
-    for name in &request.drifting {
+    let named = [&request.drifting, &request.keep, &request.applied];
+    for name in named.into_iter().flatten() {
         let Some(column) = columns.iter_mut().find(|column| column.name == *name) else {
             let known: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
             return Err(format!(
@@ -361,8 +382,11 @@ pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
                 known.join(", ")
             ));
         };
-        if column.guess == Guess::Unused {
+        if column.guess == Guess::Unused && request.drifting.contains(name) {
             return Err(format!("`{name}` cannot drift: {}", column.why));
+        }
+        if request.applied.contains(name) {
+            (column.guess, column.why) = (Guess::Applied, "as you say".to_owned());
         }
     }
     let has = |columns: &[Column], guess| columns.iter().any(|column| column.guess == guess);
@@ -396,12 +420,14 @@ pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
             _ if drifts => Kind::Drifting,
             Guess::Temperature => Kind::Temperature,
             Guess::Drive | Guess::Ambient | Guess::Other => Kind::Drive,
-            Guess::Position => Kind::Unused,
+            Guess::Position | Guess::Applied => Kind::Unused,
         };
         if drifts && request.drifting.is_empty() {
             column.why.push_str(why);
         } else if drifts {
             column.why = "as you say".to_owned();
+        } else if column.guess == Guess::Applied {
+            column.why = format!("{}, and to no position that drifts", column.why);
         } else if column.guess == Guess::Position {
             column.why = "you say that something else drifts".to_owned();
         } else if column.kind == Kind::Drive {
@@ -409,6 +435,7 @@ pub fn assign(columns: &mut [Column], request: &Request) -> Result<(), String> {
         }
     }
     one_quantity(columns, request)?;
+    pair_applied(columns, request)?;
     let names = |kind| -> Vec<&str> {
         let of_kind = columns.iter().filter(|column| column.kind == kind);
         of_kind.map(|column| column.name.as_str()).collect()
@@ -487,6 +514,71 @@ fn one_quantity(columns: &mut [Column], request: &Request) -> Result<(), String>
         ));
     }
     Ok(())
+}
+
+/// The words of a name that say of which axis it is.
+fn axis_of(name: &str) -> Vec<String> {
+    let is_aside = |word: &String| word == "applied" || Unit::parse(word).is_ok();
+    let words = words(name).into_iter().map(|word| word.to_lowercase());
+    words.filter(|word| !is_aside(word)).collect()
+}
+
+/// Finds to what a correction was applied: by the rest of the name, or where one axis drifts and one was corrected.
+fn pair_applied(columns: &mut [Column], request: &Request) -> Result<(), String> {
+    let of = |columns: &[Column], is_one: &dyn Fn(&Column) -> bool| -> Vec<usize> {
+        (0..columns.len())
+            .filter(|&nth| is_one(&columns[nth]))
+            .collect()
+    };
+    let drifting = of(columns, &|of| of.kind == Kind::Drifting);
+    let applied = of(columns, &|of| of.guess == Guess::Applied);
+    for &nth in &drifting {
+        let axis = axis_of(&columns[nth].name);
+        let same = applied
+            .iter()
+            .find(|&&of| axis_of(&columns[of].name) == axis);
+        let only = applied
+            .first()
+            .filter(|_| drifting.len() == 1 && applied.len() == 1);
+        let Some(&found) = same.or(only) else {
+            continue;
+        };
+        let name = columns[nth].name.clone();
+        if !columns[found].is_same_quantity(&columns[nth])
+            && columns[found].unit_known
+            && columns[nth].unit_known
+        {
+            return Err(format!(
+                "`{}` is in {} and cannot have been applied to `{name}`, in {}; name what was with --applied",
+                columns[found].name, columns[found].unit, columns[nth].unit
+            ));
+        }
+        if !columns[found].unit_known {
+            columns[found].unit = columns[nth].unit.clone();
+        }
+        columns[nth].applied = Some(found);
+        columns[found].kind = Kind::Applied;
+        columns[found].why = format!(
+            "what a correction applied to {name}, which is taken as it would have been without"
+        );
+    }
+    let lost = request.applied.iter().find(|name| {
+        columns
+            .iter()
+            .any(|of| of.name == **name && of.kind != Kind::Applied)
+    });
+    match lost {
+        Some(name) => Err(format!(
+            "to which of {} `{name}` was applied its name does not say; rename it, such as to `{}_applied`",
+            drifting
+                .iter()
+                .map(|&of| &*columns[of].name)
+                .collect::<Vec<_>>()
+                .join(", "),
+            drifting.first().map_or("X", |&of| &columns[of].name)
+        )),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod clock;
 mod column;
 mod dates;
 mod dropped;
+mod follows;
 mod group;
 mod layout;
 mod machines;
@@ -18,6 +19,7 @@ mod text;
 mod texts;
 mod time_form;
 mod undecided;
+mod weighed;
 mod window;
 
 pub use dates::WITHOUT_ZONE;
@@ -46,6 +48,10 @@ pub struct Request {
     pub format: Option<TimeFormat>,
     /// The columns that drift.
     pub drifting: Vec<String>,
+    /// The columns that are inputs although they seem to repeat what drifts, or to count.
+    pub keep: Vec<String>,
+    /// The columns of what a correction applied, beside those that are called so.
+    pub applied: Vec<String>,
     /// How the text of the log is laid out, as far as it is declared.
     pub table: TableFormat,
 }
@@ -61,6 +67,10 @@ pub struct Starter {
     pub columns: Value,
     /// The signal to noise of each drift against its window, for programs.
     pub windows: Value,
+    /// What the graph puts out, for people.
+    pub outputs: String,
+    /// When the last fifth of the log begins, as `--from` and `--to` take it; none where its times start again.
+    pub last_fifth: Option<String>,
 }
 
 /// Why there is no starter graph for a log.
@@ -301,9 +311,13 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
             in_segments.segments
         ));
         (survey, tables) = (in_segments, by_segments);
+        let of_segments = columns.iter_mut().find(|of| of.name == column);
+        if let Some(column) = of_segments {
+            column.leave_out("it says which segment a row is of");
+        }
     }
     remarks.extend(survey.dropped.iter().cloned());
-    survey.judge(&mut columns);
+    survey.judge(&mut columns, &request.keep);
     let mut dropped = survey.dropped.clone();
     dropped.extend(again.map(|(line, names)| {
         format!(
@@ -319,10 +333,12 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     let unfit = |why| NoStarter::of(data, [vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, request).map_err(&unfit)?;
     survey.leave_out_placeholders(&mut columns);
+    survey.take_back(&columns);
     survey.take_changes(&mut columns, &clock);
     survey.leave_out_slow(&mut columns, &clock, request);
     survey.leave_out_faults(&mut columns);
     survey.hold_rare(&mut columns);
+    follows::leave_out(&survey, &mut columns, &request.keep);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     remarks.extend(apart);
     let choice = Choice::of(&survey, &columns);
@@ -336,6 +352,8 @@ pub fn starter(data: &Dataset, request: &Request) -> Result<Starter, NoStarter> 
     Ok(Starter {
         text: text::graph(data.paths(), (&clock, &tables), &columns, &survey, &choice),
         remarks,
+        outputs: choice.outputs(&clock),
+        last_fifth: survey.period_ns.and_then(|of| clock.last_fifth(of)),
         windows: choice.facts(&columns),
         columns: columns_taken,
     })

@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 
 use athermal_core::document::TableBase;
+use athermal_core::unit::Unit;
 use athermal_files::{
     CellFault, ChannelColumn, Dataset, Event, FileError, Layout, Row, TimeForm, has_clock,
 };
@@ -33,6 +34,8 @@ pub struct Survey {
     out_of_order: u64,
     /// How many segments there are.
     pub segments: u64,
+    /// The times of the first row and of the last, where no segment begins between them.
+    pub period_ns: Option<(i64, i64)>,
 }
 
 /// The values of one column.
@@ -172,26 +175,32 @@ impl Series {
         self.gaps = OnceCell::new();
     }
 
-    /// Whether it only counts rows, or the time: whole numbers that rise by the same step in nearly each row, by several where rows are
-    /// missing, and may start again; or what grows as evenly as the time does.
+    /// Whether it only counts rows, the time or the like: whole numbers that rise by the same step in nearly each row, by several where rows
+    /// are missing, and may start again; that rise a hundred times before they start again, if ever; or what grows as evenly as the time does.
     fn counts(&self) -> bool {
         let steps = || self.values.windows(2).map(|pair| pair[1] - pair[0]);
         let mut sorted: Vec<f64> = steps().collect();
         sorted.sort_by(f64::total_cmp);
-        let Some(&usual) = sorted.get(sorted.len() / 2).filter(|step| **step != 0.0) else {
-            return false;
-        };
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
         let is_most = |such: usize, of_hundred: usize| such * 100 >= sorted.len() * of_hundred;
         if self.values.iter().all(|value| value.fract() == 0.0) {
             let same = steps().filter(|step| *step == usual).count();
-            let least = self.extremes().0;
+            let (least, most) = self.extremes();
+            let begins = |value: f64, share: f64| value <= least + share;
             let goes_on = |pair: &&[f64]| {
                 let times = (pair[1] - pair[0]) / usual;
-                times >= 1.0 && times.fract() == 0.0 || pair[1] <= least + 2.0 * usual.abs()
+                times >= 1.0 && times.fract() == 0.0 || begins(pair[1], 2.0 * usual.abs())
             };
             let falls = steps().filter(|step| step * usual < 0.0).count();
             let regular = self.values.windows(2).filter(goes_on).count();
-            return is_most(same, 50) && is_most(regular, 95) && falls * 5 <= sorted.len();
+            let rises = steps().filter(|step| *step > 0.0).count();
+            let falling = || self.values.windows(2).filter(|pair| pair[1] < pair[0]);
+            let starts_again = falling().all(|pair| begins(pair[1], 0.02 * (most - least)));
+            return usual != 0.0
+                && is_most(same, 50)
+                && is_most(regular, 95)
+                && falls * 5 <= sorted.len()
+                || starts_again && rises >= 100 * (falling().count() + 1);
         }
         let (Some(first), Some(last)) = (self.time_s.first(), self.time_s.last()) else {
             return false;
@@ -242,6 +251,21 @@ impl Series {
         (before - self.values.len()) as u64
     }
 
+    /// The values at instants that rise, each the last one before, as long as it counts; NaN where there is none.
+    #[must_use]
+    pub fn at(&self, instants: &[f64]) -> Vec<f64> {
+        let oldest = 3.0 * self.gap(0.9).unwrap_or(0.0);
+        let mut next = 0;
+        let value = |&instant: &f64| {
+            next += self.time_s[next..].partition_point(|time_s| *time_s <= instant);
+            match next.checked_sub(1) {
+                Some(last) if instant - self.time_s[last] <= oldest => self.values[last],
+                _ => f64::NAN,
+            }
+        };
+        instants.iter().map(value).collect()
+    }
+
     /// The smallest and the largest value.
     #[must_use]
     pub fn extremes(&self) -> (f64, f64) {
@@ -277,6 +301,7 @@ impl Survey {
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
         let (mut segments, mut before_s, mut begins_s) = (1, 0.0, 0.0);
+        let mut begins_ns = None;
         loop {
             match recording.next_into(&mut row)? {
                 Event::Row => {}
@@ -289,6 +314,7 @@ impl Survey {
                 Event::End => break,
             }
             let first = *first.get_or_insert(row.time_ns);
+            begins_ns.get_or_insert(row.time_ns);
             last = row.time_ns;
             rows += 1;
             let time_s = begins_s + (row.time_ns - first) as f64 / 1e9;
@@ -336,6 +362,9 @@ impl Survey {
             has_broken_rows: reports().any(|report| report.refused_rows.count > 0),
             out_of_order: reports().map(|report| report.refused_time.count).sum(),
             segments,
+            period_ns: begins_ns
+                .filter(|_| segments == 1)
+                .map(|first| (first, last)),
         })
     }
 
@@ -379,7 +408,7 @@ impl Survey {
     }
 
     /// Leaves out the columns that say nothing, and warns of cells that cannot be read in those that stay.
-    pub fn judge(&self, columns: &mut [Column]) {
+    pub fn judge(&self, columns: &mut [Column], keep: &[String]) {
         for (series, column) in self.series.iter().zip(columns) {
             let (low, high) = series.extremes();
             let values = series.values.len();
@@ -425,10 +454,11 @@ impl Survey {
                 ));
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));
-            } else if !column.is_measured() && series.counts() {
-                column.leave_out(
-                    "it rises by the same step in nearly each row, and so counts rows or the time, and nothing of the machine".to_owned(),
-                );
+            } else if !column.is_measured() && !keep.contains(&column.name) && series.counts() {
+                column.leave_out(format!(
+                    "it only rises, and so counts rows, the time or the like, and nothing of the machine; --keep {} takes it all the same",
+                    column.name
+                ));
             } else if series.unreadable > 0 {
                 let (cells, all) = (counted(series.unreadable, "cell"), count(cells));
                 let such = if series.unreadable > 1 {
@@ -440,6 +470,28 @@ impl Survey {
                     "{cells} of {all} cannot be read{such} {example}; taken as missing"
                 ));
             }
+        }
+    }
+
+    /// Takes what drifts as it would have been without what a correction applied; where that is not known there is no value.
+    pub fn take_back(&mut self, columns: &[Column]) {
+        for (nth, column) in columns.iter().enumerate() {
+            let Some(applied) = column.applied else {
+                continue;
+            };
+            let units = Unit::parse(&columns[applied].unit)
+                .ok()
+                .zip(Unit::parse(&column.unit).ok());
+            let factor = units
+                .and_then(|(from, to)| from.factor_to(&to))
+                .unwrap_or(1.0);
+            let applied = self.series[applied].at(&self.series[nth].time_s);
+            let series = &self.series[nth];
+            let rows = series.time_s.iter().zip(&series.values).zip(applied);
+            let rows: Vec<(f64, f64)> = rows
+                .map(|((at, value), applied)| (*at, value - factor * applied))
+                .collect();
+            self.series[nth].replace(rows.into_iter().filter(|(_, value)| value.is_finite()));
         }
     }
 
@@ -469,9 +521,7 @@ impl Survey {
             let left_out = series.keep(|of| !is_temperature || (lowest..=highest).contains(&of));
             column.warn(match left_out {
                 0 if drifts => {
-                    format!(
-                        "it {leaps}: was it moved, or zeroed anew? That would be learned as drift"
-                    )
+                    format!("it {leaps}: was it moved, or zeroed anew? Drifts over it are left out")
                 }
                 0 => format!("it {leaps}: did the sensor fail?"),
                 n => format!(

@@ -1,5 +1,8 @@
 //! Decides how the starter graph is written: every guess beside its reason, so that it can be corrected.
 
+mod corrected;
+mod unit;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -20,6 +23,10 @@ const FEWEST_SENSORS: usize = 4;
 
 /// Of two sensors that differ, neither is known to be wrong.
 const FEWEST_CHECKED: usize = 3;
+
+/// What learns speaks after twenty windows of truth at the earliest. A log of fewer windows than so many is too short for it, and for the past
+/// of the drift as a voter.
+const FEWEST_WINDOWS_TO_LEARN: f64 = 100.0;
 
 /// Of more segments, neighbours make up one fold.
 const MOST_FOLDS: u64 = 10;
@@ -47,6 +54,7 @@ pub fn graph(
         temperatures: groups(columns, Kind::Temperature, "temperature"),
         drives: groups(columns, Kind::Drive, "input"),
         drifting: groups(columns, Kind::Drifting, drifting_name(columns)),
+        applied: groups(columns, Kind::Applied, "applied"),
     };
     let mut text = String::new();
     let _ = writeln!(
@@ -69,6 +77,7 @@ pub fn graph(
         lay_out(&heading, table, &mut text);
     }
     writer.signals(&mut text);
+    writer.uncorrected(&mut text);
     match &choice.levels {
         Some(why) => writer.levels(why, &mut text),
         None => {
@@ -102,6 +111,7 @@ struct Writer<'a> {
     temperatures: Vec<Group>,
     drives: Vec<Group>,
     drifting: Vec<Group>,
+    applied: Vec<Group>,
 }
 
 impl Writer<'_> {
@@ -175,6 +185,7 @@ impl Writer<'_> {
             .iter()
             .chain(&self.drives)
             .chain(&self.drifting)
+            .chain(&self.applied)
         {
             let members = || {
                 group
@@ -271,17 +282,18 @@ impl Writer<'_> {
         let _ = writeln!(text, "\n# {why}.\n# So levels are predicted, not slopes.");
         let many = self.drifting.len() > 1;
         for group in &self.drifting {
+            let is_corrected = |nth: &usize| self.columns[*nth].applied.is_some();
+            let signal = match group.columns.iter().all(is_corrected) {
+                true => "uncorrected",
+                false => &group.signal,
+            };
             let (node, each, truth) = match group.channels.as_slice() {
-                [one] if !many => ("level".to_owned(), "", format!("{}.{one}", group.signal)),
-                [one] => (
-                    format!("level-{one}"),
-                    "",
-                    format!("{}.{one}", group.signal),
-                ),
+                [one] if !many => ("level".to_owned(), "", format!("{signal}.{one}")),
+                [one] => (format!("level-{one}"), "", format!("{signal}.{one}")),
                 _ => (
                     "level".to_owned(),
                     "each = \"axis\"\n",
-                    format!("{}.{{axis}}", group.signal),
+                    format!("{signal}.{{axis}}"),
                 ),
             };
             let _ = writeln!(
@@ -325,6 +337,9 @@ impl Writer<'_> {
             let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
             let mark = match (*width_s == self.choice.drift_s, self.choice.enough) {
                 (false, _) => String::new(),
+                _ if self.choice.weighed.better_s.is_some() => {
+                    "  <- chosen: its fit explains most".to_owned()
+                }
                 (_, true) => format!("  <- chosen: the narrowest with {ENOUGH} on half of them"),
                 (_, false) => format!("  <- chosen: the highest, though below {ENOUGH}"),
             };
@@ -335,8 +350,10 @@ impl Writer<'_> {
                 ratios.join("  ")
             );
         }
-        if let Some(bound) = &self.choice.bound {
-            let _ = writeln!(text, "# ({})", bound.text(self.clock));
+        let more = self.choice.explains(self.clock);
+        let bound = self.choice.bound.iter().map(|of| of.text(self.clock));
+        for remark in more.into_iter().chain(bound) {
+            let _ = writeln!(text, "# ({remark})");
         }
         let _ = writeln!(
             text,
@@ -346,7 +363,7 @@ impl Writer<'_> {
                 "[nodes.drift]",
                 &format!("what is predicted: the slope over the last {width}")
             ),
-            names(&self.drifting),
+            self.drifts(),
             toml_string(&self.drift_unit()),
         );
         for group in self.temperatures.iter().filter(|of| self.is_checked(of)) {
@@ -396,46 +413,6 @@ impl Writer<'_> {
         }
     }
 
-    /// The unit of the drift: of the signal by a prefix and a time in which it is neither tiny nor huge.
-    fn drift_unit(&self) -> String {
-        let Some(unit) = self
-            .drifting
-            .first()
-            .and_then(|group| Unit::parse(&group.unit).ok())
-        else {
-            return "1/min".to_owned();
-        };
-        let spread = self.largest(&self.choice.spread);
-        let difference = unit.difference();
-        let smaller = match difference.text() {
-            "m" | "mm" | "um" | "[in_i]" | "[mil_i]" | "10*-6.[in_i]" => {
-                &["nm", "um", "mm", "m"][..]
-            }
-            "K" => &["mK", "K"],
-            "V" => &["mV", "V"],
-            _ => &[],
-        };
-        let own = [difference.text()];
-        let candidates = if smaller.is_empty() {
-            &own[..]
-        } else {
-            smaller
-        };
-        let period = if self.choice.drift_s >= 3600.0 && !self.clock.counts_samples() {
-            "h"
-        } else {
-            "min"
-        };
-        let per_s = Unit::second();
-        let fits = |name: &&&str| {
-            let to = Unit::parse(&format!("{name}/{period}")).ok()?;
-            let factor = difference.per(&per_s).factor_to(&to)?;
-            Some((1.0..1000.0).contains(&(spread * factor)))
-        };
-        let chosen = candidates.iter().find(|name| fits(name) == Some(true));
-        format!("{}/{period}", chosen.copied().unwrap_or(difference.text()))
-    }
-
     /// What is made of the channels for which `is_of` holds, by their number among all that may explain the drift.
     fn regressors(&self, is_of: impl Fn(usize) -> bool) -> String {
         // What a heater does follows from how strong it is and not only from how it changes.
@@ -482,49 +459,65 @@ impl Writer<'_> {
             let folds = format!("{by}, folds = {{ type = \"segments\", count = {count} }}");
             module = module.replace(by, &folds);
         }
-        let halves = if has_halves {
-            text.push_str(&module);
+        let learns = self.survey.duration_s >= FEWEST_WINDOWS_TO_LEARN * drift_s;
+        let is_written = |part: &&str| {
+            (has_halves || !part.contains(".half-")) && (learns || !part.contains(".learner]"))
+        };
+        let parts: Vec<&str> = module.split("\n\n").filter(is_written).collect();
+        let mut module = parts.join("\n\n");
+        for (is_there, voters) in [
+            (has_halves, ", \"half-1\", \"half-2\""),
+            (learns, ", \"learner\""),
+        ] {
+            if !is_there {
+                module = module.replace(voters, "");
+            }
+        }
+        text.push_str(&module);
+        let halves = || {
             let [one, other] = [0, 1].map(|half| self.regressors(|number| number % 2 == half));
             format!("half-1 = {one}\nhalf-2 = {other}\n")
-        } else {
-            let parts = module.split("\n\n").filter(|part| !part.contains(".half-"));
-            let module = parts.collect::<Vec<_>>().join("\n\n");
-            text.push_str(&module.replace(", \"half-1\", \"half-2\"", ""));
-            String::new()
         };
+        let halves = has_halves.then(halves).unwrap_or_default();
         let none = self.clock.length(0.0);
-        for (node, ahead, first_lag, why) in [
-            ("now", &none, 1, "a virtual sensor: the drift of the last"),
-            ("next", &width, 0, "a forecast: the drift of the next"),
+        let lags = |first: i32| {
+            let lag = |nth: i32| self.clock.length(f64::from(first + nth) * drift_s);
+            list(&[0, 1, 2].map(|nth| toml_string(&lag(nth))))
+        };
+        let of_now = match (learns, self.many()) {
+            (false, _) => "[]",
+            (_, true) => "\"motion.{axis}\"",
+            _ => "\"motion\"",
+        };
+        if learns {
+            let why = "from the drift of the past alone: it votes in `now`";
+            let _ = write!(
+                text,
+                "\n{}\ntype = \"ar\"\n{each}inputs.truth = \"drift.{axis}\"\nahead = \"{none}\"\nlags = {}\n",
+                beside("[nodes.motion]", why),
+                lags(1),
+            );
+        }
+        for (node, ahead, first_lag, more, why) in [
+            (
+                "now",
+                &none,
+                1,
+                of_now,
+                "a virtual sensor: the drift of the last",
+            ),
+            ("next", &width, 0, "[]", "a forecast: the drift of the next"),
         ] {
-            let lag = |nth: i32| self.clock.length(f64::from(first_lag + nth) * drift_s);
-            let lags = [0, 1, 2].map(|nth| toml_string(&lag(nth)));
             let _ = write!(
                 text,
                 "\n{}\nmodule = \"prediction\"\n{each}ahead = \"{ahead}\"\nlags = {}\n\
-                 [nodes.{node}.inputs]\nsensors = {}\n{halves}drift = \"drift.{axis}\"\n",
+                 [nodes.{node}.inputs]\nsensors = {}\n{halves}drift = \"drift.{axis}\"\nmore = {more}\n",
                 beside(&format!("[nodes.{node}]"), &format!("{why} {width}")),
-                list(&lags),
+                lags(first_lag),
                 self.regressors(|_| true),
             );
         }
         text.push_str("\n[outputs]\nnow = \"now\"\nnext = \"next\"\n");
-    }
-
-    /// The largest of what was measured of each drifting column, in the unit of the first drifting signal.
-    fn largest(&self, measured: &[f64]) -> f64 {
-        let unit = |name: &str| Unit::parse(name).ok().map(|unit| unit.difference());
-        let first = self.drifting.first().and_then(|group| unit(&group.unit));
-        let columns = self.columns.iter();
-        let drifting = columns.filter(|column| column.kind == Kind::Drifting);
-        let in_first = drifting.zip(measured).filter_map(|(column, value)| {
-            let factor = match (unit(&column.unit), &first) {
-                (Some(own), Some(first)) => own.factor_to(first)?,
-                _ => 1.0,
-            };
-            Some(factor * value)
-        });
-        in_first.fold(0.0, f64::max)
     }
 }
 
@@ -550,14 +543,6 @@ fn of_signal(group: &Group, what: &str) -> String {
 /// A text as TOML writes it.
 pub(super) fn toml_string(text: &str) -> String {
     toml::Value::from(text).to_string()
-}
-
-fn names(groups: &[Group]) -> String {
-    let names: Vec<String> = groups
-        .iter()
-        .map(|group| toml_string(&group.signal))
-        .collect();
-    list(&names)
 }
 
 fn list(names: &[String]) -> String {

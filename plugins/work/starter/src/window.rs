@@ -2,7 +2,8 @@
 //!
 //! Of the widths of [`athermal_analysis::diagnosis::window`] the narrowest is chosen at which the drift stands [`ENOUGH`] times above its
 //! noise on half of the channels, or where none does, the one at which it stands highest. The rates of what drifts and of the
-//! temperatures bound the search; an input that is logged too rarely for slopes over that window is not one that bounds it.
+//! temperatures bound the search; an input that is logged too rarely for slopes over that window is not one that bounds it. The next
+//! narrower and the next wider one are weighed beside it by what their fits explain.
 
 use std::collections::BTreeSet;
 
@@ -17,6 +18,7 @@ use athermal_analysis::figures::time;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
+use super::weighed::Weighed;
 
 /// Signal to noise of a drift that is enough, noise being its standard error, in which scatter and curvature both count: a fifth
 /// of its variance is then noise, `1 / (1 + 2²)`.
@@ -31,6 +33,9 @@ const SELDOM: f64 = 5.0;
 const FEWEST_LEVELS: usize = 20;
 /// Windows fit into a log with gaps where rows of such a share of its stretches have them.
 const SHARE_OF_STRETCHES: f64 = 0.1;
+
+/// A width that is weighed beside the chosen one is at least so many times as narrow or as wide.
+const APART: f64 = 1.6;
 
 /// The share of what is measured between gaps that has so many windows of a width before it.
 fn share(series: &[&Series], width_s: f64, windows: f64) -> f64 {
@@ -59,6 +64,10 @@ pub struct Choice {
     pub spread: Vec<f64>,
     /// Whether the drift rises above its standard error.
     pub enough: bool,
+    /// The drift window by the standard error alone, and widths near it with what their fits explain.
+    pub by_noise_s: f64,
+    /// See [`Weighed`].
+    pub weighed: Weighed,
     /// Why what drifts is predicted as it stands, and not its slope: no window fits between the gaps.
     pub levels: Option<String>,
     /// Inputs with values too far apart for slopes over the drift window, by number: their last value stands for them.
@@ -89,7 +98,7 @@ impl Bound {
 }
 
 /// Roots of tan x = x over π: the windows whose spectrum shares zeros with that of a drift, per drift window.
-const HARMONICS: [f64; 4] = [1.43030, 2.45902, 3.47089, 4.47741];
+pub(super) const HARMONICS: [f64; 4] = [1.43030, 2.45902, 3.47089, 4.47741];
 
 impl Choice {
     /// Measures the candidates and chooses.
@@ -193,9 +202,21 @@ impl Choice {
                 |a: &&(f64, Vec<f64>), b: &&(f64, Vec<f64>)| median(&a.1).total_cmp(&median(&b.1));
             candidates.iter().max_by(by_ratio)
         };
-        let drift_s = chosen.or_else(best).map_or(narrowest, |(width, _)| *width);
+        let by_noise_s = chosen.or_else(best).map_or(narrowest, |(width, _)| *width);
         let pairs = || survey.series.iter().zip(columns).enumerate();
         let needs = |series: &Series| FEWEST_OF_FEATURE * series.gap(0.9).unwrap_or(0.0);
+        let weighed = match levels {
+            Some(_) => Weighed::default(),
+            None => {
+                let is_cause = |of: Kind| matches!(of, Kind::Temperature | Kind::Drive);
+                let causes = pairs().filter(|(_, (series, column))| {
+                    is_cause(column.kind) && needs(series) <= by_noise_s / 2.0
+                });
+                let causes: Vec<&Series> = causes.map(|(_, (series, _))| series).collect();
+                Weighed::of(&drifting, &causes, &beside(&widths, by_noise_s), by_noise_s)
+            }
+        };
+        let drift_s = weighed.better_s.unwrap_or(by_noise_s);
         let rare: BTreeSet<usize> = pairs()
             .filter(|(_, (series, column))| column.kind == Kind::Drive && needs(series) > drift_s)
             .map(|(index, _)| index)
@@ -237,6 +258,8 @@ impl Choice {
             spread: drifts.iter().map(Drift::spread).collect(),
             candidates,
             enough,
+            by_noise_s,
+            weighed,
             levels,
             rare,
             bound,
@@ -251,9 +274,15 @@ impl Choice {
             .filter(|column| column.kind == Kind::Drifting);
         let of = |(nth, column): (usize, &Column)| {
             let widths = self.candidates.iter();
-            let widths = widths.map(
-                |(window_s, ratios)| json!({ "window_s": window_s, "ratio": ratios.get(nth) }),
-            );
+            let widths = widths.map(|(window_s, ratios)| {
+                let mut weighed = self.weighed.widths.iter();
+                let explained = weighed.find(|(width_s, _)| width_s == window_s);
+                json!({
+                    "window_s": window_s,
+                    "ratio": ratios.get(nth),
+                    "explained": explained.map(|(_, share)| share),
+                })
+            });
             json!({
                 "column": column.name,
                 "window_s": self.drift_s,
@@ -261,6 +290,34 @@ impl Choice {
             })
         };
         drifting.enumerate().map(of).collect()
+    }
+
+    /// What the graph puts out, for people.
+    #[must_use]
+    pub fn outputs(&self, clock: &Clock) -> String {
+        if self.levels.is_some() {
+            return "output: `now`, the value that the sensors give (a virtual sensor)".to_owned();
+        }
+        let width = clock.length(self.drift_s);
+        format!(
+            "outputs: `now`, the drift of the last {width} (a virtual sensor), and `next`, the drift of the next {width} (a forecast). Of \
+             each, `result` is what goes out; the others are its voters"
+        )
+    }
+
+    /// What fits of the widths that were weighed explain, for people.
+    #[must_use]
+    pub fn explains(&self, clock: &Clock) -> Option<String> {
+        let (widest_s, _) = self.weighed.widths.last()?;
+        let shares = self.weighed.widths.iter().map(|(width_s, share)| {
+            let percent = 100.0 * share.max(0.0);
+            format!("over {} {percent:.1} %", clock.length(*width_s))
+        });
+        Some(format!(
+            "weighed in cross-validation: of the drift over {} linear fits explain, {}",
+            clock.length(*widest_s),
+            shares.collect::<Vec<_>>().join(", ")
+        ))
     }
 
     /// What was chosen and why, for people.
@@ -284,7 +341,10 @@ impl Choice {
             .zip(ratios)
             .map(|(name, ratio)| format!("{name} {ratio:.1}"))
             .collect();
-        let why = if self.enough {
+        let why = if self.weighed.better_s.is_some() {
+            let by_noise = clock.length(self.by_noise_s);
+            format!("whose fit explains more than that of {by_noise}")
+        } else if self.enough {
             format!(
                 "the narrowest at which it stands {ENOUGH} times above its standard error on half of them"
             )
@@ -297,6 +357,7 @@ impl Choice {
             "drift window: {width}, {why} ({})",
             names.join(", ")
         )];
+        remarks.extend(self.explains(clock));
         remarks.extend(self.bound.iter().map(|bound| bound.text(clock)));
         for &index in &self.rare {
             remarks.push(format!(
@@ -312,6 +373,14 @@ impl Choice {
         }
         remarks
     }
+}
+
+/// The width with the next narrower and the next wider ones of those that fit.
+fn beside(widths: &[f64], chosen_s: f64) -> Vec<f64> {
+    let narrower = widths.iter().rfind(|of| APART * **of <= chosen_s);
+    let wider = widths.iter().find(|of| **of >= APART * chosen_s);
+    let all = [narrower, Some(&chosen_s), wider].into_iter();
+    all.flatten().copied().collect()
 }
 
 /// A width that people would choose, not below this one.

@@ -65,11 +65,20 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
             ),
             match corrected {
                 Some(with) => Layer::line(&with.time_s, &with.value, "c3", "left after correction"),
-                None => Layer::line(time_s, errors, "c3", "predicted − measured"),
+                None => Layer::line(time_s, errors, "c3", "left: predicted − measured"),
             },
         ],
         bands: bands(axis),
         ..chart
+    }
+}
+
+/// The same for a narrow screen.
+pub(super) fn drift_small<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> Chart<'a> {
+    Chart {
+        width: 460.0,
+        height: 240.0,
+        ..drift(axis, errors, facts)
     }
 }
 

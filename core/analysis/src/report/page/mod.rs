@@ -7,8 +7,11 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use super::{Axis, Facts, Hours, Light, Worth, figure};
+use athermal_run::score::Score;
+
+use super::{Axis, Facts, Hours, Light, Verdict, Worth, figure};
 use crate::chart::{COLOURS, Chart, Plot, STYLE};
+use crate::figures::{count, time};
 use crate::markup::escaped;
 
 /// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
@@ -22,46 +25,131 @@ pub fn page(facts: &Facts) -> String {
     );
     verdicts(&mut html, facts);
     worth_section(&mut html, facts);
-    html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
-    html.push_str(&tables::scores(&facts.scores));
+    scores(&mut html, facts);
     outside(&mut html, facts);
     over_time(&mut html, facts);
     votes(&mut html, facts);
     chosen(&mut html, facts);
-    html.push_str("<h2>Sensors</h2>");
+    html.push_str("<h2 id=\"sensors\">Sensors</h2>");
     html.push_str(&tables::sensors(&facts.course.sensors));
     card(&mut html, facts);
     let _ = write!(html, "<script>{}</script></body></html>", style::SCRIPT);
     html
 }
 
+/// The first screen: the machine, when, the verdict on what drifts most and its picture, sensors to look at, all other verdicts.
 fn verdicts(html: &mut String, facts: &Facts) {
     let data: Vec<String> = facts.data.iter().map(|path| escaped(path)).collect();
     let (from, to) = facts.course.period_s.unwrap_or((0.0, 0.0));
+    let days = (to - from) / 86400.0;
+    let hours = Hours::of(&facts.course);
+    let when = hours
+        .dates(to)
+        .map_or(String::new(), |dates| format!("{dates}, "));
     let _ = write!(
         html,
-        "<p class=\"muted\">On {}: {} ticks over {:.1} days.</p><ul>",
-        data.join(", "),
-        facts.course.ticks,
-        (to - from) / 86400.0
+        "<p class=\"muted\">{when}{days:.1} days, {} ticks, from {}. Errors are root mean squares.</p>",
+        count(facts.course.ticks),
+        data.join(", ")
     );
     for headline in facts.worth.iter().flat_map(Worth::headlines) {
-        let _ = write!(html, "<li><b>{}</b></li>", escaped(&headline));
+        let _ = write!(html, "<p><b>{}</b></p>", escaped(&headline));
     }
-    for verdict in &facts.verdicts {
-        let class = if verdict.is_good() {
-            ""
-        } else {
-            " class=\"bad\""
-        };
+    let drift = |verdict: &Verdict| verdict.baseline_zero.unwrap_or(0.0);
+    let first = (0..facts.verdicts.len())
+        .rev()
+        .max_by(|a, b| drift(&facts.verdicts[*a]).total_cmp(&drift(&facts.verdicts[*b])));
+    let Some(first) = first else { return };
+    let _ = write!(
+        html,
+        "<ul class=\"verdicts\">{}</ul>",
+        line(&facts.verdicts[first])
+    );
+    let axis = facts.course.axes.iter();
+    if let Some(axis) = axis
+        .into_iter()
+        .find(|of| of.name == facts.verdicts[first].axis)
+    {
+        let errors = axis.errors();
         let _ = write!(
             html,
-            "<li{class}><b>{}</b>: {}</li>",
-            escaped(&verdict.axis),
-            escaped(&verdict.sentence())
+            "<div class=\"at-large\">{}</div><div class=\"at-small\">{}</div>",
+            charts::drift(axis, &errors, facts).svg(),
+            charts::drift_small(axis, &errors, facts).svg()
         );
     }
-    html.push_str("</ul>");
+    html.push_str(&sensors_to_look_at(facts));
+    let others = facts
+        .verdicts
+        .iter()
+        .enumerate()
+        .filter(|(nth, _)| *nth != first);
+    let others: String = others.map(|(_, verdict)| line(verdict)).collect();
+    let _ = write!(html, "<ul class=\"verdicts\">{others}</ul>");
+}
+
+/// A verdict in a line.
+fn line(verdict: &Verdict) -> String {
+    let class = if verdict.is_good() {
+        ""
+    } else {
+        " class=\"bad\""
+    };
+    let ahead = match verdict.ahead_s {
+        0.0 => String::new(),
+        ahead_s => format!(", {} ahead", time(ahead_s)),
+    };
+    let (name, short) = (escaped(&verdict.output), escaped(&verdict.short()));
+    format!("<li{class}><b>{name}</b>{ahead}: {short}</li>")
+}
+
+fn sensors_to_look_at(facts: &Facts) -> String {
+    let sensors = &facts.course.sensors;
+    let odd = sensors.iter().filter(|of| !of.remarks().is_empty());
+    let odd: Vec<String> = odd
+        .map(|of| {
+            format!(
+                "<b>{}</b> ({})",
+                escaped(&of.name),
+                escaped(&of.remarks().join("; "))
+            )
+        })
+        .collect();
+    match odd.is_empty() {
+        true => format!(
+            "<p class=\"good\">Sensors: all {} are in order.</p>",
+            sensors.len()
+        ),
+        false => format!(
+            "<p>Sensors to look at: {}. <a href=\"#sensors\">All sensors</a></p>",
+            odd.join(", ")
+        ),
+    }
+}
+
+/// What goes out first, and folded the voters beside it.
+fn scores(html: &mut String, facts: &Facts) {
+    let goes_out = |score: &&Score| {
+        facts
+            .verdicts
+            .iter()
+            .any(|of| of.prediction == score.output)
+    };
+    let (out, others): (Vec<&Score>, Vec<&Score>) = facts.scores.iter().partition(goes_out);
+    let _ = write!(
+        html,
+        "<h2>Scores</h2><p class=\"muted\">As <code>athermal evaluate</code> without options gives them: one step ahead, all truths. What goes \
+         out is scored wherever it has a value.</p>{}",
+        tables::scores(&out)
+    );
+    if !others.is_empty() {
+        let _ = write!(
+            html,
+            "<details><summary>{} predictions beside these</summary><p class=\"muted\">On the instants at which all are valid.</p>{}</details>",
+            others.len(),
+            tables::scores(&others)
+        );
+    }
 }
 
 fn worth_section(html: &mut String, facts: &Facts) {
@@ -94,7 +182,7 @@ fn light_section(html: &mut String, light: &Light, hours: &Hours) {
         let worst = |losses: &[f64]| figure(losses.iter().copied().reduce(f64::max));
         let _ = write!(
             html,
-            "<p>Largest loss over {}: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\">{}</div>",
+            "<p>Largest loss over {}: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"picture\">{}</div>",
             light.span(),
             worst(&light.loss_without.value),
             worst(&light.loss_with.value),
@@ -132,6 +220,9 @@ fn outside(html: &mut String, facts: &Facts) {
     for contradiction in &novelty.contradictions {
         let sentence = contradiction.sentence(&hours);
         let _ = write!(html, "<p class=\"bad\">{}</p>", escaped(&sentence));
+    }
+    for learner in &novelty.learners {
+        let _ = write!(html, "<p>{}</p>", escaped(&learner.sentence()));
     }
     if novelty.estimators.iter().all(|of| of.worst.is_none()) {
         html.push_str("<p>No prediction was made from outside.</p>");
@@ -184,7 +275,11 @@ fn limits(axes: &[Axis]) -> Vec<(String, String)> {
 }
 
 fn wide(html: &mut String, chart: &Chart<'_>) {
-    let _ = write!(html, "<div class=\"wide\">{}</div>", chart.svg());
+    let _ = write!(
+        html,
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"picture\">{}</div>",
+        chart.svg()
+    );
 }
 
 fn votes(html: &mut String, facts: &Facts) {

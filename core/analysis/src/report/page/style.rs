@@ -7,11 +7,15 @@ p,ul{margin:.4rem 0}ul{padding-left:1.2rem}.muted{color:var(--muted);font-size:.
 .wide{overflow-x:auto}.wide svg.chart{min-width:620px;width:100%;display:block}\
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9rem}th,td{padding:.15rem .6rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}\
 th:first-child,td:first-child,.left{text-align:left}summary{cursor:pointer;font-weight:600;padding:.3rem 0}td.left{white-space:normal}\
+th{white-space:normal;vertical-align:bottom}.verdicts{list-style:none;padding:0}.verdicts li{margin:.15rem 0}.at-large svg,.at-small svg{width:100%;display:block}.at-small,.more{display:none}\
+.wide.scrolls{box-shadow:inset -10px 0 8px -8px var(--muted)}.wide.scrolls+.more{display:block}\
+@media(max-width:600px){body{padding:.6rem}.at-large{display:none}.at-small{display:block}}\
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,320px),1fr));gap:.6rem}.pair svg.chart{width:100%}\
 @media print{body{max-width:none;font-size:11pt}.wide{overflow:visible}.wide svg.chart{min-width:0}table{font-size:7.5pt}th,td{padding:.1rem .3rem}svg,tr{break-inside:avoid}h2,h3,summary{break-after:avoid}.screen{display:none}}";
 
 /// Zooming: dragging, the wheel about the pointer, double click for all. All charts of time move together. For print, all is unfolded.
-pub(super) const SCRIPT: &str = r#"addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>{d.open=true}));(()=>{const all=[...document.querySelectorAll('svg.zoom')].map(s=>{const b=s.viewBox.baseVal;
+pub(super) const SCRIPT: &str = r#"const wide=()=>document.querySelectorAll('.wide').forEach(w=>w.classList.toggle('scrolls',w.scrollWidth>w.clientWidth+1));
+addEventListener('resize',wide);document.querySelectorAll('details').forEach(d=>d.addEventListener('toggle',wide));wide();addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>{d.open=true}));(()=>{const all=[...document.querySelectorAll('svg.zoom')].map(s=>{const b=s.viewBox.baseVal;
 return{s,w:b.width,h:b.height,x0:+s.dataset.x0,x1:+s.dataset.x1,g:s.parentNode.querySelector('g.ticks')}});if(!all.length)return;
 let lo=Math.min(...all.map(c=>c.x0)),hi=Math.max(...all.map(c=>c.x1));const full=[lo,hi];
 const nice=r=>{const p=10**Math.floor(Math.log10(r));return[1,2,5,10].map(n=>n*p).find(n=>n>=r)};

@@ -6,6 +6,7 @@ use athermal_run::model::EstimatorCard;
 use athermal_run::score::Score;
 
 use super::super::scores::share;
+use super::super::verdict::is_worse;
 use super::super::{
     Compared, Departure, Effect, Excursion, Hours, Light, SensorFacts, figure, spelled,
 };
@@ -15,18 +16,21 @@ use crate::markup::escaped;
 fn table(header: &[&str], rows: &str) -> String {
     let header: String = header
         .iter()
-        .map(|cell| format!("<th>{cell}</th>"))
+        .map(|cell| format!("<th scope=\"col\">{cell}</th>"))
         .collect();
-    format!("<div class=\"wide\"><table><tr>{header}</tr>{rows}</table></div>")
+    format!(
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"table\"><table><tr>{header}</tr>{rows}</table></div>\
+         <p class=\"muted more\">The table goes on to the right: scroll it.</p>"
+    )
 }
 
-pub(super) fn scores(scores: &[Score]) -> String {
+pub(super) fn scores(scores: &[&Score]) -> String {
     let mut rows = String::new();
     for score in scores {
-        let worse = if score.is_worse_than_nothing() {
-            " class=\"bad\""
-        } else {
-            ""
+        let both = score.rmse.zip(score.baseline_zero);
+        let worse = match both.is_some_and(|(rmse, zero)| is_worse(rmse, zero)) {
+            true => " class=\"bad\"",
+            false => "",
         };
         let valid = score
             .valid
@@ -263,7 +267,7 @@ fn compared(errors: Option<&Compared>) -> String {
         return "<td>0</td><td>–</td><td>–</td><td>–</td><td></td>".to_owned();
     };
     let worse = of.rmse.zip(of.rmse_unheeded);
-    let worse = worse.is_some_and(|(with, without)| with > without);
+    let worse = worse.is_some_and(|(with, without)| is_worse(with, without));
     format!(
         "<td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td>{}</td>",
         count(of.n),
@@ -287,7 +291,7 @@ pub(super) fn estimators(estimators: &[EstimatorCard]) -> String {
             escaped(&estimator.kind),
             escaped(&estimator.truth),
             estimator.rows,
-            dropped.without_run + dropped.outside_limits + dropped.incomplete,
+            dropped.without_run + dropped.outside_limits + dropped.leapt + dropped.incomplete,
             figure(estimator.report.in_sample_rmse),
             escaped(&estimator.unit),
             figure(estimator.report.condition),

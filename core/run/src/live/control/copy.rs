@@ -26,6 +26,7 @@ impl Control {
         if copy.event == at && self.replica.is_none() {
             self.frozen = copy.engine.frozen();
             self.replica = Some(*copy);
+            self.look_into();
             self.find_given_up();
             notices.extend(std::mem::take(&mut self.is_lost).then_some(Notice::Mirrored));
         }

@@ -87,6 +87,7 @@ impl Control {
         let (outputs, values) = made.split_at(self.running.outputs.len());
         let view = TickView {
             at: time,
+            event: mark.event,
             revision: &self.revision,
             plan: &self.running,
             outputs,
@@ -161,6 +162,7 @@ impl Control {
         if let (Some(mut live), Some(old)) = (live, old) {
             live.take_over(&old.engine);
             self.replica = Some(live);
+            self.look_into();
             self.previous = Some(Previous {
                 live: old,
                 left: self.options.keep_warm,

@@ -50,10 +50,8 @@ impl Control {
         if let Some(replica) = &mut self.replica {
             replica.usual = usual.to_vec();
         }
-        let mut watch = Watch::new(&self.running, &self.running.sources, usual);
-        self.watching.new = watch.begin();
+        let watch = Watch::new(&self.running, &self.running.sources, usual);
         self.watching.watch = Some(watch);
-        self.watching.keep(self.last.unwrap_or(Instant::MIN));
     }
 
     /// What is watched; none where nothing is.

@@ -26,8 +26,6 @@ pub enum Finding {
     Sensors(Vec<SensorChange>),
     /// No output has had a value.
     NoOutput(NoOutput),
-    /// The correction goes by past drifts of these channels, which it moves itself.
-    FeedsBack(Vec<String>),
 }
 
 impl Finding {
@@ -42,7 +40,6 @@ impl Finding {
             }
             Self::Sensors(changes) => (None, &changes[..]),
             Self::NoOutput(_) => (Some(("no_output", None)), &[][..]),
-            Self::FeedsBack(_) => (Some(("feeds_back", None)), &[][..]),
         };
         let fails = changes.iter().filter(|of| !of.is_over);
         let fails = fails.map(|of| (of.fault.kind(), Some(&*of.channel)));

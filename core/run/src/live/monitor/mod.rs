@@ -1,8 +1,6 @@
 //! What is watched beside a graph at work: sensors that drop out or freeze, samples out of range or far outside of the fit, outputs that
-//! stay empty, a correction that learns from what it took away. Whoever runs a graph shows its rows to a [`Watch`], and reports what that
-//! finds.
+//! stay empty. Whoever runs a graph shows its rows to a [`Watch`], and reports what that finds.
 
-pub mod feedback;
 mod finding;
 mod output;
 mod range;

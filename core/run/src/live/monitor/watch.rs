@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Finding, Monitor, NoOutput, OutputMonitor, OutsideFit, RangeMonitor, SensorFault,
-    SensorMonitor, feedback,
+    Finding, Monitor, NoOutput, OutputMonitor, OutsideFit, RangeMonitor, SensorFault, SensorMonitor,
 };
 use crate::compile::{Plan, SourceChannel};
 use crate::engine::{Engine, SampleRange};
@@ -17,8 +16,6 @@ pub struct Watch {
     range: RangeMonitor,
     sensors: SensorMonitor,
     output: OutputMonitor,
-    /// The channels that a correction moves and goes by.
-    fed_back: Vec<String>,
     /// How often was warned of what.
     warnings: BTreeMap<(&'static str, Option<String>), u64>,
 }
@@ -32,18 +29,8 @@ impl Watch {
             range: RangeMonitor::new(read, usual),
             sensors: SensorMonitor::new(plan),
             output: OutputMonitor::of(plan),
-            fed_back: feedback::corrected_channels(plan),
             warnings: BTreeMap::new(),
         }
-    }
-
-    /// What is found of the graph alone, before the first row.
-    pub fn begin(&mut self) -> Vec<Finding> {
-        let fed_back = Some(&self.fed_back).filter(|of| !of.is_empty());
-        let found = fed_back.cloned().map(Finding::FeedsBack);
-        let found: Vec<_> = found.into_iter().collect();
-        self.count(&found);
-        found
     }
 
     /// How often was warned, by kind and channel; no channel of what is found of a whole graph.
@@ -72,12 +59,6 @@ impl Watch {
     #[must_use]
     pub fn looks_inside(&self) -> bool {
         self.output.is_empty()
-    }
-
-    /// The channels that a correction moves and goes by.
-    #[must_use]
-    pub fn fed_back(&self) -> &[String] {
-        &self.fed_back
     }
 
     fn count(&mut self, found: &[Finding]) {
@@ -122,10 +103,5 @@ impl Monitor for Watch {
         self.range.follow(plan, feed, usual, found);
         self.sensors.follow(plan, feed, usual, found);
         self.output.follow(plan, feed, usual, found);
-        let fed_back = feedback::corrected_channels(plan);
-        if fed_back != self.fed_back {
-            self.fed_back = fed_back;
-            found.extend(self.begin());
-        }
     }
 }

@@ -4,7 +4,7 @@ use athermal_core::events;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::{Finding, NoOutput, SensorChange, SensorFault, feedback};
+use super::{Finding, NoOutput, SensorChange, SensorFault};
 use crate::diagnostic::listed;
 use crate::engine::SampleRange;
 use crate::event::EventKind;
@@ -48,8 +48,6 @@ pub const KINDS: &[EventKind] = events!(kinds {
     "has_samples_again", note, { channel: String, of_truth: bool, from_s: f64, to_s: f64 };
     /// No output has had a value for an hour beyond the warm-up of the graph, or up to the end.
     "no_output", fault, { ticks: u64, first_silent: String };
-    /// The correction goes by past drifts of what it moves.
-    "feeds_back", fault, { channels: Vec<String> };
 });
 /// The event for samples that do not count.
 pub const REJECTED: &str = "rejected_samples";
@@ -97,10 +95,6 @@ pub fn messages(
         }
         Finding::Sensors(changes) => return of_sensors(changes, at_s, together),
         Finding::NoOutput(of) => no_output(of),
-        Finding::FeedsBack(channels) => {
-            let words = feedback::words(channels).unwrap_or_default();
-            Message::new("feeds_back", json!({ "channels": channels }), words)
-        }
     };
     vec![(true, found)]
 }

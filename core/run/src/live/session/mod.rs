@@ -287,7 +287,7 @@ impl<'a> Session<'a> {
     /// When the source can give no more, and as [`take`](Self::take) and [`finish`](Self::finish).
     pub fn run(&mut self, source: &mut dyn Source, sink: &mut dyn Sink) -> Result<(), RunError> {
         let session = &mut *self;
-        let ended = drive(&mut Driven { session, sink }, source, |_, _, _| Ok(()));
+        let ended = drive(&mut Driven { session, sink }, source, 1, |_, _, _| Ok(()));
         match ended {
             Ok(_) => {
                 self.restart.end(self.reporter);

@@ -241,3 +241,28 @@ fn a_log_without_a_time_is_told_to_name_one() {
     let refused = found("a,b\n1,1\n0,0\n2,0\n").unwrap_err();
     assert!(refused.contains("--time"), "{refused}");
 }
+
+#[test]
+fn the_last_fifth_begins_at_a_round_time_of_the_logs_own_form() {
+    const DAY_NS: i64 = 86_400_000_000_000;
+    let monday = 1_772_438_400_000_000_000;
+    for (text, (first, length), expected) in [
+        ("time_s,a\n0,1\n1,2\n", (0, 3 * DAY_NS), Some("207000")),
+        ("t_ms,a\n0,1\n250,2\n", (0, DAY_NS / 8640), Some("8000")),
+        ("t [d],a\n0,1\n0.25,2\n", (0, 9 * DAY_NS / 10), Some("0.72")),
+        (
+            "time,a\n2026-03-02T08:00:00Z,1\n2026-03-02T08:01:00Z,2\n",
+            (monday, 5 * DAY_NS),
+            Some("2026-03-06T08:00:00Z"),
+        ),
+        (
+            "time,a\n02.03.2026 08:00:10,1\n02.03.2026 08:01:10,2\n13.03.2026 08:01:10,2\n",
+            (monday + 10_000_000_000, DAY_NS / 2),
+            Some("02.03.2026 17:36:00"),
+        ),
+        ("time_s,a\n0,1\n1,2\n", (5, 0), None),
+    ] {
+        let found = found(text).unwrap().last_fifth((first, first + length));
+        assert_eq!(found.as_deref(), expected, "{text}");
+    }
+}
