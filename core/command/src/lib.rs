@@ -28,6 +28,7 @@
 //! # assert!((kind.declare)().try_get_matches_from(["windows", "15"]).is_ok());
 //! ```
 
+mod browse;
 pub mod numbers;
 #[macro_use]
 pub mod output;
@@ -36,6 +37,7 @@ pub mod terminal;
 
 pub use athermal_core::message::{self, Message};
 pub use athermal_run::live::monitor::words as findings;
+pub use browse::{Browse, Browsed, Scheme, browse};
 pub use registry::{Command, CommandKind, Group, declare, run};
 pub use terminal::{Answer, Failure, Format, Terminal};
 

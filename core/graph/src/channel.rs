@@ -25,6 +25,15 @@ pub const COLD: f64 = f64::from_bits(0x7ff8_0000_0000_c01d);
 /// It differs from [`ABSENT`], which such a node sees when the channel's producer ran and had nothing to give.
 pub const UNCHANGED: f64 = f64::from_bits(0x7ff8_0000_0000_01d1);
 
+/// No value of a truth: its window holds a leap of what it is taken over, which is no drift.
+pub const LEAPT: f64 = f64::from_bits(0x7ff8_0000_0000_1ea9);
+
+/// Whether a value is absent because of a leap in its window.
+#[must_use]
+pub fn is_leapt(value: f64) -> bool {
+    value.to_bits() == LEAPT.to_bits()
+}
+
 /// Whether a fresh read found that the channel was given nothing at this tick.
 #[must_use]
 pub fn is_unchanged(value: f64) -> bool {

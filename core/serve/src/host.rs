@@ -35,6 +35,12 @@ pub fn now() -> Option<Instant> {
     i64::try_from(since.as_nanos()).ok().map(Instant::from_ns)
 }
 
+/// The host's time, right or not, as it is stamped where nothing else gives one; 1970 where it is before that.
+#[must_use]
+pub fn time_of_day() -> Instant {
+    now().unwrap_or(Instant::from_ns(0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

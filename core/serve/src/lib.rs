@@ -22,6 +22,7 @@
 //! | [`recovery`] | from there to where the service was |
 //! | [`service`] | all of it at work, with its threads |
 //! | [`mod@facts`] | what is known of it, each fact declared once |
+//! | [`shown`] | what of a tick whoever looks on may name |
 //! | [`companion`] | what runs beside it and asks it things |
 
 /// Makes errors of other parts into those of one.
@@ -50,6 +51,7 @@ pub mod moment;
 pub mod recovery;
 pub mod replay;
 pub mod service;
+pub mod shown;
 pub mod testkit;
 
 // The layers below, by the names that they have for everybody.

@@ -11,7 +11,7 @@ use crate::compile::Plan;
 use crate::engine::{Engine, EngineError, StateTransfer};
 use crate::folder::{StateFolder, StatePaths, may_pass};
 use crate::journal::{Begin, Entry, FeedNames, Gap, JournalError, Log, Record, Torn};
-use crate::replay::{Difference, Replay};
+use crate::replay::{Difference, NotStepped, Replay};
 use crate::sequencer::Timeline;
 use crate::time::Instant;
 
@@ -120,6 +120,12 @@ impl fmt::Display for RecoveryError {
 impl std::error::Error for RecoveryError {}
 
 from! { RecoveryError: JournalError => Journal, CheckpointError => Checkpoints }
+
+impl From<NotStepped> for RecoveryError {
+    fn from((event, error): NotStepped) -> Self {
+        Self::Engine { event, error }
+    }
+}
 
 impl Recovered {
     /// Finds where a service was. `model` is what is to run where there was nothing before, `feed` what it is given from now on, by the plan that
@@ -261,6 +267,7 @@ impl Recovered {
         while let Some(entry) = log.read()? {
             let (event, record) = match entry {
                 Entry::Begin(begin) => {
+                    replay.catch_up(look)?;
                     replay.begin(&begin, log.gaps().len() > report.gaps.len());
                     report.gaps = log.gaps().to_vec();
                     seen = begin.happenings;
@@ -270,11 +277,13 @@ impl Recovered {
             };
             // A graph that was committed saw all that came between that and its taking over.
             while let Some((_, engine)) = committed.next_if(|(at, _)| *at <= seen) {
+                replay.catch_up(look)?;
                 replay.follow(engine);
             }
             seen += u64::from(record.is_happening());
             match record {
                 Record::Swap { revision } if seen >= from => {
+                    replay.catch_up(look)?;
                     let revision = format!("{revision:016x}");
                     let next = folder.model(&revision);
                     model = next.map_err(|error| no_model(&revision, error))?;
@@ -288,14 +297,12 @@ impl Recovered {
                     report.swaps.push(revision);
                 }
                 _ if seen > from || seen == from && !record.is_happening() => {
-                    let stepped = replay.apply(event, &record);
-                    if stepped.map_err(|error| RecoveryError::Engine { event, error })? {
-                        look(seen, replay.engine());
-                    }
+                    replay.apply((event, seen), &record, look)?;
                 }
                 _ => replay.pass_by(&record),
             }
         }
+        replay.catch_up(look)?;
         let is_unsealed = seals
             && match log.seal() {
                 Err(JournalError::NotWritten { error, .. }) if may_pass(&error) => true,

@@ -9,7 +9,10 @@ use crate::journal::{Begin, FeedNames, Record, output_hash};
 use crate::sequencer::Timeline;
 use crate::time::Instant;
 
-/// An engine that a log is applied to.
+/// Ticks that are stepped together: where several engines follow each other, what one knows is brought into the caches once for them.
+const TOGETHER: usize = 16;
+
+/// An engine that a log is applied to. Ticks wait until there are several, or something else is to be done.
 #[derive(Debug)]
 pub struct Replay {
     runs: Fed,
@@ -20,7 +23,23 @@ pub struct Replay {
     stepped: u64,
     beats: u64,
     difference: Option<Difference>,
+    /// Ticks that are to be stepped, and their rows.
+    waiting: Vec<Waiting>,
+    rows: Vec<f64>,
 }
+
+/// A tick of the log.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    /// The number of its record, and how many happenings there were then.
+    event: u64,
+    happenings: u64,
+    at: Instant,
+    hash: u64,
+}
+
+/// A record that cannot be stepped, by its number, and why.
+pub type NotStepped = (u64, EngineError);
 
 /// An engine, and what it is given.
 #[derive(Debug)]
@@ -48,14 +67,24 @@ impl Fed {
             channels.position(|(name, column)| *name == of.name && *column == of.column)
         };
         self.places = Feed::of(self.engine.plan()).iter().map(place).collect();
-        self.samples = vec![ABSENT; self.places.len()];
     }
 
-    fn step(&mut self, at: Instant, row: &[f64]) -> Result<&[f64], EngineError> {
-        for (sample, place) in self.samples.iter_mut().zip(&self.places) {
-            *sample = place.map_or(ABSENT, |place| row[place]);
+    /// Steps rows of the feed, one after the other.
+    fn step(
+        &mut self,
+        ticks: &[Waiting],
+        rows: &[f64],
+        look: impl FnMut(&Engine, Instant),
+    ) -> Result<(), EngineError> {
+        self.samples.clear();
+        for row in rows.chunks((rows.len() / ticks.len().max(1)).max(1)) {
+            let sample = |place: &Option<usize>| place.map_or(ABSENT, |place| row[place]);
+            self.samples.extend(self.places.iter().map(sample));
         }
-        self.engine.step(at, &self.samples)
+        let width = self.places.len();
+        let row = |nth: usize| &self.samples[nth * width..][..width];
+        let rows = ticks.iter().enumerate().map(|(nth, of)| (of.at, row(nth)));
+        self.engine.step_rows(rows, look)
     }
 }
 
@@ -80,6 +109,8 @@ impl Replay {
             stepped: 0,
             beats: 0,
             difference: None,
+            waiting: Vec::with_capacity(TOGETHER),
+            rows: Vec::new(),
         }
     }
 
@@ -100,29 +131,70 @@ impl Replay {
         record.apply(&mut self.timeline);
     }
 
-    /// Applies a record. True where the engine made a step.
+    /// Applies a record, after so many ticks, beats, breaks and freezes; `look` sees each step that is made, with how many of these there are
+    /// then.
     ///
     /// # Errors
     /// When the engine refuses a tick.
-    pub fn apply(&mut self, event: u64, record: &Record) -> Result<bool, EngineError> {
+    pub fn apply(
+        &mut self,
+        (event, happenings): (u64, u64),
+        record: &Record,
+        look: &mut impl FnMut(u64, &Engine),
+    ) -> Result<(), NotStepped> {
+        if let Record::Tick { at, hash } | Record::Beat { at, hash } = *record {
+            self.rows.extend_from_slice(self.timeline.tick(at));
+            self.waiting.push(Waiting {
+                event,
+                happenings,
+                at,
+                hash,
+            });
+            self.beats += u64::from(matches!(record, Record::Beat { .. }));
+            return match self.waiting.len() < TOGETHER {
+                true => Ok(()),
+                false => self.catch_up(look),
+            };
+        }
         match record {
-            Record::Tick { at, hash } | Record::Beat { at, hash } => {
-                let row = self.timeline.tick(*at);
-                self.beside.retain_mut(|fed| fed.step(*at, row).is_ok());
-                let outputs = self.runs.step(*at, row)?;
-                if output_hash(outputs) != *hash && self.difference.is_none() {
-                    self.difference = Some(Difference { event, at: *at });
-                }
-                self.stepped += 1;
-                self.beats += u64::from(matches!(record, Record::Beat { .. }));
-                return Ok(true);
+            Record::Break { .. } => {
+                self.catch_up(look)?;
+                self.all().for_each(|fed| fed.engine.segment());
             }
-            Record::Break { .. } => self.all().for_each(|fed| fed.engine.segment()),
-            Record::Freeze(frozen) => self.all().for_each(|fed| fed.engine.freeze(*frozen)),
+            Record::Freeze(frozen) => {
+                self.catch_up(look)?;
+                self.all().for_each(|fed| fed.engine.freeze(*frozen));
+            }
             _ => {}
         }
         record.apply(&mut self.timeline);
-        Ok(false)
+        Ok(())
+    }
+
+    /// Steps the ticks that wait.
+    ///
+    /// # Errors
+    /// As [`apply`](Self::apply).
+    pub fn catch_up(&mut self, look: &mut impl FnMut(u64, &Engine)) -> Result<(), NotStepped> {
+        let (ticks, rows) = (&*self.waiting, &*self.rows);
+        self.beside
+            .retain_mut(|fed| fed.step(ticks, rows, |_, _| ()).is_ok());
+        let (mut left, difference) = (ticks.iter(), &mut self.difference);
+        let stepped = self.runs.step(ticks, rows, |engine, at| {
+            let Some(of) = left.next() else { return };
+            if output_hash(engine.outputs()) != of.hash && difference.is_none() {
+                *difference = Some(Difference {
+                    event: of.event,
+                    at,
+                });
+            }
+            look(of.happenings, engine);
+        });
+        self.stepped += (ticks.len() - left.len()) as u64;
+        let refused = left.next().map_or(0, |of| of.event);
+        self.waiting.clear();
+        self.rows.clear();
+        stepped.map_err(|error| (refused, error))
     }
 
     /// The first difference so far.

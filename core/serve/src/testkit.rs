@@ -16,14 +16,14 @@
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration as Wait, Instant as Clock};
 
 use crate::bell::{Bell, Mailbox};
 use crate::connector::{
-    Arrival, OutRow, Outlet, Remarks, Sink, SinkWiring, Source, SourceLink, SourceWiring, Stop,
-    WiredChannel, WiredOutput, link,
+    Arrival, OutRow, Outlet, Remarks, Sink, SinkWiring, Source, SourceCounts, SourceLink,
+    SourceWiring, Stop, WiredChannel, WiredOutput, link,
 };
 use crate::document::{TableBase, TimeBase, TimeForm};
 use crate::journal::Progress;
@@ -78,6 +78,8 @@ impl<'a> SourceTrial<'a> {
                 state: folder.join("tried"),
                 folder: folder.to_owned(),
                 channels: channels.iter().map(wired).collect(),
+                silent: Wait::from_secs(30),
+                retry: Wait::from_secs(30),
                 time: time_base(),
                 table: TableBase::default(),
             },
@@ -126,64 +128,66 @@ impl<'a> SourceTrial<'a> {
             let after = &mut wiring.channels[given.channel].after;
             *after = given.stamp.max(*after);
         }
+        let mut tried = self.begin(wiring, room)?;
+        let (mut all, mut is_late) = (Vec::new(), false);
+        let began = Clock::now();
+        while all.len() < least && !tried.worker.is_finished() {
+            is_late = takes && began.elapsed() > self.patience;
+            // Once it has had time to fill the ring, the engine goes.
+            if is_late || !takes && began.elapsed() > Wait::from_millis(300) {
+                break;
+            }
+            thread::sleep(Wait::from_millis(5));
+            if takes {
+                all.extend(tried.take());
+            }
+        }
+        if !takes {
+            tried.link = None;
+            thread::sleep(Wait::from_millis(50));
+        }
+        match tried.end(&mut all)? {
+            Err(error) if all.is_empty() && takes => Err(format!("it fails: {error}")),
+            _ if is_late => Err(format!(
+                "it gives {} of {least} samples in {:?}",
+                all.len(),
+                self.patience
+            )),
+            _ => Ok(all),
+        }
+    }
+
+    /// It at work, for whoever takes what it gives by hand.
+    ///
+    /// # Errors
+    /// When it does not open.
+    pub fn start(&self) -> Result<Tried, String> {
+        self.begin(self.wiring.clone(), 1 << 16)
+    }
+
+    fn begin(&self, wiring: SourceWiring, room: usize) -> Result<Tried, String> {
         let places: Vec<u32> = (0..).take(wiring.channels.len()).collect();
-        let remarks = Remarks::new("it", &Mailbox::new(channel().0, &Bell::here()));
+        let (tell, heard) = channel();
+        let remarks = Remarks::new("it", &Mailbox::new(tell, &Bell::here()));
         let engine = (thread::current(), Arc::<Progress>::default(), remarks);
         let stamps = self.source.stamps();
         let (mut out, link) = link(room, &wiring.channels, &places, stamps, engine);
         let opened = self.source.open(wiring);
         let mut inlet = opened.map_err(|error| format!("it does not open: {error}"))?;
-        let (stop, asked) = (Stop::default(), Stop::default());
+        let (counts, stop) = (Arc::clone(out.counts()), Stop::default());
         let stops = stop.clone();
         let worker = thread::spawn(move || {
             let ran = inlet.run(&mut out, &stops);
             // What a source that fails has given counts all the same; the service starts it again.
             ran.map_err(|error| error.to_string())
         });
-        let mut link = Some(link);
-        let mut all = Vec::new();
-        let began = Clock::now();
-        while all.len() < least && !worker.is_finished() {
-            if began.elapsed() > self.patience {
-                asked.ask();
-                break;
-            }
-            thread::sleep(Wait::from_millis(5));
-            match &mut link {
-                Some(link) if takes => take(link, &mut all),
-                // Once it has had time to fill the ring, the engine goes.
-                Some(_) if began.elapsed() > Wait::from_millis(300) => break,
-                _ => {}
-            }
-        }
-        if !takes {
-            link = None;
-            thread::sleep(Wait::from_millis(50));
-        }
-        stop.ask();
-        let ended = Clock::now();
-        while !worker.is_finished() {
-            if ended.elapsed() > SECOND {
-                return Err("stop: it does not end within a second of being asked to".to_owned());
-            }
-            if let Some(link) = &mut link {
-                take(link, &mut all);
-            }
-            thread::sleep(Wait::from_millis(5));
-        }
-        if let Some(link) = &mut link {
-            take(link, &mut all);
-        }
-        match worker.join() {
-            Err(_) => Err("it panics".to_owned()),
-            Ok(Err(error)) if all.is_empty() && takes => Err(format!("it fails: {error}")),
-            Ok(_) if asked.is_asked() => Err(format!(
-                "it gives {} of {least} samples in {:?}",
-                all.len(),
-                self.patience
-            )),
-            Ok(_) => Ok(all),
-        }
+        Ok(Tried {
+            link: Some(link),
+            counts,
+            heard,
+            stop,
+            worker,
+        })
     }
 
     /// Tries all rules.
@@ -231,15 +235,56 @@ impl<'a> SourceTrial<'a> {
     }
 }
 
-fn take(link: &mut SourceLink, all: &mut Vec<Given>) {
-    while let Some(arrival) = link.next() {
-        if let Arrival::Sample(sample) = arrival {
-            all.push(Given {
-                channel: sample.channel as usize,
-                stamp: sample.stamp,
-                value: sample.value,
-            });
+/// A source at work that is tried.
+#[derive(Debug)]
+pub struct Tried {
+    /// None once the engine is gone.
+    link: Option<SourceLink>,
+    /// What it counts, and how its channels are.
+    pub counts: Arc<SourceCounts>,
+    heard: Receiver<(String, String)>,
+    stop: Stop,
+    worker: thread::JoinHandle<Result<(), String>>,
+}
+
+impl Tried {
+    /// What it has given since.
+    pub fn take(&mut self) -> Vec<Given> {
+        let mut all = Vec::new();
+        while let Some(arrival) = self.link.as_mut().and_then(SourceLink::next) {
+            if let Arrival::Sample(sample) = arrival {
+                all.push(Given {
+                    channel: sample.channel as usize,
+                    stamp: sample.stamp,
+                    value: sample.value,
+                });
+            }
         }
+        all
+    }
+
+    /// What it has reported since.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        self.heard.try_iter().map(|(_, words)| words).collect()
+    }
+
+    /// Ends it, and gives why it has ended where it failed, and what it gave last.
+    ///
+    /// # Errors
+    /// The rule that it broke, in words.
+    pub fn end(mut self, last: &mut Vec<Given>) -> Result<Result<(), String>, String> {
+        self.stop.ask();
+        let ended = Clock::now();
+        while !self.worker.is_finished() {
+            if ended.elapsed() > SECOND {
+                return Err("stop: it does not end within a second of being asked to".to_owned());
+            }
+            last.extend(self.take());
+            thread::sleep(Wait::from_millis(5));
+        }
+        last.extend(self.take());
+        self.worker.join().map_err(|_| "it panics".to_owned())
     }
 }
 
@@ -279,9 +324,11 @@ pub fn open_sink(
     let opened = sink.open(SinkWiring {
         name: "tried".to_owned(),
         machine: None,
+        state: folder.join("tried"),
         folder: folder.to_owned(),
         outputs: outputs.iter().map(wired).collect(),
         time: time_base(),
+        retry: Wait::from_secs(30),
     });
     opened.map_err(|error| format!("it does not open: {error}"))
 }
@@ -299,6 +346,7 @@ pub fn put(outlet: &mut dyn Outlet, second: i64, outputs: usize) -> Result<(), S
         is_beat: false,
         behind: Duration::ZERO,
         revision: 1,
+        is_degraded: false,
         outputs: &values,
     };
     outlet.put(&row).map_err(|error| error.to_string())

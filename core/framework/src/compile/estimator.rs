@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::instance::{Declared, Instance, instance_name};
-use super::keys::{EstimatorKeys, Learn, Limits, Outside};
+use super::keys::{EstimatorKeys, Limits, Outside};
 use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{NOVELTY, PlannedFit, PlannedRole, STD_DEV, TrainingLimits, TruthLink};
@@ -13,7 +13,7 @@ use super::resolver::Resolver;
 use super::row::Row;
 use crate::channel::Channel;
 use crate::diagnostic::Problem;
-use crate::node::{Estimator, FREEZE, Learns, Mistake, OutputPort, PlannedRow};
+use crate::node::{Estimator, FREEZE, Mistake, OutputPort, PlannedRow};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -173,17 +173,10 @@ impl Resolver<'_> {
 
     /// What becomes of predictions outside of the rows of the fit; `None` when an error about it has been reported.
     fn outside(&mut self, instance: &Instance<'_>, estimator: &dyn Estimator) -> Option<Outside> {
-        let EstimatorKeys { outside, learn, .. } = instance.read.estimator;
-        let learns = match estimator.learns() {
-            Learns::Never { .. } => false,
-            Learns::OnRequest => learn.is_some_and(|learn| learn != Learn::Switch(false)),
-            Learns::ByDefault => learn != Some(Learn::Switch(false)),
-        };
-        match outside {
+        match instance.read.estimator.outside {
             Some(outside) if estimator.has_novelty() => return Some(outside),
-            // What it has learned since the fit may lie outside of that.
-            None if learns || !estimator.has_novelty() => return Some(Outside::Pass),
-            None => return Some(Outside::Shrink),
+            None if estimator.has_novelty() => return Some(Outside::Shrink),
+            None => return Some(Outside::Pass),
             Some(_) => {}
         }
         let message =

@@ -25,12 +25,11 @@ pub struct EstimatorKeys {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outside {
-    /// Their distance from what is predicted in the middle of the rows of the fit is divided by the novelty, which is the default unless
-    /// it goes on learning. The standard deviation `σ` becomes `√((novelty · σ)² + d²)`, `d` being how far the prediction has moved.
+    /// Their distance from what is predicted in the middle of the rows of the fit is divided by the novelty, which is the default. The standard deviation `σ` becomes `√((novelty · σ)² + d²)`, `d` being how far the prediction has moved.
     Shrink,
     /// There is none.
     Absent,
-    /// They stay as they are, which is the default where it goes on learning.
+    /// They stay as they are.
     Pass,
 }
 
@@ -80,11 +79,11 @@ pub(crate) struct LearnLimits {
     /// Truths that miss their prediction by more than this multiple of the recent root mean square error, above 1; what the fit
     /// was off by stands for the first, but for kinds that go on from the last truths, such as `kalman`. Errors of a kind that
     /// states how unsure it is are in units of its `std_dev`, so that after a gap it may be off by more. A truth that is left
-    /// out counts as one at the limit, so that a change that stays is learned after a few, and so is a burst that goes on for
-    /// as long.
+    /// out counts as twice that error; when all of four windows of the truth and at least 20 have been, what was before is forgotten, so
+    /// that a change that stays is learned.
     #[schemars(extend("exclusiveMinimum" = 1.0))]
     pub(crate) outliers: f64,
-    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width; 0 where it is not
+    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width; 1 where it is not
     /// given. The level of `kalman` follows them all the same, and its coefficients stay. Not for kinds that follow a state
     /// alone, such as `armax`, which is followed whatever the regressors are.
     #[schemars(with = "f64", range(min = 0.0))]

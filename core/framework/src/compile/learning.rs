@@ -54,7 +54,7 @@ impl Resolver<'_> {
         sound.then_some(Some(PlannedLearning {
             limits: LearningLimits {
                 outliers: limits.outliers,
-                margin: limits.margin.unwrap_or(0.0),
+                margin: limits.margin.unwrap_or(1.0),
             },
             freeze,
         }))

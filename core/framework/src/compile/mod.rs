@@ -10,6 +10,7 @@ mod conversion;
 mod diff;
 mod estimator;
 mod feature;
+pub mod fed_back;
 mod gate;
 mod guard;
 mod inputs;
@@ -26,6 +27,7 @@ mod port_channels;
 pub mod problem;
 mod provenance;
 mod rare;
+mod rates;
 mod reference;
 mod resolver;
 mod row;
@@ -47,6 +49,7 @@ pub use plan::{
 pub use plan::{Rows, admits};
 pub use port_channels::PortChannels;
 pub use provenance::persistence_lag;
+pub use rates::{Periods, RateError, Rates};
 pub use reference::Reference;
 pub use scope::outermost;
 
@@ -139,6 +142,7 @@ fn planned(
         debug_assert_eq!(plan.check_order(), Ok(()));
         // Of a graph that is otherwise whole: outputs that are missing or never have a value, and what nobody uses.
         steps::check_use(graph, &plan, diagnostics);
+        fed_back::check(graph, &plan, diagnostics);
     }
     if diagnostics.has_errors() {
         return Err(Box::new(Part { plan, broken }));

@@ -1,9 +1,9 @@
 //! What the slots of a plan follow from, and what follows from them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Plan, PlannedNode};
-use crate::node::Duty;
+use crate::node::{Duty, Role};
 
 /// The slots from which others follow, these included, where `reads` gives those that a node goes by.
 #[must_use]
@@ -75,9 +75,53 @@ pub fn slots(plan: &Plan, gathers: impl Iterator<Item = usize>) -> Vec<usize> {
 /// The measured channels from which a slot follows, by their number.
 #[must_use]
 pub fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
-    let mut of_slot = upstream(plan, vec![slot], |node| inputs(plan, node));
+    let made_of = |node: &PlannedNode| {
+        let ports = match (node.spec.role(), node.ports.first()) {
+            (Role::Feature(feature), Some((port, _))) => feature.reach(port).ports(usize::MAX),
+            _ => usize::MAX,
+        };
+        slots(plan, node.role.inputs().take(ports))
+    };
+    let mut of_slot = upstream(plan, vec![slot], made_of);
     of_slot.truncate(plan.sources.len());
     of_slot
+}
+
+/// The truths with a window, by slot, and the channels without one of their own that each is taken over: positions that are measured, or
+/// put back.
+#[must_use]
+pub fn windowed(plan: &Plan) -> BTreeMap<usize, Vec<usize>> {
+    let truths = plan.nodes.iter().filter_map(|node| node.role.truth());
+    let slots: BTreeSet<usize> = truths.map(|of| of.slot).collect();
+    (slots.into_iter())
+        .filter(|slot| !plan.channels[*slot].channel.span.is_zero())
+        .map(|slot| (slot, taken_over(plan, slot)))
+        .collect()
+}
+
+fn taken_over(plan: &Plan, slot: usize) -> Vec<usize> {
+    let (mut found, mut open) = (Vec::new(), vec![slot]);
+    let mut seen = vec![false; plan.channels.len()];
+    while let Some(slot) = open.pop() {
+        let of = &plan.channels[slot];
+        if std::mem::replace(&mut seen[slot], true) {
+            continue;
+        }
+        if of.channel.span.is_zero() {
+            found.push(slot);
+        } else if let Some(node) = of.node.map(|node| &plan.nodes[node])
+            && let Role::Feature(feature) = node.spec.role()
+            && let Some((port, own)) = node.ports.iter().find(|(_, of)| of.contains(&slot))
+        {
+            let inputs: Vec<_> =
+                (node.role.inputs().map(|of| slots(plan, [of].into_iter()))).collect();
+            let parts = feature
+                .reach(port)
+                .parts(&inputs, slot - own.start, own.len());
+            open.extend(parts.into_iter().map(|(slot, _)| slot));
+        }
+    }
+    found
 }
 
 /// The measured channels that a node watches over, each with the slot of the port `reason` that is about it.
@@ -95,6 +139,17 @@ pub fn health_reasons(plan: &Plan) -> BTreeMap<usize, usize> {
         }
     }
     reasons
+}
+
+/// The measured channels of what a correction applied: they leap and stand still as it does.
+#[must_use]
+pub fn applied(plan: &Plan) -> Vec<bool> {
+    let nodes = plan.nodes.iter();
+    let put_back = nodes.filter(|node| node.kind.duty() == Duty::PutBack);
+    let read = slots(plan, put_back.filter_map(|node| node.role.inputs().nth(1)));
+    (0..plan.sources.len())
+        .map(|slot| read.contains(&slot))
+        .collect()
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.

@@ -188,6 +188,18 @@ impl PlannedNode {
         let (_, slots) = ports.find(|(port, _)| *port == name)?;
         Some(slots.clone())
     }
+
+    /// The slot in which an estimator that goes on learning says what became of truths, and who speaks.
+    #[must_use]
+    pub fn says_of_learning(&self) -> Option<usize> {
+        let PlannedRole::Estimator { learning, .. } = &self.role else {
+            return None;
+        };
+        learning
+            .as_ref()
+            .and(self.port("learning"))
+            .map(|of| of.start)
+    }
 }
 
 /// What an instance does at a tick.

@@ -79,6 +79,24 @@ impl Plan {
     pub fn observe(&mut self, slots: impl IntoIterator<Item = usize>) {
         lay_out(self, slots, Wanted::default());
     }
+
+    /// The plan that also computes the weights, standard deviations and novelties that nothing reads, for whoever looks on. All else keeps
+    /// its bits.
+    #[must_use]
+    pub fn looked_into(&self) -> Self {
+        let beside = |node: &PlannedNode| [WEIGHTS, STD_DEV, NOVELTY].map(|port| node.port(port));
+        let slots: Vec<_> = self
+            .nodes
+            .iter()
+            .flat_map(beside)
+            .flatten()
+            .flatten()
+            .collect();
+        let mut plan = self.clone();
+        plan.observe(slots);
+        plan.warm_up = self.warm_up;
+        plan
+    }
 }
 
 /// Notes what is computed only where somebody reads it, beside what has been noted: all ports of features but the first, weights

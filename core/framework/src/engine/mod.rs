@@ -4,9 +4,12 @@
 //! another engine. Sources and sinks are not known here.
 
 mod at_work;
+mod contributions;
 mod error;
+mod holding;
 mod idle;
 mod isolation;
+pub mod leap;
 mod learning;
 mod sample_range;
 mod state;
@@ -15,8 +18,11 @@ mod tick;
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
+pub use crate::node::who_speaks;
 pub use at_work::{When, naming_one};
+pub use contributions::Contribution;
 pub use error::EngineError;
+pub use holding::{Held, Holding};
 pub use learning::{Mode, Pair, Pairing, StepLength, times};
 pub use sample_range::SampleRange;
 pub use state::{
@@ -27,6 +33,7 @@ pub use tick::{Cursor, History};
 pub use idle::Answer;
 
 pub(crate) use at_work::{caught, naming};
+use leap::Leaps;
 use tick::Gathered;
 
 use crate::channel::Extremes;
@@ -52,15 +59,16 @@ pub struct Engine {
     revision: OnceLock<Arc<str>>,
     slots: Slots,
     gathered: Vec<Gathered>,
-    /// Few channels have one, so each stands by itself.
-    histories: Vec<Option<Box<History>>>,
-    /// The slots that have a history of what they held.
-    recorded: Vec<usize>,
+    /// Of the few slots that have one, in their order: see [`with_history`].
+    histories: Box<[History]>,
+    /// Those that have a history of what they held, with its place.
+    recorded: Vec<(usize, usize)>,
     /// The planned channels, each with what it held before the tick.
     planned: Vec<PlannedSlot>,
     /// The nodes that are given truths after all outputs, and the slots of these.
     truths: Vec<(usize, usize)>,
-    nodes: Vec<NodeRunner>,
+    nodes: Box<[NodeRunner]>,
+    leaps: Leaps,
     work: Box<[Work]>,
     last: Instant,
     /// Set between a segment break and the first tick after it: the last instant before the break.
@@ -88,13 +96,14 @@ impl Engine {
     /// # Errors
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
-        let nodes = runners(&plan, fitted)?;
-        let planned = PlannedSlot::all(&plan);
+        let leaps = Leaps::new(&plan);
+        let nodes = runners(&plan, fitted, &leaps)?;
+        let with_history: Vec<_> = with_history(&plan).collect();
+        let planned = PlannedSlot::all(&plan, &with_history);
         let is_planned = |slot: usize| planned.iter().any(|of| of.slot == slot);
-        let with_history =
-            |&slot: &usize| plan.channels[slot].history.is_some() && !is_planned(slot);
+        let recorded = with_history.iter().copied().zip(0..);
         Ok(Self {
-            recorded: (0..plan.channels.len()).filter(with_history).collect(),
+            recorded: recorded.filter(|(slot, _)| !is_planned(*slot)).collect(),
             planned,
             truths: nodes
                 .iter()
@@ -102,11 +111,15 @@ impl Engine {
                 .filter_map(|(node, running)| Some((node, running.truth()?)))
                 .collect(),
             slots: Slots::new(plan.channels.len()),
-            gathered: plan.gathers.iter().map(Gathered::new).collect(),
+            gathered: plan
+                .gathers
+                .iter()
+                .map(|gather| Gathered::new(gather, &with_history))
+                .collect(),
             histories: plan
                 .channels
                 .iter()
-                .map(|channel| channel.history.map(|depth| Box::new(History::new(depth))))
+                .filter_map(|channel| channel.history.map(History::new))
                 .collect(),
             row: vec![
                 0.0;
@@ -119,6 +132,7 @@ impl Engine {
             ],
             work: work(&plan, &nodes),
             nodes,
+            leaps,
             last: Instant::MIN,
             before_break: None,
             rejected: vec![0; plan.sources.len()],
@@ -180,15 +194,33 @@ impl Engine {
         Ok(self.outputs.values())
     }
 
+    /// Takes several rows, one after the other, to the bits of as many [steps](Self::step); `look` sees the engine after each. Where thousands
+    /// of engines take turns, what one knows is brought into the caches of the processor once for all of them.
+    ///
+    /// # Errors
+    /// As of a step: the rows before it have been taken, and none after it.
+    pub fn step_rows<'a>(
+        &mut self,
+        rows: impl IntoIterator<Item = (Instant, &'a [f64])>,
+        mut look: impl FnMut(&Self, Instant),
+    ) -> Result<(), EngineError> {
+        for (time, samples) in rows {
+            self.step(time, samples)?;
+            look(self, time);
+        }
+        Ok(())
+    }
+
     /// Runs the nodes in order. One that panics is given up where the engine isolates nodes, and the rest goes on.
     fn run_nodes(&mut self, time: Instant) {
         let mut nth = 0;
         while let Err((node, panic)) = caught(|at_work| {
-            let nodes = &mut *self.nodes;
+            let (nodes, gathers) = (&mut *self.nodes, &*self.plan.gathers);
             let mut context = TickContext {
                 now: time,
                 slots: &mut self.slots,
                 gathered: &mut self.gathered,
+                leaps: &mut self.leaps,
                 row: &mut self.row,
                 frozen: self.frozen,
                 at_work,
@@ -197,7 +229,8 @@ impl Engine {
                 nth += 1;
                 match work {
                     Work::Step(Step::Gather(gather)) => {
-                        context.gathered[*gather].read(context.slots, &self.histories, time);
+                        let of = &gathers[*gather];
+                        context.gathered[*gather].read(of, context.slots, &self.histories, time);
                     }
                     Work::Step(Step::Run(node)) => {
                         context.at_work.is(*node);
@@ -298,12 +331,10 @@ impl Engine {
                 }
             }
         });
+        self.leaps.segment();
         self.slots.clear();
         self.gathered.iter_mut().for_each(Gathered::clear);
-        self.histories
-            .iter_mut()
-            .flatten()
-            .for_each(|of| of.clear());
+        self.histories.iter_mut().for_each(History::clear);
         self.before_break = Some(self.last);
         self.last = Instant::MIN;
     }
@@ -440,19 +471,17 @@ impl Engine {
             }
         }
         for planned in &self.planned {
-            if let Some(history) = &mut self.histories[planned.slot] {
-                planned.take(&mut self.slots, history, time);
-            }
+            planned.take(&mut self.slots, &mut self.histories, time);
         }
     }
 
     /// Writes down what later ticks will ask for, and hands truths over, now that all outputs of the tick are there.
     fn remember(&mut self, now: Instant) {
-        for &slot in &self.recorded {
-            if let Some(history) = &mut self.histories[slot]
-                && self.slots.ran(slot)
-            {
-                history.push(now, self.slots.values[slot], self.slots.given[slot].stamp);
+        self.leaps.remember(&self.slots, now);
+        for &(slot, nth) in &self.recorded {
+            if self.slots.ran(slot) {
+                let stamp = self.slots.given[slot].stamp;
+                self.histories[nth].push(now, self.slots.values[slot], stamp);
             }
         }
         for &(node, slot) in &self.fed_back {
@@ -499,6 +528,12 @@ impl Engine {
             }
         }
     }
+}
+
+/// The slots of a plan that have a history, in their order.
+fn with_history(plan: &Plan) -> impl Iterator<Item = usize> {
+    let channels = plan.channels.iter().enumerate();
+    channels.filter_map(|(slot, channel)| channel.history.map(|_| slot))
 }
 
 impl std::fmt::Debug for Engine {

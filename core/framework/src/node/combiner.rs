@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{InputPort, KindFacts, Mistake, Restored, State};
+use super::{InputPort, Kept, KindFacts, Mistake, Restored, State};
 use crate::time::{Duration, Instant};
 
 /// A node that makes one prediction of several for the same instant.
@@ -89,6 +89,12 @@ pub trait Combiner: Debug + Send + Sync {
     /// How long what was learned counts; the engine keeps so much of the past for warming up.
     fn memory(&self) -> Duration {
         Duration::ZERO
+    }
+
+    /// What it keeps of the past in memory, where truths come each `every`: see [`Feature::keeps`](super::Feature::keeps). By default that is a
+    /// number and an instant of each voter, for as long as [`memory`](Self::memory).
+    fn keeps(&self, voters: usize, every: Duration) -> Vec<Kept> {
+        Kept::past(self.memory(), every, 16 * voters)
     }
 
     /// Whether what was learned counts for ever, or for so many truths however long they take to come, so that no length of the past

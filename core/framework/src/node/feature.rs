@@ -4,7 +4,8 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use super::{
-    Encoder, InputPort, Inputs, KindFacts, Mistake, OutputPort, PortSummary, Reach, Restored, State,
+    Encoder, InputPort, Inputs, Kept, KindFacts, Mistake, OutputPort, PortSummary, Reach, Restored,
+    State,
 };
 use crate::channel::unless_infinite;
 use crate::time::{Duration, Instant};
@@ -143,6 +144,13 @@ pub trait Feature: Debug + Send + Sync {
     /// How far back the inputs reach that the outputs depend on; the engine keeps so much of the past for warming up.
     fn memory(&self) -> Duration {
         Duration::ZERO
+    }
+
+    /// What it keeps of the past in memory, by window, where its channels have a sample each `every`: for whoever asks how much memory a graph
+    /// takes before it runs. By default that is a number and an instant of each channel, for as long as [`memory`](Self::memory).
+    fn keeps(&self, inputs: &Inputs, _wanted: &[bool], every: Duration) -> Vec<Kept> {
+        let channels = inputs.ports.iter().map(|(_, channels)| channels.len());
+        Kept::past(self.memory(), every, 16 * channels.sum::<usize>())
     }
 
     /// How far ahead of a tick it also reads the channels of its first port, each time above 0. Only planned channels may be read so,

@@ -10,6 +10,24 @@ pub struct KindFacts {
     pub reasons: &'static [&'static str],
     /// What it does, where reports go by that.
     pub duty: Duty,
+    /// What runs may be another for the same parameters, such as a class of Python: models with it share no plan.
+    pub can_change: bool,
+    /// Of a feature, how often its channels are given something.
+    pub pace: Pace,
+}
+
+/// How often the channels of a feature are given something.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// All when it runs.
+    #[default]
+    Together,
+    /// Those that are made of a channel of its first port when that is, in all ports.
+    ByChannel,
+    /// Those of its first port when the channels that pass through it are, which its first input begins with; the others at every tick.
+    Passes,
+    /// All when its second input is.
+    BySecond,
 }
 
 /// What a node does for a graph. Names are those of parameters, each a quantity or a duration.
@@ -64,7 +82,15 @@ impl KindFacts {
             is_change: false,
             reasons: &[],
             duty,
+            can_change: false,
+            pace: Pace::Together,
         }
+    }
+
+    /// The same of a feature whose channels are given something so often.
+    #[must_use]
+    pub const fn pace(self, pace: Pace) -> Self {
+        Self { pace, ..self }
     }
 
     /// The same of a kind whose outputs are changes.

@@ -145,6 +145,33 @@ pub trait Learner: Debug + Send {
         true
     }
 
+    /// Each truth is about so long a window before it; zero where it is of an instant. Said once, before the first.
+    fn set_window(&mut self, _window: Duration) {}
+
+    /// In which time what it learns fades, of kinds that go back to their fit. At most ten truths of one window are then handed over.
+    fn memory(&self) -> Option<Duration> {
+        None
+    }
+
+    /// Whether it speaks only while it errs no more than the fit that it began from: until there have been 20 windows of truth, and one
+    /// memory after the last, the fit stands in.
+    fn yields_to_fit(&self) -> bool {
+        self.memory().is_some()
+    }
+
+    /// What stands in for it where its fit is to, of kinds whose fit follows truths too; of others the predictor does, as it was fitted.
+    fn as_fitted(&self) -> Option<&dyn Learner> {
+        None
+    }
+
+    /// Whether a truth that belongs to these regressors would say so little that it is better passed over.
+    fn says_little(&self, _regressors: &[f64]) -> bool {
+        false
+    }
+
+    /// A truth that says little: time goes on without being forgotten in, and a level follows it.
+    fn pass_over(&mut self, _regressors: &[f64], _truth: f64, _at: Instant) {}
+
     /// A truth, measured at `at`, and the regressors of the run that it belongs to. Instants never go back.
     ///
     /// Nothing is allocated here.

@@ -1,8 +1,9 @@
 //! Decides which truths a learner is kept from, beside a machine as in the rehearsal of a fit; how it learns is its own.
 
 use super::recent_error::RecentError;
-use super::{Learner, TrainedRange};
-use crate::time::Instant;
+use super::standing::{Speaks, Standing};
+use super::{Learner, Predictor};
+use crate::time::{Duration, Instant};
 
 /// What a learner does not learn from: the key `learn` of an estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,11 +23,22 @@ impl LearningLimits {
     };
 }
 
+/// How long after a truth the next one teaches, of truths that each tell of so long a window: at most ten of one do.
+#[must_use]
+pub fn between_lessons(window: Duration) -> Duration {
+    Duration::from_ns(window.as_ns() / 10)
+}
+
 /// What keeps a learner from rows that would spoil it.
 #[derive(Debug, Clone)]
 pub struct LearningGate {
     limits: LearningLimits,
+    /// The span of the truth.
+    window: Duration,
     pub(crate) recent: RecentError,
+    /// How it stands beside its fit, where that is to stand in at times, and after which memory without a truth it does.
+    pub(crate) standing: Standing,
+    pub(crate) memory: Option<Duration>,
 }
 
 /// What became of a row that was offered.
@@ -38,28 +50,45 @@ pub enum Admission {
     Outlier,
     /// A regressor lay outside the range of the fit: a level followed it all the same, where there is one.
     OutsideRange,
+    /// It says too little: a level followed it all the same, where there is one.
+    SaysLittle,
+    /// Its window has taught as often as it may.
+    TooMany,
 }
 
 impl LearningGate {
-    /// Before the first truth of a learner.
+    /// Before the first truth of a learner, each of which is about so long a window.
     #[must_use]
-    pub fn new(limits: LearningLimits, learner: &dyn Learner) -> Self {
+    pub fn new(limits: LearningLimits, window: Duration, learner: &mut dyn Learner) -> Self {
+        learner.set_window(window);
         Self {
             limits,
+            window,
             recent: RecentError::of_fit(learner.usual_error()),
+            standing: Standing::new(),
+            memory: learner.memory().filter(|_| learner.yields_to_fit()),
         }
     }
 
     /// Lets a learner learn from a truth that was measured at `at` and the regressors of the run that it belongs to, all of them
-    /// there, unless something speaks against it. `range` is that of the regressors in the fit, where it was kept.
+    /// there, unless something speaks against it. It began from a fit.
     pub fn offer(
         &mut self,
         learner: &mut dyn Learner,
-        range: Option<&TrainedRange>,
+        fit: &dyn Predictor,
         row: &[f64],
         truth: f64,
         at: Instant,
     ) -> Admission {
+        if learner.memory().is_some() {
+            let between = between_lessons(self.window);
+            let lesson = &mut self.recent.lesson;
+            if lesson.is_some_and(|last| at >= last && at - last < between) {
+                return Admission::TooMany;
+            }
+            *lesson = Some(at);
+        }
+        let range = fit.trained_range();
         let outside = range.is_some_and(|range| !range.contains(row, self.limits.margin));
         if outside && !learner.has_level() {
             return Admission::OutsideRange;
@@ -69,14 +98,47 @@ impl LearningGate {
         let most = self.limits.outliers;
         // What has yet to find out where it is may be far off.
         let starts_anywhere = learner.extrapolates();
-        if learner.is_settled() && !self.recent.admits(error, std_dev, most, starts_anywhere) {
+        let (miss, when) = ((error, std_dev), (at, self.window));
+        if learner.is_settled() && !self.recent.admits(miss, most, starts_anywhere, when) {
             return Admission::Outlier;
         }
         if outside {
             learner.follow_level(row, truth, at);
             return Admission::OutsideRange;
         }
+        if self.memory.is_some() {
+            let of_fit = match learner.as_fitted() {
+                Some(fit) => fit.predict(row, at),
+                None => fit.predict(row),
+            };
+            self.standing
+                .observe([error, truth - of_fit], at, self.window);
+        }
+        if learner.says_little(row) {
+            learner.pass_over(row, truth, at);
+            return Admission::SaysLittle;
+        }
         learner.learn(row, truth, at);
         Admission::Learned
+    }
+
+    /// Who speaks at an instant.
+    pub(crate) fn speaks(&self, now: Instant) -> Speaks {
+        let speaks = |memory| self.standing.speaks(now, memory);
+        self.memory.map_or(Speaks::Learner, speaks)
+    }
+
+    /// Who predicts at an instant: a learner, or what stands in for it while its fit is to.
+    #[must_use]
+    pub fn speaker<'a>(&self, learner: &'a dyn Learner, now: Instant) -> &'a dyn Learner {
+        let fit = learner.as_fitted();
+        fit.filter(|_| self.speaks(now) != Speaks::Learner)
+            .unwrap_or(learner)
+    }
+
+    /// Moves what is remembered to the clock of another segment.
+    pub fn segment(&mut self, shift: Duration) {
+        self.recent.shift(shift);
+        self.standing.shift(shift);
     }
 }

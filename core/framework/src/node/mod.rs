@@ -16,6 +16,7 @@ mod estimator;
 mod feature;
 mod figure;
 mod forms;
+mod kept;
 mod kind_facts;
 mod learner;
 mod learning_gate;
@@ -30,6 +31,7 @@ mod range;
 mod reach;
 mod recent_error;
 mod registry;
+mod standing;
 mod state;
 mod training_error;
 
@@ -45,9 +47,10 @@ pub use feature::{Feature, Operator, Outputs, Tick};
 pub(crate) use feature::{PortValues, SlotTime};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
-pub use kind_facts::{Duty, KindFacts};
+pub use kept::Kept;
+pub use kind_facts::{Duty, KindFacts, Pace};
 pub use learner::{Learner, Learns, TrainedRange};
-pub use learning_gate::{Admission, LearningGate, LearningLimits};
+pub use learning_gate::{Admission, LearningGate, LearningLimits, between_lessons};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read};
@@ -60,6 +63,8 @@ pub(crate) use recent_error::RecentError;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeKind, NodeSpec, ReadSpec, Role, RoleName, as_toml, inline_toml};
+pub use standing::who_speaks;
+pub(crate) use standing::{Speaks, Standing};
 #[doc(hidden)]
 pub use state::StateForm;
 pub use state::{Restored, State};

@@ -15,9 +15,9 @@ pub enum Reach {
     /// first input port, in that order; of another input port with as many channels it reads its own there too, and of any
     /// other all.
     Own,
-    /// Each is made of its own channel of the first input port as with [`Own`](Reach::Own). The values of other ports reach
-    /// none: only that they come says when.
-    First,
+    /// Each is made of its own channel of the first input ports, so many, as with [`Own`](Reach::Own). The values of other ports reach none:
+    /// they say when there is a value, or whether.
+    First(usize),
     /// Each is made of its own input channel as with [`Own`](Reach::Own), and there is one for each of these delays.
     Delayed(Vec<Duration>),
 }
@@ -33,13 +33,9 @@ impl Reach {
         }
         let delay = match self {
             Self::Delayed(delays) => delays.get(nth % each).copied().unwrap_or_default(),
-            Self::All | Self::Own | Self::First => Duration::ZERO,
+            Self::All | Self::Own | Self::First(_) => Duration::ZERO,
         };
-        let ports = if *self == Self::First {
-            1
-        } else {
-            inputs.len()
-        };
+        let ports = self.ports(inputs.len());
         let own = inputs.iter().take(ports).flat_map(|port| {
             if port.len() == owners {
                 &port[nth / each..=nth / each]
@@ -48,6 +44,14 @@ impl Reach {
             }
         });
         own.map(|&slot| (slot, delay)).collect()
+    }
+
+    /// The values of how many of the input ports, the first, reach an output port.
+    pub(crate) fn ports(&self, all: usize) -> usize {
+        match self {
+            Self::First(ports) => *ports,
+            _ => all,
+        }
     }
 }
 
@@ -76,7 +80,7 @@ mod tests {
     #[test]
     fn a_port_that_says_only_when_reaches_nothing() {
         let inputs = [vec![3, 4], vec![7, 8]];
-        assert_eq!(slots(&Reach::First, &inputs, 1, 2), [4]);
+        assert_eq!(slots(&Reach::First(1), &inputs, 1, 2), [4]);
     }
 
     #[test]

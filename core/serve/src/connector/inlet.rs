@@ -34,6 +34,11 @@ pub trait Source: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// What is wrong with an address that `channels` gives a channel, or doubtful: it is reported where that stands.
+    fn remark(&self, _address: &str) -> Option<ParameterRemark> {
+        None
+    }
+
     /// Whether its connection is dropped and made anew where it is connected, and neither gives a sample nor says that it is
     /// [alive](Outflow::alive) for as long as `silent` says. A reconnect that brings no data back is noticed by that.
     fn is_watched(&self) -> bool {
@@ -138,6 +143,10 @@ pub struct SourceWiring {
     pub folder: PathBuf,
     /// The channels that it is to give, in the order in which [`Outflow::sample`] counts them.
     pub channels: Vec<WiredChannel>,
+    /// How long it may be connected without a sample and without a sign of life: then it is started over.
+    pub silent: Wait,
+    /// The longest pause after a failure, for whoever connects by itself.
+    pub retry: Wait,
     /// How tables give time.
     pub time: TimeBase,
     /// How tables are laid out.
@@ -166,6 +175,7 @@ pub trait Inlet: Send {
     /// Gives samples until there will be no more, or it is to stop.
     ///
     /// # Errors
-    /// When it cannot go on, and why. It is reported, and `run` is called again after a while: 0.5 s at first, 30 s at most.
+    /// When it cannot go on, and why. It is reported, and `run` is called again after a while: 0.5 s at first, and
+    /// no longer than `retry` says.
     fn run(&mut self, out: &mut Outflow, stop: &Stop) -> Result<(), ConnectorError>;
 }

@@ -42,6 +42,8 @@ reasons! {
     NoNumber "no_number"
     /// The source says that it is not good.
     BadQuality "bad_quality"
+    /// The source says that it is doubtful, and none such is to be taken.
+    Uncertain "uncertain"
     /// It has no time that can be read.
     NoTime "no_time"
     /// Its time does not go on from that of the row before.

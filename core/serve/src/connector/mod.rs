@@ -23,7 +23,9 @@ pub use kind::{ConnectorKind, SinkKind, SourceKind};
 #[doc(hidden)]
 pub use kind::{read_sink, read_source};
 pub use left_out::{LeftOut, LeftOutCounts};
-pub use outlet::{Kept, OutRow, Outlet, Place, Purpose, Sink, SinkWiring, WiredOutput};
+pub use outlet::{
+    Kept, Messages, OpensMessages, OutRow, Outlet, Place, Purpose, Sink, SinkWiring, WiredOutput,
+};
 pub(crate) use source_link::{Arrival, SourceLink, link};
 pub use source_link::{Connection, Outflow, Remarks, SourceCounts};
 pub use stop::Stop;

@@ -2,10 +2,11 @@
 
 use std::fmt::Debug;
 use std::path::PathBuf;
+use std::time::Duration as Wait;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ConnectorError, ParameterRemark};
+use super::{ConnectorError, ParameterRemark, Seen};
 use crate::document::TimeBase;
 use crate::time::{Duration, Instant};
 
@@ -21,11 +22,46 @@ pub trait Sink: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Whether it can put each output out, for whoever commissions it: it connects, looks, and leaves; none where it cannot be asked.
+    /// [`Seen::channel`] is the number of an output, and
+    /// [`Seen::granted`] to where it goes.
+    fn look(&self, _: SinkWiring, _: Wait) -> Option<Result<Vec<Seen>, ConnectorError>> {
+        None
+    }
+
     /// The sink at work. Nothing is connected yet: that is for the first [`Outlet::put`].
     ///
     /// # Errors
     /// When it cannot be what is asked of it: a command keeps the service from starting, a log is tried again.
     fn open(&self, wiring: SinkWiring) -> Result<Box<dyn Outlet>, ConnectorError>;
+
+    /// What sends messages beside rows, such as alarms, where the kind does.
+    fn messages(&self) -> Option<&dyn OpensMessages> {
+        None
+    }
+}
+
+/// Sends messages beside the rows of a sink, to where that puts them.
+pub trait OpensMessages {
+    /// On a connection of its own, whose name ends in `suffix`, under a topic.
+    ///
+    /// # Errors
+    /// When it can never send there, and why.
+    fn open(
+        &self,
+        wiring: &SinkWiring,
+        suffix: &str,
+        topic: &str,
+    ) -> Result<Box<dyn Messages>, ConnectorError>;
+}
+
+/// Messages on their way, on a thread that may wait.
+pub trait Messages: Send {
+    /// Sends one, until the other end has it.
+    ///
+    /// # Errors
+    /// When it does not have it yet, and why: it may have it later all the same, and is to be sent again.
+    fn send(&mut self, text: &str) -> Result<(), ConnectorError>;
 }
 
 /// What a sink is for.
@@ -44,12 +80,16 @@ pub struct SinkWiring {
     pub name: String,
     /// The name of the graph, if it has one.
     pub machine: Option<String>,
+    /// A folder of its own beside the journal, which need not be there yet.
+    pub state: PathBuf,
     /// The folder that relative paths start from.
     pub folder: PathBuf,
     /// The outputs that it is given, in the order of [`OutRow::outputs`].
     pub outputs: Vec<WiredOutput>,
     /// How tables give time.
     pub time: TimeBase,
+    /// The longest pause after a failure, for whoever connects by itself.
+    pub retry: Wait,
 }
 
 /// An output that a sink is given.
@@ -148,6 +188,8 @@ pub struct OutRow<'a> {
     pub behind: Duration,
     /// The revision of the graph that made it.
     pub revision: u64,
+    /// Whether the service is degraded while the row is put out, as its status says.
+    pub is_degraded: bool,
     /// The outputs; NaN where there is none.
     pub outputs: &'a [f64],
 }

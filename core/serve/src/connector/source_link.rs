@@ -1,8 +1,8 @@
 //! What lies between the thread of a source and the engine thread: a bounded ring, on which neither waits for the other's work.
 
 use std::fmt;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 use std::time::Duration as Wait;
 
@@ -75,6 +75,8 @@ pub struct SourceCounts {
     has_ended: AtomicBool,
     /// What it left out, by its channels.
     pub left_out: LeftOutCounts,
+    /// How its channels are, in its own words; empty where it says nothing.
+    states: Mutex<Vec<String>>,
     /// The places of its channels in the feed.
     places: Vec<u32>,
     /// So many samples have been taken by the engine thread…
@@ -84,6 +86,13 @@ pub struct SourceCounts {
 }
 
 impl SourceCounts {
+    /// How a channel is, by its number, as the source says; none where it says nothing.
+    #[must_use]
+    pub fn state(&self, channel: usize) -> Option<String> {
+        let states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.get(channel).filter(|of| !of.is_empty()).cloned()
+    }
+
     /// How many samples wait for the engine thread.
     #[must_use]
     pub fn waiting(&self) -> u64 {
@@ -215,6 +224,7 @@ pub(crate) fn link(
     let (ring, arrivals) = RingBuffer::new(room);
     let counts = Arc::new(SourceCounts {
         left_out: LeftOutCounts::new(channels.len()),
+        states: Mutex::new(vec![String::new(); channels.len()]),
         places: places.to_vec(),
         ..SourceCounts::default()
     });
@@ -428,6 +438,15 @@ impl Outflow {
     /// Counts samples that the source leaves out: the channel by its number, none where it is not known.
     pub fn left_out(&self, channel: Option<usize>, reason: LeftOut, samples: u64) {
         self.counts.left_out.count(channel, reason, samples);
+    }
+
+    /// Says how a channel is, such as `waiting: BadNodeIdUnknown since 10:31` or `granted 100 ms, queue 20`: a status shows it.
+    pub fn state(&self, channel: usize, words: impl fmt::Display) {
+        let states = self.counts.states.lock();
+        let mut states = states.unwrap_or_else(PoisonError::into_inner);
+        if let Some(of) = states.get_mut(channel) {
+            *of = words.to_string();
+        }
     }
 
     /// Where it reports what it leaves out.

@@ -64,6 +64,17 @@ pub(super) fn find<'a>(table: &'a Value, at: &[String]) -> (Option<&'a Value>, P
 pub(super) fn report(remarks: Vec<ParameterRemark>, table: &Value, diagnostics: &mut Diagnostics) {
     for remark in remarks {
         let (_, place, _) = find(table, &remark.at);
+        report_at(place, Some(remark), diagnostics);
+    }
+}
+
+/// Reports one at a place.
+pub(super) fn report_at(
+    place: Place,
+    remark: Option<ParameterRemark>,
+    diagnostics: &mut Diagnostics,
+) {
+    if let Some(remark) = remark {
         let (words, advice) = (remark.words, remark.help);
         match remark.is_mistake {
             true => diagnostics.report(place, UnfitParameter { words, advice }),

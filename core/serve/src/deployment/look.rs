@@ -1,7 +1,7 @@
 //! What the sources of a deployment have of each channel at present, as a table.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Duration as Wait;
 
 use serde_json::{Value, json};
@@ -10,11 +10,13 @@ use super::Deployment;
 use crate::compile::Plan;
 use crate::connector::{ConnectorError, Seen};
 
-/// What a source has.
+/// What a source has, or of a sink, what its outputs go to.
 #[derive(Debug)]
 pub struct Found {
-    /// The name of the source.
-    pub source: String,
+    /// Whether it is a source or a sink.
+    pub role: &'static str,
+    /// Its name.
+    pub name: String,
     /// What it has of each channel, with the names of the channel and of its place; or why it cannot be asked.
     pub channels: Result<Vec<(String, String, Seen)>, ConnectorError>,
     /// How many channels have no value.
@@ -27,25 +29,38 @@ const NAMES: [&str; 7] = [
 ];
 
 impl Deployment {
-    /// Asks each source for one of everything, which may take so long each. `plan` is what it was read with.
+    /// Asks each source for one of everything, and each sink whether it can put out what it is given, which may take so long each.
+    /// `plan` is what it was read with, `state` the folder of the service.
     #[must_use]
-    pub fn look(&self, plan: &Plan, patience: Wait) -> Vec<Found> {
-        let found = self.sources.iter().map(|source| {
-            let seen = source
-                .parameters
-                .look(source.wiring(plan, PathBuf::new()), patience);
-            let lacks = |seen: &Vec<Seen>| seen.iter().filter(|of| of.value.is_none()).count();
+    pub fn look(&self, plan: &Plan, state: &Path, patience: Wait) -> Vec<Found> {
+        let lacks = |seen: &Vec<Seen>| seen.iter().filter(|of| of.value.is_none()).count();
+        let sources = self.sources.iter().map(|source| {
+            let seen = source.parameters.look(source.wiring(plan, state), patience);
             let named = |of: Seen| {
                 let channel = &source.channels[of.channel];
                 (channel.channel.name.clone(), channel.address.clone(), of)
             };
             Found {
-                source: source.name.clone(),
+                role: "source",
+                name: source.name.clone(),
                 missing: seen.as_ref().map_or(source.channels.len(), lacks),
                 channels: seen.map(|seen| seen.into_iter().map(named).collect()),
             }
         });
-        found.collect()
+        let sinks = self.sinks.iter().filter_map(|sink| {
+            let seen = sink.parameters.look(sink.wiring(plan, state), patience)?;
+            let named = |mut of: Seen| {
+                let to = std::mem::take(&mut of.granted);
+                (sink.outputs[of.channel].clone(), to, of)
+            };
+            Some(Found {
+                role: "sink",
+                name: sink.name.clone(),
+                missing: seen.as_ref().map_or(sink.outputs.len(), lacks),
+                channels: seen.map(|seen| seen.into_iter().map(named).collect()),
+            })
+        });
+        sources.chain(sinks).collect()
     }
 }
 
@@ -67,7 +82,7 @@ impl Found {
         let channels = self.channels.as_ref();
         let channels = channels.map(|all| all.iter().map(channel).collect::<Vec<_>>());
         let error = channels.as_ref().err().map(ToString::to_string);
-        json!({ "source": self.source, "channels": channels.ok(), "error": error })
+        json!({ self.role: self.name, "channels": channels.ok(), "error": error })
     }
 }
 
@@ -75,7 +90,7 @@ impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let channels = match &self.channels {
             Ok(channels) => channels,
-            Err(error) => return writeln!(f, "source `{}`: {error}", self.source),
+            Err(error) => return writeln!(f, "{} `{}`: {error}", self.role, self.name),
         };
         let cells = |(name, from, of): &(String, String, Seen)| {
             let shown = |of: Option<String>| of.unwrap_or_else(|| "-".to_owned());
@@ -92,8 +107,9 @@ impl fmt::Display for Found {
         let rows: Vec<_> = channels.iter().map(cells).collect();
         writeln!(
             f,
-            "source `{}`, {} of {} missing",
-            self.source,
+            "{} `{}`, {} of {} missing",
+            self.role,
+            self.name,
             self.missing,
             rows.len()
         )?;

@@ -7,6 +7,7 @@ mod look;
 pub mod problem;
 mod runtime;
 mod schema;
+mod secret;
 mod sinks;
 mod size;
 mod sources;
@@ -15,19 +16,25 @@ pub(crate) use keys::read as read_keys;
 pub use look::Found;
 pub use runtime::{Keep, Runtime};
 pub use schema::schemas;
+pub use secret::{Login, Secret};
 pub use size::Size;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration as Wait;
 
 use athermal_run::recording::{ThinnedChannels, Thinning};
 
 use crate::companion::{Companion, CompanionKind};
 use crate::compile::{Plan, SourceChannel};
-use crate::connector::{Mapped, Sink, SinkKind, Source, SourceKind, SourceWiring, WiredChannel};
+use crate::connector::{
+    Mapped, Sink, SinkKind, SinkWiring, Source, SourceKind, SourceWiring, WiredChannel, WiredOutput,
+};
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::document::GraphFile;
 use crate::registry::{self, Registered};
 use crate::sequencer::ClockRule;
+use crate::service::usual_state;
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -60,6 +67,8 @@ pub struct DeclaredSource {
     pub folder: PathBuf,
     /// A source that is away so long is not waited for.
     pub silent: Duration,
+    /// The longest pause after a failure.
+    pub retry: Duration,
     /// How its clock is judged; not at all without.
     pub clock: Option<ClockRule>,
     /// How it is thinned before the graph; not at all without.
@@ -91,21 +100,27 @@ pub struct DeclaredSink {
     /// Its kind.
     pub kind: &'static Registered<SinkKind>,
     /// Its parameters.
-    pub parameters: Box<dyn Sink>,
+    pub parameters: Arc<dyn Sink>,
     /// As of a source.
     pub folder: PathBuf,
     /// The columns of the outputs that it is given, as `run` writes them, in order.
     pub outputs: Vec<String>,
+    /// The longest pause after a failure.
+    pub retry: Duration,
     /// A tick that lies further behind is not put out; for commands 5 s unless the file says otherwise.
     pub behind: Option<Duration>,
     /// By how much a command may change per second, in the unit of each output; without bound where there is none.
     pub rate: Vec<Option<f64>>,
 }
 
+fn wait(of: Duration) -> Wait {
+    Wait::from_nanos(of.as_ns().max(0) as u64)
+}
+
 impl DeclaredSource {
-    /// What it is asked for, with nothing known before. `state` is a folder of its own.
+    /// What it is asked for, with nothing known before. `state` is the folder of the service.
     #[must_use]
-    pub fn wiring(&self, plan: &Plan, state: PathBuf) -> SourceWiring {
+    pub fn wiring(&self, plan: &Plan, state: &Path) -> SourceWiring {
         let unit = |name: &str| {
             let mut channels = plan.sources.iter().zip(&plan.channels);
             let found = channels.find(|(of, _)| of.name == name);
@@ -122,16 +137,49 @@ impl DeclaredSource {
         SourceWiring {
             name: self.name.clone(),
             machine: plan.name.clone(),
-            state,
+            state: state.join("sources").join(&self.name),
             folder: self.folder.clone(),
             channels: self.channels.iter().map(channel).collect(),
+            silent: wait(self.silent),
+            retry: wait(self.retry),
             time: plan.time.clone(),
             table: plan.table.clone(),
         }
     }
 }
 
+impl DeclaredSink {
+    /// What it is given, by the columns that it has. `state` is the folder of the service.
+    #[must_use]
+    pub fn wiring(&self, plan: &Plan, state: &Path) -> SinkWiring {
+        let unit = |name: &String| {
+            let output = plan.outputs.iter().find(|of| of.name == *name)?;
+            Some(plan.channels[output.slot].channel.unit.text().to_owned())
+        };
+        let output = |name: &String| WiredOutput {
+            name: name.clone(),
+            unit: unit(name),
+        };
+        SinkWiring {
+            name: self.name.clone(),
+            machine: plan.name.clone(),
+            state: state.join("sinks").join(&self.name),
+            folder: self.folder.clone(),
+            outputs: self.outputs.iter().map(output).collect(),
+            time: plan.time.clone(),
+            retry: wait(self.retry),
+        }
+    }
+}
+
 impl Deployment {
+    /// The folder that a service of this machine file keeps its state in.
+    #[must_use]
+    pub fn state(&self, machine: &Path) -> PathBuf {
+        let named = self.runtime.state.clone();
+        named.unwrap_or_else(|| usual_state(machine))
+    }
+
     /// The channels that are thinned before the graph, for whoever reads them elsewhere.
     #[must_use]
     pub fn thinned(&self) -> Vec<ThinnedChannels> {
@@ -185,7 +233,11 @@ impl Deployment {
                 break;
             }
             let what = format!("`[{}]`", kind.name);
-            companions.extend((kind.read)(found, &what, diagnostics));
+            let companion = (kind.read)(found, &what, diagnostics);
+            if let (Some(section), Some(companion)) = (found, &companion) {
+                companion.check(section, plan, &sinks, diagnostics);
+            }
+            companions.extend(companion);
         }
         let deployment = Self {
             runtime: runtime?,

@@ -222,6 +222,33 @@ problem! {
     help: advice.clone(),
 }
 
+problem! {
+    /// A section that names neither an output nor a channel.
+    A214 NotShown {
+        section: String,
+        name: String,
+        /// The outputs and channels.
+        known: Arc<Names>,
+    }
+    error: "no such output or channel",
+    explanation: "`[page]` and `[alarms.NAME]` name an output of the graph, or a channel as `tap --channel` shows it. It is named whole, as `now.Z`, or \
+        up to what says which of several it is, as `now`.",
+    message: format!("the graph has neither an output nor a channel `{name}` for `{section}`"),
+    label: "neither an output nor a channel",
+    help: nearest_of(name, known, "there are"),
+}
+
+problem! {
+    /// A command that goes by past drifts of what it moves.
+    A215 CommandFedBack { output: String, channel: String }
+    error: "command that goes by what it moves",
+    explanation: "What a command sink sends corrects the machine, and moves the positions that its prediction is learned from, weighed by or \
+        made of. Their drift then lacks what was taken away.",
+    message: format!("`{output}` is sent as a command and goes by past drifts of `{channel}`, which it moves"),
+    label: "sends it to the machine",
+    help: athermal_core::compile::fed_back::WAY_OUT,
+}
+
 fn nearest_of(name: &str, known: &Names, there_are: &str) -> String {
     match known.nearest(name) {
         Some(near) => format!("did you mean `{near}`?"),

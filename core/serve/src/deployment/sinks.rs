@@ -9,10 +9,10 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::channels::{expand, texts};
-use super::problem::{NoOutput, NotACommand, OtherRate, Unbounded};
-use super::sources::of_kind;
+use super::problem::{CommandFedBack, NoOutput, NotACommand, OtherRate, Unbounded};
+use super::sources::{RETRY, of_kind};
 use super::{DeclaredSink, keys};
-use crate::compile::{Plan, PlannedOutput};
+use crate::compile::{Plan, PlannedOutput, fed_back};
 use crate::connector::{Purpose, Sink};
 use crate::diagnostic::{Diagnostics, Names, Place, Sources};
 use crate::document::{Data, Entry, GraphFile, Pattern, Table, Value, decode};
@@ -21,7 +21,7 @@ use crate::time::Duration;
 use crate::unit::Unit;
 
 /// The keys that every sink has.
-pub(super) const KEYS: [&str; 3] = ["outputs", "behind", "rate"];
+pub(super) const KEYS: [&str; 4] = ["outputs", "behind", "rate", "retry"];
 
 /// How far behind a tick may lie that is a command.
 const BEHIND: Duration = Duration::from_ns(5_000_000_000);
@@ -37,6 +37,9 @@ pub(super) struct SinkKeys {
     /// Only of commands: a tick that lies further behind is not put out; 5 s without.
     #[schemars(extend("exclusiveMinimum" = 0))]
     behind: Option<Duration>,
+    /// The longest pause after a failure: 0.5 s at first, then ever longer ones up to this; 30 s without.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    retry: Option<Duration>,
     /// Only of commands: by how much they may change in a time, such as "5 nm/s", for all outputs or each; the `blend` of an output
     /// without.
     #[serde(rename = "rate")]
@@ -67,6 +70,7 @@ enum RateForm {
 /// What a sink may be given.
 struct Outputs<'a> {
     graph: &'a GraphFile,
+    plan: &'a Plan,
     /// Columns, each with its unit per second, and its `blend` in that.
     columns: Vec<(String, Unit, Option<f64>)>,
     /// Outputs and columns.
@@ -92,6 +96,7 @@ pub(super) fn read(
     let names = names.chain(columns.iter().map(|(name, ..)| name.clone()));
     let outputs = Outputs {
         graph,
+        plan,
         names: Arc::new(names.collect()),
         columns,
     };
@@ -131,6 +136,15 @@ fn sink(
             diagnostics.report(entry.key, NotACommand { key, kind });
         }
     }
+    if is_command {
+        let found = columns.iter().find_map(|nth| {
+            let channel = outputs.moves(*nth)?;
+            Some((outputs.columns[*nth].0.clone(), channel))
+        });
+        if let Some((output, channel)) = found {
+            diagnostics.report(entry.key, CommandFedBack { output, channel });
+        }
+    }
     // What no command is bounded by is not stated either.
     if !is_command {
         rate.fill(None);
@@ -147,18 +161,32 @@ fn sink(
     Some(DeclaredSink {
         name: name.to_owned(),
         kind,
-        parameters,
+        parameters: parameters.into(),
         folder: files.resolve(entry.value.place_of("path"), ""),
         outputs: columns
             .iter()
             .map(|&column| outputs.columns[column].0.clone())
             .collect(),
+        retry: keys.as_ref().and_then(|of| of.retry).unwrap_or(RETRY),
         behind: is_command.then_some(keys?.behind.unwrap_or(BEHIND)),
         rate,
     })
 }
 
 impl Outputs<'_> {
+    /// The position that a column moves and goes by, where it is a prediction that is sent.
+    fn moves(&self, column: usize) -> Option<String> {
+        let channels = &self.plan.channels;
+        let slot = self.plan.outputs[column].slot;
+        channels[slot].predicts?;
+        let moved = fed_back::moved(self.plan, [slot]);
+        // What is sent to a chiller moves no position.
+        let is_position =
+            |slot: &&usize| !channels[**slot].channel.unit.measures_same(&Unit::kelvin());
+        let first = moved.iter().find(is_position)?;
+        Some(channels[*first].name.clone())
+    }
+
     /// The columns that an output, a column or a pattern names.
     fn find(&self, text: &str, place: Place, diagnostics: &mut Diagnostics) -> Vec<usize> {
         let mut found = Vec::new();

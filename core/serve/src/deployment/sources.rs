@@ -20,9 +20,12 @@ use crate::registry::{Registered, Sort, all, find};
 use crate::sequencer::{ClockRemedy, ClockRule};
 use crate::time::Duration;
 
+/// The longest pause after a failure, unless the file says another.
+pub(super) const RETRY: Duration = Duration::from_ns(30_000_000_000);
+
 /// The keys that every source has.
-pub(super) const KEYS: [&str; 7] = [
-    "channels", "silent", "clock", "late", "mean", "last", "median",
+pub(super) const KEYS: [&str; 8] = [
+    "channels", "silent", "retry", "clock", "late", "mean", "last", "median",
 ];
 
 /// The keys that every source has.
@@ -37,6 +40,9 @@ pub(super) struct SourceKeys {
     /// A source that is away so long is not waited for. One that is connected and silent so long is dropped and started over.
     #[schemars(extend("exclusiveMinimum" = 0))]
     silent: Duration,
+    /// The longest pause after a failure: 0.5 s at first, then ever longer ones up to this.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    retry: Duration,
     /// How its clock is judged by the time at which samples arrive; not at all without.
     clock: Option<ClockKeys>,
     /// A sample no later than this is given to the next tick; a channel may have its own.
@@ -109,6 +115,7 @@ impl Default for SourceKeys {
         Self {
             _channels: IgnoredAny,
             silent: Duration::from_ns(30_000_000_000),
+            retry: RETRY,
             clock: None,
             late: Duration::ZERO,
             mean: None,
@@ -339,6 +346,10 @@ fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Optio
             return None;
         }
     }
+    for claim in claims.iter().filter(|of| of.mapped.is_none()) {
+        let remark = claim.address.as_ref().and_then(|of| parameters.remark(of));
+        keys::report_at(claim.place, remark, diagnostics);
+    }
     let keys = part.keys?;
     let channel = |claim: Claim| {
         let channel = plan.sources[claim.channel].clone();
@@ -356,6 +367,7 @@ fn declared(part: Part<'_>, plan: &Plan, diagnostics: &mut Diagnostics) -> Optio
         parameters,
         folder: part.folder,
         silent: keys.silent,
+        retry: keys.retry,
         channels: claims.into_iter().map(channel).collect(),
         clock: keys.clock.map(ClockRule::from),
         thinning: part.thinning,

@@ -18,10 +18,10 @@ use serde_json::{Value, json};
 pub use declare::{Declared, Fact, Known, Labels, Metrics, Words};
 pub use reasons::Reasons;
 pub use service::{
-    ChannelFacts, ChannelsFacts, ErrorFacts, EventFacts, FaultFacts, HeldFacts, JournalFacts, Look,
-    NoOutputFacts, NodeFacts, NodesFacts, OutputFacts, OutputsFacts, OutsideFitFacts, SinkFacts,
-    SourceFacts, StagedFacts, State, StatusFacts, TickFacts, TicksFacts, WarningFacts,
-    WatchedFacts,
+    CardFacts, ChannelFacts, ChannelsFacts, ErrorFacts, EventFacts, FaultFacts, HeldFacts,
+    JournalFacts, LearnerFacts, Look, NoOutputFacts, NodeFacts, NodesFacts, OutputFacts,
+    OutputsFacts, OutsideFitFacts, SinkFacts, SourceFacts, StagedFacts, State, StatusFacts,
+    TickFacts, TicksFacts, WarningFacts, WatchedFacts,
 };
 
 use crate::service::{Service, event_kinds};

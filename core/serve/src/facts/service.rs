@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use athermal_run::live::Verdict;
 use athermal_run::live::monitor::{OutsideFit, SensorFault, Watch};
+use athermal_run::model::Card;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
@@ -11,7 +12,7 @@ use serde_json::Value;
 use super::{Counts, Known, Reasons, Sections, words};
 use crate::compile::{Plan, PlannedNode, PlannedOutput};
 use crate::connector::{Connection, SourceCounts};
-use crate::engine::NodeCarry;
+use crate::engine::{NodeCarry, who_speaks};
 use crate::journal::JournalStatus;
 use crate::message::Message;
 use crate::service::{ChannelSamples, Held, Seen, Service, SinkCounts, Snapshot};
@@ -43,8 +44,7 @@ impl<'a> Look<'a> {
     }
 
     fn state(&self) -> State {
-        let lacks = !self.service.lacking().is_empty() || self.service.running().is_none();
-        match self.journal.is_degraded || lacks || !self.panics.is_empty() {
+        match self.service.is_degraded() {
             true => State::Degraded,
             false => State::Running,
         }
@@ -81,6 +81,8 @@ crate::facts! {
         revision: Option<String> [info "athermal_graph_info"] = of.service.running().map(|of| of.revision.to_owned());
         /// When the model that runs was fitted.
         fitted_s: Option<f64> [gauge "athermal_model_fitted_timestamp_seconds"] = of.service.fitted_s();
+        /// How it was fitted.
+        card: Option<CardFacts> = of.service.card().map(CardFacts::read);
         /// Ticks that samples made since the service started.
         ticks: u64 [counter "athermal_ticks_total"] [made words::ticks] = of.snapshot.ticks;
         /// Ticks that time alone made since the service started.
@@ -128,6 +130,12 @@ crate::facts! {
         sinks: Vec<SinkFacts> = of.service.sinks().iter().map(|(name, of)| SinkFacts::read(name, of)).collect();
         /// What monitors have found of the graph that runs, as a run reports it.
         watched: Option<WatchedFacts> = of.service.watched().map(|watch| WatchedFacts::read(watch, of.service));
+        /// What learns of its own, since a truth came.
+        learners: Vec<LearnerFacts> = {
+            let seen = of.service.watcher().seen();
+            let said = seen.learning.iter().filter(|(.., said)| !said.is_nan());
+            said.map(|(name, _, said)| LearnerFacts::read(name, *said)).collect()
+        };
         /// What companions know.
         companions: Sections = of.service.sections();
         /// How many events there were, by their names.
@@ -137,6 +145,28 @@ crate::facts! {
             let seen = of.service.watcher().seen();
             seen.recent.iter().map(|(is_fault, of, at_s)| EventFacts::read(*is_fault, of, *at_s)).collect()
         };
+    }
+
+    /// How a model was fitted.
+    CardFacts(of: &Card) {
+        /// The release of the program that fitted it.
+        release: String = of.athermal.clone();
+        /// The files that it was fitted on; empty of rows that came from elsewhere.
+        data: Vec<String> = of.data.iter().map(|of| of.path.clone()).collect();
+        /// How many rows they have.
+        rows: u64 = of.data.iter().map(|of| of.rows).sum();
+        /// Of how many ticks the fit is.
+        ticks: u64 = of.ticks;
+    }
+
+    /// What goes on learning.
+    LearnerFacts["{learner}: {speaks}"](name: &str, said: f64) {
+        /// Its name.
+        learner: String [label] = name.to_owned();
+        /// What its port `learning` said last.
+        says: f64 [gauge "athermal_learner_says"] = said;
+        /// Who speaks, it or its fit.
+        speaks: &'static str = who_speaks(said);
     }
 
     /// What a graph keeps of the past.
@@ -232,8 +262,6 @@ crate::facts! {
             [gauge "athermal_no_output" |of: &Self| of.is_known.then(|| f64::from(u8::from(of.no_output.is_some())))]
             [line "no output has had a value in {no_output.ticks} ticks and beats; the first to lack one is {no_output.first_silent}"]
             = service.replica().and_then(|of| watch.no_output(of)).map(|of| NoOutputFacts::read(of.rows, of.first_silent));
-        /// Channels that the correction moves and goes by.
-        feeds_back: Vec<String> [gauge "athermal_fed_back_channels"] [made words::feeds_back] = watch.fed_back().to_vec();
         /// Whether it is known what runs.
         is_known: bool = service.running().is_some();
     }
@@ -316,6 +344,8 @@ crate::facts! {
         source: Option<String> [label] = of.source.clone();
         /// Its name.
         channel: String [label] = of.channel.clone();
+        /// How it is, as its source says: `waiting: …`, or what was granted; `null` where that says nothing.
+        state: Option<String> [more words::channel_state] = of.state.clone();
         /// Samples that were accepted.
         accepted: u64 [counter "athermal_samples_total"] [part "{accepted} samples of {source}"] = of.accepted;
         /// How old the newest sample is that was stepped.

@@ -1,6 +1,5 @@
 //! Facts in words, where those are made of more than one.
 
-use athermal_run::live::monitor::feedback;
 use serde_json::Value;
 
 use crate::connector::LeftOut;
@@ -78,6 +77,10 @@ pub(super) fn connection(of: &Value) -> Option<String> {
     })
 }
 
+pub(super) fn channel_state(of: &Value) -> Option<String> {
+    of["state"].as_str().map(str::to_owned)
+}
+
 pub(super) fn left_out_at_source(of: &Value) -> Option<String> {
     left_out(&of["left_out"])
 }
@@ -108,10 +111,4 @@ pub(super) fn outside_fit(of: &Value) -> Option<String> {
     Some(format!(
         "{channel}: {samples} samples far outside of the fit, {lowest} to {highest}; there {lowest_in_fit} to {highest_in_fit}"
     ))
-}
-
-pub(super) fn feeds_back(of: &Value) -> Option<String> {
-    let all = of["feeds_back"].as_array()?.iter();
-    let all: Vec<_> = all.filter_map(Value::as_str).collect();
-    feedback::words(&all)
 }

@@ -1,14 +1,18 @@
 //! What a running service says of itself.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration as Wait;
 
 use athermal_run::live::monitor::Watch;
+use athermal_run::model::Card;
 
-use super::{Held, Service, SinkCounts, Snapshot, Watcher};
-use crate::connector::{Connection, LeftOut, SourceCounts};
+use super::{Held, Service, ServiceOptions, SinkCounts, Snapshot, Watcher};
+use crate::companion::Beside;
+use crate::connector::{Connection, LeftOut, Sink, SinkWiring, SourceCounts};
 use crate::facts::Sections;
+use crate::figures::unix_seconds;
 use crate::folder::StateFolder;
 use crate::journal::JournalStatus;
 use crate::time::Instant;
@@ -20,6 +24,8 @@ pub struct ChannelSamples {
     pub channel: String,
     /// Its source; none where the machine file names none.
     pub source: Option<String>,
+    /// How it is, as its source says; none where that says nothing.
+    pub state: Option<String>,
     /// How many were accepted.
     pub accepted: u64,
     /// How many were left out, by reason. Those that are out of range were accepted, and are absent at their ticks.
@@ -37,6 +43,25 @@ impl ChannelSamples {
 }
 
 impl Service {
+    /// What companions are given.
+    pub(super) fn beside(
+        &self,
+        options: &ServiceOptions,
+        sinks: Vec<(Arc<dyn Sink>, SinkWiring)>,
+    ) -> Beside {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or(path.to_owned());
+        Beside {
+            name: self.name.clone(),
+            machine: absolute(&options.machine),
+            state: absolute(self.folder.path()),
+            handle: self.handle(),
+            happenings: self.happened,
+            sinks,
+            observers: self.observers.clone(),
+            shared: self.shared_by_companions.clone(),
+        }
+    }
+
     /// The name of the machine.
     #[must_use]
     pub fn name(&self) -> &str {
@@ -46,7 +71,13 @@ impl Service {
     /// When the model that runs was fitted, in s since 1970.
     #[must_use]
     pub fn fitted_s(&self) -> Option<f64> {
-        self.fitted.get(self.running()?.revision).copied()
+        unix_seconds(self.card()?.created.as_deref()?)
+    }
+
+    /// How the model that runs was fitted, where that is known.
+    #[must_use]
+    pub fn card(&self) -> Option<&Card> {
+        self.cards.get(self.running()?.revision)
     }
 
     /// What is kept in mind of it.
@@ -125,6 +156,14 @@ impl Service {
         lacking(sources.map(|(name, of)| (name.as_str(), of.connection())))
     }
 
+    /// Whether anything is not as it should be: the journal cannot be written, a node was given up, a source [lacks](Self::lacking), or it
+    /// is not known what runs.
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        let lacks = !self.lacking().is_empty() || self.running().is_none();
+        lacks || self.progress.status().is_degraded || !self.given_up().is_empty()
+    }
+
     /// What is watched of the graph that runs, and what was found.
     #[must_use]
     pub fn watched(&self) -> Option<&Watch> {
@@ -169,6 +208,7 @@ pub(super) fn samples(
         ChannelSamples {
             channel: name.clone(),
             source: source.map(|(name, ..)| name.clone()),
+            state: source.and_then(|(_, of, nth)| of.state(nth)),
             accepted: counts.accepted,
             left_out: LeftOut::ALL.map(|reason| (reason, left_out(reason))),
             stamp: known.stamps[place],

@@ -104,6 +104,7 @@ mod tests {
             is_beat: false,
             behind: Duration::from_ns(behind_s * 1_000_000_000),
             revision: 0,
+            is_degraded: false,
             outputs,
         }
     }

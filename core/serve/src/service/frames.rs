@@ -214,6 +214,7 @@ impl FrameReceiver {
             is_beat: self.words[1] != 0,
             behind: Duration::from_ns(self.words[2] as i64),
             revision: self.words[3],
+            is_degraded: false,
             outputs: &self.outputs,
         };
         let ticket = Ticket {

@@ -34,13 +34,13 @@ mod wiring;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::{Builder, JoinHandle, Thread};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use athermal_run::live::{Feed, LiveGraph, LiveOptions, Notice, Order, pair_from};
-use athermal_run::model::Model;
+use athermal_run::model::{Card, Model};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 pub use crate::keeper::{CommitError, Held};
@@ -58,10 +58,10 @@ pub use watcher::{LastTicks, Seen, Watcher};
 use crate::aside::{Aside, within};
 use crate::bell::{Bell, Mailbox};
 use crate::checkpoint::Checkpoints;
-use crate::companion::Beside;
+use crate::companion::Shared as OfCompanions;
 use crate::compile::Plan;
 use crate::connector::{SourceCounts, Stop};
-use crate::deployment::Deployment;
+use crate::deployment::{DeclaredSink, Deployment};
 use crate::facts::SectionFacts;
 use crate::folder::{FolderError, StateFolder, StatePaths, may_pass};
 use crate::host;
@@ -74,12 +74,12 @@ use crate::time::{Duration, Instant};
 use engine_thread::{EngineThread, Remark, Request};
 use handle::Work;
 use host_clock::HostClock;
-use observer::Observers;
+pub(crate) use observer::Observers;
 use replacing::Comparison;
 use sinks::OpenSink;
 use status::Shared;
 use watch::Watch;
-use wiring::{fed, keep, outputs, rules};
+use wiring::{fed, keep, rules};
 
 /// How often old files of the journal are looked at.
 const RETIRE: Wait = Wait::from_secs(60);
@@ -122,11 +122,14 @@ pub struct Service {
     asked: Receiver<Work>,
     observers: Observers,
     watcher: Watcher,
-    /// When models were fitted, by their revisions, in s since 1970.
-    fitted: BTreeMap<String, f64>,
+    /// How models were fitted, by their revisions.
+    cards: BTreeMap<String, Card>,
     /// What companions know.
     sections: Vec<(&'static str, Section)>,
     companions: Vec<Box<dyn Send>>,
+    shared_by_companions: OfCompanions,
+    /// How many ticks, beats, breaks and freezes there were at the start.
+    happened: u64,
     comparison: Option<Comparison>,
     is_asked_to_end: bool,
     /// The revision of the graph that the machine file gave.
@@ -156,7 +159,9 @@ pub struct Service {
     keep: Keep,
     retired: Clock,
     retiring: Aside<()>,
-    is_degraded: bool,
+    journal_is_degraded: bool,
+    /// Whether the whole is, for the threads of sinks.
+    sinks_know: Arc<AtomicBool>,
     /// How many nodes were given up and reported.
     given_up: usize,
     has_failed: bool,
@@ -194,9 +199,11 @@ impl Service {
             Some(kept) => kept.map(|()| None)?,
             None => None,
         };
-        let units = outputs(&model.plan);
-        let open = |declared: crate::deployment::DeclaredSink| {
-            let wiring = sinks::wiring(&declared, &units, &model.plan);
+        let wiring = |of: &DeclaredSink| of.wiring(&model.plan, folder.path());
+        let wired = |of: &DeclaredSink| (Arc::clone(&of.parameters), wiring(of));
+        let messengers = sinks.iter().map(wired).collect();
+        let open = |declared: DeclaredSink| {
+            let wiring = wiring(&declared);
             OpenSink::open(declared, wiring, &folder)
         };
         let sinks = sinks.into_iter().map(open).collect::<Result<Vec<_>, _>>()?;
@@ -264,7 +271,8 @@ impl Service {
         let shared = Arc::new(Shared::new(feed.len()));
         let (stop_sources, stop_sinks) = (Stop::default(), Stop::default());
         // Sinks first: nothing that comes is put out into nowhere.
-        let threads = (&progress, &stop_sinks, &tell);
+        let sinks_know = Arc::default();
+        let threads = (&progress, &stop_sinks, &tell, &sinks_know);
         let running = sinks::start(sinks, options.is_dry, (&folder, happenings), threads)?;
         let (out, sink_threads, sink_counts) = running;
         // The engine thread waits for the links of sources, which need to know it.
@@ -306,9 +314,11 @@ impl Service {
             asked,
             observers,
             watcher,
-            fitted: BTreeMap::new(),
+            cards: BTreeMap::new(),
             sections: Vec::new(),
             companions: Vec::new(),
+            shared_by_companions: OfCompanions::default(),
+            happened: happenings,
             comparison: None,
             is_asked_to_end: false,
             given,
@@ -335,7 +345,8 @@ impl Service {
             keep: keep(&runtime),
             retired: Clock::now(),
             retiring: Aside::default(),
-            is_degraded: false,
+            journal_is_degraded: false,
+            sinks_know,
             given_up: 0,
             has_failed: false,
             put: (0, Clock::now()),
@@ -357,7 +368,7 @@ impl Service {
             let thread = spawn("source", move || source.run(&stop, &tell))?;
             service.source_threads.push(thread);
         }
-        let beside = service.beside(options);
+        let beside = service.beside(options, messengers);
         for companion in companions {
             match companion.start(&beside) {
                 Ok(running) => service.companions.push(running),
@@ -423,12 +434,13 @@ impl Service {
         let new = given_up.iter().skip(self.given_up).cloned();
         events.extend(new.map(ServiceEvent::NodeGivenUp));
         self.given_up = given_up.len();
+        self.sinks_know.store(self.is_degraded(), Ordering::Relaxed);
         if self.observers.look_inside() && !self.keeper.control().needs_replica() {
             self.engine.thread().unpark();
         }
         let status = self.progress.status();
-        if status.is_degraded != self.is_degraded {
-            self.is_degraded = status.is_degraded;
+        if status.is_degraded != self.journal_is_degraded {
+            self.journal_is_degraded = status.is_degraded;
             self.keep_model();
             events.push(ServiceEvent::Journal(status));
         }
@@ -469,6 +481,12 @@ impl Service {
     /// Reports something that happened, as if it had happened here.
     pub fn report(&mut self, event: ServiceEvent) {
         self.own.push(event);
+    }
+
+    /// What companions have for each other.
+    #[must_use]
+    pub fn shared(&self) -> &OfCompanions {
+        &self.shared_by_companions
     }
 
     /// To ask it from other threads.
@@ -545,16 +563,6 @@ impl Service {
             let (folder, revision) = (StatePaths::clone(&self.folder), revision.to_owned());
             // Where it cannot be written, a restart lets the given graph take over again.
             let _ = within(move || folder.note_given(&revision));
-        }
-    }
-
-    fn beside(&self, options: &ServiceOptions) -> Beside {
-        let absolute = |path: &Path| std::path::absolute(path).unwrap_or(path.to_owned());
-        Beside {
-            name: self.name.clone(),
-            machine: absolute(&options.machine),
-            state: absolute(self.folder.path()),
-            handle: self.handle(),
         }
     }
 }

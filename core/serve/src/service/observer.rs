@@ -32,10 +32,16 @@ pub trait Observer: Send {
 
 /// All that look on.
 #[derive(Clone, Default)]
-pub(super) struct Observers(Arc<Mutex<Vec<Box<dyn Observer>>>>);
+pub(crate) struct Observers(Arc<Mutex<Vec<Box<dyn Observer>>>>);
+
+impl std::fmt::Debug for Observers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} look on", self.all().len())
+    }
+}
 
 impl Observers {
-    pub(super) fn add(&self, observer: Box<dyn Observer>) {
+    pub(crate) fn add(&self, observer: Box<dyn Observer>) {
         self.all().push(observer);
     }
 

@@ -8,7 +8,6 @@ use athermal_run::model::Model;
 use super::{Service, ServiceEvent};
 use crate::aside::{PATIENCE, within};
 use crate::engine::Engine;
-use crate::figures::unix_seconds;
 use crate::folder::StatePaths;
 use crate::keeper::CommitError;
 use crate::time::Duration;
@@ -151,9 +150,8 @@ impl Service {
 
     /// Keeps in mind when a model was fitted.
     pub(super) fn note_fit(&mut self, model: &Model) {
-        let created = model.card.as_ref().and_then(|of| of.created.as_deref());
-        if let (Some(revision), Some(at_s)) = (model.revision(), created.and_then(unix_seconds)) {
-            self.fitted.insert(revision, at_s);
+        if let (Some(revision), Some(card)) = (model.revision(), &model.card) {
+            self.cards.insert(revision, card.clone());
         }
     }
 

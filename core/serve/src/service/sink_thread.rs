@@ -6,7 +6,7 @@
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration as Wait, Instant as Clock};
 
 use super::ServiceEvent;
@@ -16,7 +16,7 @@ use super::position::{Position, PositionFile};
 use super::sinks::made_again;
 use crate::aside::Aside;
 use crate::bell::{Bell, Mailbox};
-use crate::connector::{ConnectorError, OutRow, Outlet, Place, Sink, SinkWiring, Stop};
+use crate::connector::{BackOff, ConnectorError, OutRow, Outlet, Place, Sink, SinkWiring, Stop};
 use crate::diagnostic::panic_message;
 use crate::folder::StatePaths;
 use crate::journal::Progress;
@@ -24,8 +24,6 @@ use crate::recovery::{Recovered, Start};
 
 /// How long outputs wait for the journal.
 const PATIENCE: Wait = Wait::from_millis(50);
-/// How long a row waits after a failure.
-const AGAIN: Wait = Wait::from_millis(500);
 /// How often the position of a log is kept, and that of a command, which goes on from there.
 const KEEP: (Wait, Wait) = (Wait::from_secs(5), Wait::from_secs(1));
 
@@ -45,7 +43,7 @@ impl Outlet for Shut {
 
 /// What a sink is opened by.
 pub(super) struct Opening {
-    pub(super) parameters: Box<dyn Sink>,
+    pub(super) parameters: Arc<dyn Sink>,
     pub(super) wiring: SinkWiring,
 }
 
@@ -83,6 +81,10 @@ pub(super) struct Port {
     pub(super) counts: Arc<SinkCounts>,
     pub(super) stop: Stop,
     pub(super) health: Health,
+    /// The longest pause after a failure.
+    pub(super) retry: Wait,
+    /// Whether the service is degraded.
+    pub(super) is_degraded: Arc<AtomicBool>,
 }
 
 impl SinkThread {
@@ -125,6 +127,7 @@ impl SinkThread {
     /// Opens it, and counts what stands behind the place where it was. That is tried again where it fails: a log that is wrong is no reason
     /// to do without corrections. False where it is to stop before.
     fn open(&mut self) -> bool {
+        let mut back_off = BackOff::up_to(self.port.retry);
         while let Some(of) = &self.opening {
             let place = self.was.as_ref().and_then(|was| was.place);
             let opened = guarded(|| {
@@ -152,7 +155,7 @@ impl SinkThread {
                         // What comes is made again by the next start, where this one never opens it.
                         self.keep(true);
                     }
-                    if !self.port.stop.wait(AGAIN) {
+                    if !self.port.stop.wait(back_off.after(Wait::ZERO)) {
                         return false;
                     }
                 }
@@ -341,7 +344,11 @@ impl SinkThread {
 impl Port {
     /// Puts a row out. False where that fails.
     fn put(&mut self, row: &OutRow<'_>) -> bool {
-        let put = guarded(|| self.outlet.put(row));
+        let row = OutRow {
+            is_degraded: self.is_degraded.load(Ordering::Relaxed),
+            ..*row
+        };
+        let put = guarded(|| self.outlet.put(&row));
         let is_put = put.is_ok();
         let counted = [&self.counts.failures, &self.counts.put][usize::from(is_put)];
         counted.fetch_add(1, Ordering::Relaxed);
@@ -351,11 +358,12 @@ impl Port {
 
     /// Puts a row out, however often that fails. False where it is to stop before.
     fn put_at_last(&mut self, row: &OutRow<'_>) -> bool {
+        let mut back_off = BackOff::up_to(self.retry);
         while !self.stop.is_asked() {
             if self.put(row) {
                 return true;
             }
-            let _ = self.stop.wait(AGAIN);
+            let _ = self.stop.wait(back_off.after(Wait::ZERO));
         }
         false
     }

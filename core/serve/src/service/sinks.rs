@@ -1,7 +1,7 @@
 //! The sinks of a service at its start: opened, and brought to where the journal is.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Instant as Clock;
 
@@ -13,7 +13,7 @@ use super::sink_thread::{Health, Opening, Port, Shut, SinkThread};
 use super::{ServiceError, ServiceEvent, spawn};
 use crate::aside::Aside;
 use crate::bell::Mailbox;
-use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop, WiredOutput};
+use crate::connector::{OutRow, Outlet, Purpose, SinkWiring, Stop};
 use crate::deployment::DeclaredSink;
 use crate::engine::Engine;
 use crate::folder::{StateFolder, StatePaths};
@@ -79,41 +79,28 @@ pub(super) fn made_again<'a>(
         is_beat: false,
         behind: Duration::ZERO,
         revision: u64::from_str_radix(engine.revision(), 16).unwrap_or_default(),
+        is_degraded: false,
         outputs: row,
-    }
-}
-
-/// What a sink is given, by the columns that it has.
-pub(super) fn wiring(
-    declared: &DeclaredSink,
-    outputs: &[WiredOutput],
-    plan: &crate::compile::Plan,
-) -> SinkWiring {
-    let of = |name: &String| {
-        let known = outputs.iter().find(|of| of.name == *name);
-        known.cloned().unwrap_or(WiredOutput {
-            name: name.clone(),
-            unit: None,
-        })
-    };
-    SinkWiring {
-        name: declared.name.clone(),
-        machine: plan.name.clone(),
-        folder: declared.folder.clone(),
-        outputs: declared.outputs.iter().map(of).collect(),
-        time: plan.time.clone(),
     }
 }
 
 /// What the engine thread hands rows to, the threads of sinks, and what each counts.
 type Running = (Sinks, Vec<JoinHandle<()>>, Vec<(String, Arc<SinkCounts>)>);
 
+/// What the threads of sinks share with the service: the journal, the end, what happens, and whether the service is degraded.
+type Threads<'a> = (
+    &'a Arc<Progress>,
+    &'a Stop,
+    &'a Mailbox<ServiceEvent>,
+    &'a Arc<AtomicBool>,
+);
+
 /// Starts the threads of sinks, which have all rows of so many ticks, beats, breaks and freezes.
 pub(super) fn start(
     sinks: Vec<OpenSink>,
     is_dry: bool,
     (folder, happenings): (&StatePaths, u64),
-    (progress, stop, events): (&Arc<Progress>, &Stop, &Mailbox<ServiceEvent>),
+    threads_of: Threads<'_>,
 ) -> Result<Running, ServiceError> {
     let (mut out, mut threads, mut counts) = (Sinks::default(), Vec::new(), Vec::new());
     for sink in sinks {
@@ -121,7 +108,7 @@ pub(super) fn start(
         let is_log = sink.declared.parameters.purpose() == Purpose::Log;
         let (sender, frames) = frames(ROWS, columns.len(), is_log, &sink.counts);
         counts.push((name, Arc::clone(&sink.counts)));
-        let thread = sink.thread(frames, is_dry, (folder, happenings), progress, stop, events);
+        let thread = sink.thread(frames, is_dry, (folder, happenings), threads_of);
         let handle = spawn("sink", move || thread.run())?;
         out.add(sender, columns, handle.thread().clone());
         threads.push(handle);
@@ -135,10 +122,9 @@ impl OpenSink {
         frames: FrameReceiver,
         is_dry: bool,
         (folder, happenings): (&StatePaths, u64),
-        progress: &Arc<Progress>,
-        stop: &Stop,
-        events: &Mailbox<ServiceEvent>,
+        (progress, stop, events, is_degraded): Threads<'_>,
     ) -> SinkThread {
+        let retry = self.wiring.retry;
         let is_command = self.outlet.is_some();
         let gate = is_command.then(|| {
             let mut gate = CommandGate::new(self.declared.behind, self.declared.rate.clone());
@@ -167,6 +153,8 @@ impl OpenSink {
                 outlet: self.outlet.unwrap_or_else(|| Box::new(Shut)),
                 counts: Arc::clone(&self.counts),
                 stop: stop.clone(),
+                retry,
+                is_degraded: Arc::clone(is_degraded),
                 health: Health {
                     sink: self.declared.name,
                     events: events.clone(),

@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
-use std::time::Instant as Clock;
+use std::time::{Duration as Wait, Instant as Clock};
 
 use super::ServiceEvent;
 use crate::bell::Mailbox;
@@ -19,6 +19,8 @@ pub(super) struct SourceThread {
     pub(super) run: Stop,
     /// How long that may be.
     pub(super) silent: Duration,
+    /// The longest pause after a failure.
+    pub(super) retry: Wait,
 }
 
 impl SourceThread {
@@ -30,8 +32,9 @@ impl SourceThread {
             mut out,
             run,
             silent,
+            retry,
         } = self;
-        let mut back_off = BackOff::default();
+        let mut back_off = BackOff::up_to(retry);
         let either = stop.or(&run);
         loop {
             let began = Clock::now();

@@ -51,7 +51,7 @@ pub(super) fn open(
     let place = |name: &str| feed.iter().position(|of| of.name == name);
     let plan = &model.plan;
     for source in sources {
-        let mut wiring = source.wiring(plan, state.join("sources").join(&source.name));
+        let mut wiring = source.wiring(plan, state);
         // Each channel of a source is one of the feed.
         wiring
             .channels
@@ -97,6 +97,7 @@ pub(super) fn open(
             out: outflow,
             run,
             silent: source.silent,
+            retry: wait(source.retry),
         });
     }
     Ok(open)

@@ -37,6 +37,8 @@ pub struct Seen {
     pub novelty: Vec<(String, f64)>,
     /// The slots of these.
     novelty_slots: Vec<usize>,
+    /// What the port `learning` of each learner said last, by its name, and its slot.
+    pub learning: Vec<(String, usize, f64)>,
 }
 
 /// The last ticks of each output, of graphs before included.
@@ -80,11 +82,20 @@ impl Observer for Watcher {
         {
             seen.last.follow(plan);
             (seen.novelty, seen.novelty_slots) = novelties(plan).unzip();
+            let learners = plan.nodes.iter();
+            let learners =
+                learners.filter_map(|of| Some((of.instance(), of.says_of_learning()?, f64::NAN)));
+            seen.learning = learners.collect();
         }
         seen.last.tick(tick);
         seen.errors.look(tick);
         for ((_, value), slot) in seen.novelty.iter_mut().zip(&seen.novelty_slots) {
             *value = tick.value(*slot);
+        }
+        for (_, slot, said) in &mut seen.learning {
+            if tick.ran(*slot) {
+                *said = tick.value(*slot);
+            }
         }
     }
 }

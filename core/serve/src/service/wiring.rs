@@ -4,7 +4,7 @@ use athermal_run::live::Feed;
 
 use super::wait;
 use crate::compile::Plan;
-use crate::connector::{Stamps, WiredOutput};
+use crate::connector::Stamps;
 use crate::deployment::{DeclaredSource, Runtime};
 use crate::journal::Keep;
 use crate::sequencer::{ChannelRules, Rules, SourceRules};
@@ -49,14 +49,6 @@ pub(super) fn rules(runtime: &Runtime, sources: &[DeclaredSource], feed: &[Feed]
         channels: feed.iter().map(channel).collect(),
         ..Rules::default()
     }
-}
-
-pub(super) fn outputs(plan: &Plan) -> Vec<WiredOutput> {
-    let output = |of: &crate::compile::PlannedOutput| WiredOutput {
-        name: of.name.clone(),
-        unit: Some(plan.channels[of.slot].channel.unit.text().to_owned()),
-    };
-    plan.outputs.iter().map(output).collect()
 }
 
 pub(super) fn keep(runtime: &Runtime) -> Keep {

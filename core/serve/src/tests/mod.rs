@@ -245,19 +245,23 @@ pub(crate) fn read(folder: &Path) -> (Log, Vec<Record>) {
 pub(crate) fn replay(model: &Model, folder: &Path) -> (Outputs, Replay) {
     let mut log = Log::open(folder).unwrap();
     let mut outputs = Vec::new();
+    let mut look =
+        |_, engine: &Engine| outputs.push((engine.last().unwrap(), bits(engine.outputs())));
     let mut replay: Option<Replay> = None;
     while let Some(entry) = log.read().unwrap() {
         match (entry, &mut replay) {
             (Entry::Begin(begin), None) => replay = Some(Replay::new(engine(model), &begin)),
-            (Entry::Begin(begin), Some(replay)) => replay.begin(&begin, !log.gaps().is_empty()),
+            (Entry::Begin(begin), Some(replay)) => {
+                replay.catch_up(&mut look).unwrap();
+                replay.begin(&begin, !log.gaps().is_empty());
+            }
             (Entry::Record(event, record), Some(replay)) => {
-                if replay.apply(event, &record).unwrap() {
-                    let at = replay.engine().last().unwrap();
-                    outputs.push((at, bits(replay.engine().outputs())));
-                }
+                replay.apply((event, 0), &record, &mut look).unwrap();
             }
             (Entry::Record(..), None) => panic!("a record before its file"),
         }
     }
-    (outputs, replay.unwrap())
+    let mut replay = replay.unwrap();
+    replay.catch_up(&mut look).unwrap();
+    (outputs, replay)
 }

@@ -19,7 +19,7 @@ problem! {
     /// Two crates bring the same kind.
     A041 KindTwice { why: NotFound }
     error: "ambiguous name",
-    explanation: "Two crates in this program have a node of the same type, or write what a node knows under the same name, so that a \
+    explanation: "Two crates in this program have a node of the same type, or write what a node knows under the same name. A \
         graph or a file could mean either.",
     message: why.message(),
     label: "which of them?",

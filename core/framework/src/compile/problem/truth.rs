@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 
+use crate::compile::fed_back;
 use crate::compile::provenance::smallest_lag;
 use crate::diagnostic::problem;
 use crate::quantity::Quantity;
@@ -129,6 +130,27 @@ problem! {
 }
 
 problem! {
+    /// A correction that goes by past truths which it moves.
+    A162 FedBack {
+        channel: String,
+        /// How many more it moves and goes by.
+        more: usize,
+    }
+    error: "a correction that goes by what it moves",
+    explanation: "A correction moves the positions that it corrects. A learner, lag or vote behind it that reads them as they are measured \
+        sees a drift that lacks what was taken away, and goes by that. An `uncorrected` node puts it back.",
+    message: format!(
+        "the correction goes by past drifts of `{channel}`{}, which it moves itself",
+        match more {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        }
+    ),
+    label: "goes by what it moves",
+    help: fed_back::WAY_OUT,
+}
+
+problem! {
     /// A truth made of values that depend on all of the past.
     A160 EndlessTruth { channel: String, node: String }
     error: "a truth without a span",
@@ -152,8 +174,8 @@ problem! {
         is_measured: bool,
     }
     error: "ahead of its time",
-    explanation: "A negative lag reads what will be. That is known only of what is planned, such as the set points of a recipe: its signal \
-        says with `known_ahead` how long before it applies a value is known, and a `lag` reads it so far ahead and no further. What is \
+    explanation: "A negative lag reads what will be. That is known only of what is planned, such as the set points of a recipe. Its signal \
+        says with `known_ahead` how long before it applies a value is known; a `lag` reads it so far ahead and no further. What is \
         measured, and what is computed from it, is not known before its time.",
     message: match known {
         Some(known) => format!("`{channel}` is read {ahead} ahead, and known {known} ahead"),

@@ -7,7 +7,7 @@ use super::mode::{Mode, StepLength};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
 use crate::engine::state::NodeState;
 use crate::engine::tick::Gathered;
-use crate::node::{Admission, Learner, LearningGate, LinearForm, Predictor, Restored};
+use crate::node::{Admission, Learner, LearningGate, LinearForm, Predictor, Restored, Speaks};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
@@ -21,13 +21,17 @@ pub(crate) struct GatedLearner {
     step: StepLength,
     /// Whether a run knows of the truth of its own tick.
     at_once: bool,
+    /// Who speaks now.
+    speaks: Speaks,
+    /// Whether the errors by which that is decided are others since.
+    stale: bool,
     /// Whether it may predict otherwise than when it was asked last.
     changed: bool,
     /// A row in which nothing is there.
     nothing: Vec<f64>,
 }
 
-/// What became of a truth that the embargo let through, as the port `learning` gives it.
+/// What became of a truth that the embargo let through: the ones of the port `learning`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum LearnOutcome {
@@ -45,6 +49,8 @@ pub(crate) enum LearnOutcome {
     OutsideLimits = 5,
     /// The run that it belongs to lacked a regressor.
     Incomplete = 6,
+    /// It says little, or its window has taught as often as it may.
+    PassedOver = 7,
 }
 
 impl GatedLearner {
@@ -56,10 +62,12 @@ impl GatedLearner {
         training: TrainingLimits,
     ) -> Option<Self> {
         let width = predictor.uses().len();
-        let learner = predictor.learner()?;
-        let own = LearningGate::new(planned.limits, &*learner);
+        let mut learner = predictor.learner()?;
+        let own = LearningGate::new(planned.limits, truth.span, &mut *learner);
         Some(Self {
             at_once: truth.allows_present() && learner.extrapolates(),
+            speaks: own.speaks(Instant::MIN),
+            stale: true,
             learner,
             changed: false,
             // With each row stands whether learning was frozen at the run.
@@ -99,22 +107,40 @@ impl GatedLearner {
         }
     }
 
+    /// Asks who speaks: the learner, or its fit while that stands in.
+    #[inline]
+    fn ask<'a, T>(
+        &'a self,
+        learner: impl FnOnce(&'a dyn Learner) -> T,
+        fit: impl FnOnce(&'a dyn Predictor) -> T,
+    ) -> T {
+        if self.speaks == Speaks::Learner {
+            return learner(&*self.learner);
+        }
+        match self.learner.as_fitted() {
+            Some(of_fit) => learner(of_fit),
+            None => fit(&*self.gate.predictor),
+        }
+    }
+
     pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
-        self.learner.predict(row, now + self.withheld.link().ahead)
+        let of = now + self.withheld.link().ahead;
+        self.ask(|of_now| of_now.predict(row, of), |fit| fit.predict(row))
     }
 
     pub(crate) fn std_dev(&self, row: &[f64], now: Instant) -> f64 {
         let of = now + self.withheld.link().ahead;
-        self.learner.std_dev(row, of)
+        self.ask(|of_now| of_now.std_dev(row, of), |fit| fit.std_dev(row))
     }
 
     pub(crate) fn novelty(&self, row: &[f64]) -> f64 {
-        self.learner.novelty(row)
+        self.ask(|of_now| of_now.novelty(row), |fit| fit.novelty(row))
     }
 
     /// What it predicts now in the middle of the rows of the fit.
     pub(crate) fn centre(&self, now: Instant) -> f64 {
-        self.learner.centre(now + self.withheld.link().ahead)
+        let of = now + self.withheld.link().ahead;
+        self.ask(|of_now| of_now.centre(of), Predictor::centre)
     }
 
     /// The slot of the truth.
@@ -129,8 +155,9 @@ impl GatedLearner {
 
     /// What the prediction is, where it is a linear form.
     pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
+        let form = self.ask(Learner::linear, Predictor::linear);
         // What is given the truth of its own tick first cannot be predicted with others.
-        self.learner.linear().filter(|_| !self.at_once)
+        form.filter(|_| !self.at_once)
     }
 
     /// Whether it may predict otherwise than when this was asked last.
@@ -173,18 +200,35 @@ impl GatedLearner {
         self.withheld.observe(truth, now, frozen);
     }
 
-    /// Learns from what the embargo lets through at `now`; gives the outcome of the newest, and when it had arrived.
+    /// Learns from what the embargo lets through at `now`; gives what the port `learning` says, and when the newest truth had arrived,
+    /// where either has changed. It said `said` before.
     pub(crate) fn release(
         &mut self,
         now: Instant,
         gathered: &[Gathered],
         on: bool,
-    ) -> Option<(LearnOutcome, Instant)> {
+        said: f64,
+    ) -> Option<(f64, Instant)> {
         let frozen = self.frozen(gathered, on);
         let newest = self.newest(now);
         let outcome = self.learn_up_to(newest, frozen);
-        self.changed |= outcome.is_some();
-        outcome
+        let spoke = self.speaks;
+        // Between truths only silence changes that: sums over windows are none of each tick.
+        let own = &self.gate.own;
+        if let Some(memory) = own.memory
+            && (std::mem::take(&mut self.stale) || own.standing.is_silent(now, memory))
+        {
+            self.speaks = own.speaks(now);
+        }
+        self.changed |= outcome.is_some() || spoke != self.speaks;
+        let (became, arrived) = match outcome {
+            Some((outcome, arrived)) => (outcome as u8, arrived),
+            None if said >= 0.0 && said as u8 / 10 * 10 != self.speaks as u8 => {
+                (said as u8 % 10, now)
+            }
+            None => return None,
+        };
+        Some((f64::from(became + self.speaks as u8), arrived))
     }
 
     #[inline]
@@ -197,6 +241,7 @@ impl GatedLearner {
                 outcome = Some((gate.offer(learner, released, frozen), released.arrived));
             }
         });
+        self.stale |= outcome.is_some();
         outcome
     }
 
@@ -212,12 +257,16 @@ impl GatedLearner {
     /// Moves what is remembered to the clock of the segment that begins.
     pub(crate) fn shift(&mut self, shift: Duration) {
         self.learner.segment(shift);
+        self.gate.own.segment(shift);
+        self.stale = true;
     }
 
     pub(crate) fn snapshot(&self) -> NodeState {
         let mut state = NodeState::pack(Some(self.learner.snapshot()));
         state.learning = Some(self.withheld.state());
-        state.recent = Some(self.gate.own.recent);
+        let own = &self.gate.own;
+        state.recent = Some(own.recent);
+        state.standing = own.memory.map(|_| own.standing.clone());
         state
     }
 
@@ -227,13 +276,16 @@ impl GatedLearner {
             Ok(None) => Restored::cold("it did not learn before"),
             Err(cold) => cold,
         };
-        self.changed = true;
+        (self.changed, self.stale) = (true, true);
         if !matches!(answer, Restored::Cold { .. }) {
             if let Some(from) = &state.learning {
                 self.withheld.restore(from);
             }
-            let recent = &mut self.gate.own.recent;
-            *recent = state.recent.unwrap_or(*recent);
+            let own = &mut self.gate.own;
+            own.recent = state.recent.unwrap_or(own.recent);
+            if let Some(from) = &state.standing {
+                own.standing.go_on_from(from);
+            }
         }
         answer
     }
@@ -292,11 +344,12 @@ impl Gate {
         if !self.training.admits(truth) {
             return LearnOutcome::OutsideLimits;
         }
-        let range = self.predictor.trained_range();
-        match self.own.offer(learner, range, row, truth, arrived) {
+        let fit = &*self.predictor;
+        match self.own.offer(learner, fit, row, truth, arrived) {
             Admission::Learned => LearnOutcome::Learned,
             Admission::Outlier => LearnOutcome::Outlier,
             Admission::OutsideRange => LearnOutcome::OutsideRange,
+            Admission::SaysLittle | Admission::TooMany => LearnOutcome::PassedOver,
         }
     }
 }

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::time::Instant;
 
-/// Rows of as many numbers each and their instants, the oldest first. A row lies in one piece, and room is made by doubling until the
-/// number of rows is known.
+/// Rows of as many numbers each and their instants, the oldest first. A row lies in one piece, and room is made by a part until the number
+/// of rows is known.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(into = "InOrder", try_from = "InOrder")]
 pub(crate) struct Rows {
@@ -111,26 +111,32 @@ impl Rows {
         self.len = 0;
     }
 
-    /// Makes room for as many rows more as there are, and for a few.
+    /// Makes room for half as many rows more as there are, and for a few.
     pub(crate) fn reserve(&mut self) {
-        while self.times.len() < 2 * self.len.max(8) {
-            self.grow();
-        }
+        self.grow_to(self.len + self.len / 2 + 8);
     }
 
     #[inline]
     fn index(&self, nth: usize) -> usize {
-        (self.first + nth) & (self.times.len() - 1)
+        let index = self.first + nth;
+        let beyond = index.checked_sub(self.times.len());
+        beyond.unwrap_or(index)
     }
 
     #[cold]
     fn grow(&mut self) {
-        let room = 2 * self.times.len();
+        self.grow_to(self.times.len() + (self.times.len() / 32).max(4));
+    }
+
+    fn grow_to(&mut self, room: usize) {
+        let more = room.saturating_sub(self.times.len());
         self.times.rotate_left(self.first);
         self.numbers.rotate_left(self.first * self.width);
         self.first = 0;
-        self.times.resize(room, Instant::MIN);
-        self.numbers.resize(room * self.width, 0.0);
+        self.times.reserve_exact(more);
+        self.times.resize(self.times.len() + more, Instant::MIN);
+        self.numbers.reserve_exact(more * self.width);
+        self.numbers.resize(self.times.len() * self.width, 0.0);
     }
 }
 

@@ -9,9 +9,10 @@ use super::blend::Blending;
 use super::revision::fnv_1a;
 use crate::channel::Extremes;
 use crate::compile::Plan;
+use crate::engine::leap::Course;
 use crate::engine::learning::EmbargoState;
 use crate::engine::tick::History;
-use crate::node::{RecentError, Restored, State};
+use crate::node::{RecentError, Restored, Standing, State};
 use crate::time::{Duration, Instant};
 
 /// What every snapshot begins with.
@@ -37,6 +38,9 @@ pub struct EngineState {
     /// What each node keeps.
     pub nodes: BTreeMap<String, NodeState>,
     pub(crate) blending: BTreeMap<String, Blending>,
+    /// The series in which leaps are looked for.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) courses: BTreeMap<String, Course>,
     /// Whether learning has been frozen on command.
     pub(crate) frozen: bool,
 }
@@ -57,6 +61,9 @@ pub struct NodeState {
     /// The recent error of an estimator that learns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) recent: Option<RecentError>,
+    /// How it stands beside its fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) standing: Option<Standing>,
 }
 
 impl NodeState {

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use super::engine_state::{NodeState, SlotState};
 use super::transfer::{Begin, Carry, NodeCarry, StateTransfer};
 use crate::channel::Extremes;
-use crate::compile::PlannedRole;
 use crate::compile::origins::Dependents;
+use crate::compile::{Plan, PlannedRole};
 use crate::engine::tick::Estimate;
 use crate::engine::tick::NodeRunner;
-use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one};
+use crate::engine::{Engine, EngineState, RestoreError, When, naming, naming_one, with_history};
 use crate::node::Restored;
 use crate::node::SlotTime;
 
@@ -53,7 +53,15 @@ impl Engine {
     /// # Errors
     /// When a node does not take its own state back.
     pub fn twin(&self) -> Result<Self, RestoreError> {
-        let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)
+        self.twin_on(&self.plan)
+    }
+
+    /// The same on a plan that computes more or less of what nothing reads: this one's, as [`Plan::looked_into`] gives it, or back.
+    ///
+    /// # Errors
+    /// As [`twin`](Self::twin).
+    pub fn twin_on(&self, plan: &Arc<Plan>) -> Result<Self, RestoreError> {
+        let mut twin = Self::new(Arc::clone(plan), &self.fitted)
             .expect("what was fitted belongs to the plan, or there would be no engine to copy");
         twin.revision.clone_from(&self.revision);
         match twin.go_on(&self.state()) {
@@ -96,7 +104,7 @@ impl Engine {
             stamp: given.stamp,
             written: given.tick,
         });
-        let histories = channels().zip(self.histories.iter().cloned());
+        let histories = with_history(plan).zip(&self.histories);
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             revision: self.revision().to_owned(),
@@ -109,9 +117,12 @@ impl Engine {
             extremes: sources().zip(self.extremes.iter().copied()).collect(),
             slots: channels().zip(slots).collect(),
             histories: histories
-                .filter_map(|(name, history)| Some((name, *history?)))
+                .map(|(slot, history)| (plan.channels[slot].name.clone(), history.clone()))
                 .collect(),
             nodes: self.node_states(),
+            courses: (self.leaps.courses.iter())
+                .map(|(slot, course)| (plan.channels[*slot].name.clone(), course.clone()))
+                .collect(),
             blending: outputs
                 .map(|(index, output)| (output.name.clone(), self.outputs.blending(index)))
                 .collect(),
@@ -198,22 +209,33 @@ impl Engine {
     }
 
     fn adopt_slots(&mut self, state: &EngineState, transfer: &StateTransfer, refusing: &[bool]) {
+        let goes_on = |slot: usize| {
+            let refuses = self.plan.channels[slot].node.is_some_and(|of| refusing[of]);
+            transfer.slots[slot] && !refuses
+        };
         for (slot, channel) in self.plan.channels.iter().enumerate() {
-            if !transfer.slots[slot] || channel.node.is_some_and(|node| refusing[node]) {
-                continue;
-            }
-            if let Some(was) = state.slots.get(&channel.name) {
+            if let Some(was) = state.slots.get(&channel.name)
+                && goes_on(slot)
+            {
                 self.slots.values[slot] = was.value;
                 self.slots.given[slot] = SlotTime {
                     stamp: was.stamp,
                     tick: was.written,
                 };
             }
-            if let (Some(history), Some(was)) = (
-                &mut self.histories[slot],
-                state.histories.get(&channel.name),
-            ) {
+        }
+        for (slot, history) in with_history(&self.plan).zip(&mut self.histories) {
+            if let Some(was) = state.histories.get(&self.plan.channels[slot].name)
+                && goes_on(slot)
+            {
                 history.adopt(was);
+            }
+        }
+        for (slot, course) in &mut self.leaps.courses {
+            if let Some(was) = state.courses.get(&self.plan.channels[*slot].name)
+                && transfer.slots[*slot]
+            {
+                course.clone_from(was);
             }
         }
         for gathered in &mut self.gathered {
@@ -245,7 +267,8 @@ impl Engine {
             } = &node.role
                 && let Some(freeze) = learning.freeze
             {
-                self.gathered[freeze].read(&self.slots, &self.histories, self.last);
+                let of = &self.plan.gathers[freeze];
+                self.gathered[freeze].read(of, &self.slots, &self.histories, self.last);
             }
         }
     }

@@ -7,6 +7,7 @@ use super::slots::Slots;
 use super::vote::Vote;
 use crate::channel::unless_infinite;
 use crate::engine::at_work::AtWork;
+use crate::engine::leap::Leaps;
 use crate::engine::learning::GatedLearner;
 use crate::node::{Outputs, Tick};
 use crate::time::Instant;
@@ -16,6 +17,7 @@ pub(crate) struct TickContext<'a> {
     pub(crate) now: Instant,
     pub(crate) slots: &'a mut Slots,
     pub(crate) gathered: &'a mut [Gathered],
+    pub(crate) leaps: &'a mut Leaps,
     /// Room for the regressors of any estimator.
     pub(crate) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
@@ -72,6 +74,9 @@ impl TickContext<'_> {
             ports: &node.gathers,
         };
         node.operator.step(&tick, &mut outputs);
+        if !node.truths.is_empty() {
+            self.leaps.refuse(node.truths.clone(), self.slots, self.now);
+        }
     }
 
     /// Lets an estimator learn before it runs; the outcome of the newest truth stands beside its prediction.
@@ -82,8 +87,9 @@ impl TickContext<'_> {
             let truth = self.slots.values[learning.truth()];
             learning.observe(truth, now, self.gathered, on);
         }
-        if let Some((became, arrived)) = learning.release(now, self.gathered, on) {
-            self.slots.set(slot + 1, f64::from(became as u8), arrived);
+        let said = self.slots.values[slot + 1];
+        if let Some((says, arrived)) = learning.release(now, self.gathered, on, said) {
+            self.slots.set(slot + 1, says, arrived);
         }
     }
 

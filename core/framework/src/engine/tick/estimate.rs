@@ -172,8 +172,12 @@ impl Estimate {
 
     /// What the prediction is, where it is a linear form and nothing else is asked of it; it may learn.
     pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
+        self.linear().filter(|_| self.plain)
+    }
+
+    /// The same whatever else is asked of it.
+    pub(crate) fn linear(&self) -> Option<LinearForm<'_>> {
         let form = match &self.learning {
-            _ if !self.plain => None,
             Some(learning) => learning.form(),
             None => self.predictor.linear(),
         };

@@ -7,9 +7,7 @@ use crate::compile::{Conversion, Entry, Gather};
 use crate::node::{PortValues, Read, SlotTime};
 use crate::time::{Duration, Instant};
 
-/// A bundle of slots as read at the present tick, side by side.
-///
-/// What a tick needs of the plan is copied here, so that it touches little memory.
+/// A bundle of slots as read at the present tick, side by side. What stays as it is lies in the plan, which engines share.
 #[derive(Debug, Clone)]
 pub struct Gathered {
     /// The values; NaN where there is none.
@@ -25,12 +23,10 @@ pub struct Gathered {
     /// Whether one whose value would be held ran and gave nothing, which ends the hold.
     pub(crate) ended: bool,
     read: Read,
+    /// Whether some are converted, or do not age what is made of them.
+    changes: bool,
     origin: Origin,
-    conversions: Box<[Conversion]>,
-    /// Those that do not age what is made of them, and until which age.
-    rare: Box<[(usize, Duration)]>,
-    /// How long each of them counts, and how long any does at least.
-    ages: Box<[Duration]>,
+    /// How long any of them counts at least.
     shortest: Duration,
 }
 
@@ -40,21 +36,20 @@ enum Origin {
     /// Slots side by side, of which this is the first, without a lag.
     SideBySide(usize),
     /// Slots without a lag.
-    Apart(Box<[usize]>),
+    Apart,
     /// Slots of which some are read with a lag.
     Past(Box<AllPast>),
 }
 
 impl Origin {
-    fn new(entries: &[Entry]) -> Self {
+    fn new(entries: &[Entry], with_history: &[usize]) -> Self {
         if let Some(first) = side_by_side(entries) {
             return Self::SideBySide(first);
         }
-        let slots = entries.iter().map(|entry| entry.slot);
         if entries.iter().all(|entry| entry.lag.is_zero()) {
-            return Self::Apart(slots.collect());
+            return Self::Apart;
         }
-        Self::Past(Box::new(AllPast::new(entries)))
+        Self::Past(Box::new(AllPast::new(entries, with_history)))
     }
 }
 
@@ -66,15 +61,14 @@ struct AllPast {
     until: Instant,
     /// The oldest stamp, where all of it is there.
     whole: Option<Instant>,
-    /// Places and slots of what is read without a lag.
-    present: Box<[(usize, usize)]>,
 }
 
 /// A value that is read with a lag.
 #[derive(Debug, Clone)]
 struct Past {
-    place: usize,
-    entry: Entry,
+    /// Its place in the gather, and that of its slot among those that have a history.
+    place: u32,
+    history: u32,
     cursor: Cursor,
     /// Until when it stays as it is.
     until: Instant,
@@ -127,7 +121,8 @@ impl PortValues for &[Gathered] {
 }
 
 impl Gathered {
-    pub(crate) fn new(gather: &Gather) -> Self {
+    /// Of a gather, nothing yet; `with_history` are the slots that have one.
+    pub(crate) fn new(gather: &Gather, with_history: &[usize]) -> Self {
         let width = gather.entries.len();
         Self {
             values: vec![ABSENT; width].into(),
@@ -137,34 +132,33 @@ impl Gathered {
             fresh: false,
             ended: false,
             read: gather.read,
-            origin: Origin::new(&gather.entries),
-            conversions: gather.conversions.clone().into(),
-            rare: gather.rare.clone().into(),
-            ages: gather.entries.iter().map(|entry| entry.max_age).collect(),
+            changes: !(gather.conversions.is_empty() && gather.rare.is_empty()),
+            origin: Origin::new(&gather.entries, with_history),
             shortest: shortest(&gather.entries),
         }
     }
 
-    /// Reads the slots as they stand now.
+    /// Reads the slots of its gather as they stand now.
     #[inline]
-    pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<Box<History>>], now: Instant) {
+    pub(crate) fn read(&mut self, of: &Gather, slots: &Slots, histories: &[History], now: Instant) {
         match self.origin {
-            Origin::SideBySide(first) => self.read_side_by_side(slots, first, now),
-            Origin::Apart(_) => self.read_apart(slots, now),
-            Origin::Past(_) => self.read_past(slots, histories, now),
+            Origin::SideBySide(first) => self.read_side_by_side(of, slots, first, now),
+            Origin::Apart => self.read_apart(of, slots, now),
+            Origin::Past(_) => self.read_past(of, slots, histories, now),
         }
-        if !self.conversions.is_empty() {
-            self.convert();
-        }
-        if !self.rare.is_empty() {
-            self.spare(now);
+        if self.changes {
+            self.convert(&of.conversions);
+            self.spare(&of.rare, now);
         }
     }
 
     /// Takes what is rare and not too old for new: whoever reads what is made of it would take nothing so old.
     #[inline(never)]
-    fn spare(&mut self, now: Instant) {
-        for &(place, age) in &self.rare {
+    fn spare(&mut self, rare: &[(usize, Duration)], now: Instant) {
+        if rare.is_empty() {
+            return;
+        }
+        for &(place, age) in rare {
             let stamp = &mut self.stamps[place];
             if now - *stamp <= age {
                 *stamp = now;
@@ -175,8 +169,8 @@ impl Gathered {
     }
 
     #[inline(never)]
-    fn convert(&mut self) {
-        for conversion in &self.conversions {
+    fn convert(&mut self, conversions: &[Conversion]) {
+        for conversion in conversions {
             let value = &mut self.values[conversion.entry];
             // A NaN carries the reason why there is no value, and must stay as it is.
             if !value.is_nan() {
@@ -188,7 +182,7 @@ impl Gathered {
     /// A whole port, as it is most often read. What nearly always holds of all its values is looked at first, since a port may
     /// be wide.
     #[inline(never)]
-    fn read_side_by_side(&mut self, slots: &Slots, first: usize, now: Instant) {
+    fn read_side_by_side(&mut self, of: &Gather, slots: &Slots, first: usize, now: Instant) {
         let range = first..first + self.values.len();
         let hides = |given: &SlotTime| match self.read {
             Read::Fresh => given.tick < slots.tick,
@@ -210,57 +204,60 @@ impl Gathered {
         self.ended = false;
         let from = slots.values[range.clone()].iter().zip(&slots.given[range]);
         let to = self.values.iter_mut().zip(&mut self.stamps);
-        for ((to, (&value, given)), &max_age) in to.zip(from).zip(&self.ages) {
+        for ((to, (&value, given)), entry) in to.zip(from).zip(&of.entries) {
             let ran = given.tick == slots.tick;
             self.fresh |= ran && !value.is_nan();
             self.ended |= ran && value.is_nan();
-            *to.0 = seen(value, self.read, ran, now - given.stamp, max_age);
+            *to.0 = seen(value, self.read, ran, now - given.stamp, entry.max_age);
             *to.1 = given.stamp;
         }
         self.ended &= self.read == Read::Held;
     }
 
     #[inline(never)]
-    fn read_apart(&mut self, slots: &Slots, now: Instant) {
-        let Origin::Apart(places) = &self.origin else {
-            return;
-        };
+    fn read_apart(&mut self, of: &Gather, slots: &Slots, now: Instant) {
         let mut glance = Glance::NOTHING;
         let to = self.values.iter_mut().zip(&mut self.stamps);
-        for ((value, stamp), &slot) in to.zip(places) {
+        for ((value, stamp), &Entry { slot, .. }) in to.zip(&of.entries) {
             let (last, given) = (slots.values[slot], &slots.given[slot]);
             (*value, *stamp) = (last, given.stamp);
             glance.add(last, given, slots.tick);
         }
         self.together = glance.oldest == glance.newest;
-        let nothing = places.is_empty();
-        self.take(&glance, (!nothing).then_some(Instant::MAX), slots, now);
+        let nothing = of.entries.is_empty();
+        self.take(of, &glance, (!nothing).then_some(Instant::MAX), slots, now);
     }
 
     #[inline(never)]
-    fn read_past(&mut self, slots: &Slots, histories: &[Option<Box<History>>], now: Instant) {
+    fn read_past(&mut self, of: &Gather, slots: &Slots, histories: &[History], now: Instant) {
         let Origin::Past(past) = &mut self.origin else {
             return;
         };
         let (values, stamps) = (&mut *self.values, &mut *self.stamps);
         if now >= past.until {
-            let changed = !(self.conversions.is_empty() && self.rare.is_empty());
-            past.read(values, stamps, histories, now, changed);
+            past.read(of, values, stamps, histories, now, self.changes);
         }
         let mut glance = Glance::NOTHING;
-        for &(place, slot) in &past.present {
+        for (place, slot) in present(of) {
             let (value, given) = (slots.values[slot], &slots.given[slot]);
             (values[place], stamps[place]) = (value, given.stamp);
             glance.add(value, given, slots.tick);
         }
         let whole = past.whole;
-        self.take(&glance, whole, slots, now);
+        self.take(of, &glance, whole, slots, now);
     }
 
     /// Takes what is known of the values that are read without a lag, and hides those that a reader does not see. `of_past` is the
     /// oldest stamp of those that are read with one, where all of these are there.
     #[inline(always)]
-    fn take(&mut self, glance: &Glance, of_past: Option<Instant>, slots: &Slots, now: Instant) {
+    fn take(
+        &mut self,
+        of: &Gather,
+        glance: &Glance,
+        of_past: Option<Instant>,
+        slots: &Slots,
+        now: Instant,
+    ) {
         let hides = match self.read {
             Read::Fresh => glance.late,
             Read::Held | Read::Truth => glance.oldest < now - self.shortest,
@@ -270,21 +267,16 @@ impl Gathered {
         let whole = of_past.filter(|_| !(glance.lacks | hides));
         self.whole = whole.map(|of_past| of_past.min(glance.oldest));
         if hides {
-            self.hide(slots, now);
+            self.hide(of, slots, now);
         }
     }
 
     #[inline(never)]
-    fn hide(&mut self, slots: &Slots, now: Instant) {
-        let (values, stamps, ages, read) = (&mut self.values, &self.stamps, &self.ages, self.read);
-        let mut hide = |place: usize, slot: usize| {
-            let (value, age) = (&mut values[place], now - stamps[place]);
-            *value = seen(*value, read, slots.ran(slot), age, ages[place]);
-        };
-        match &self.origin {
-            Origin::SideBySide(_) => {}
-            Origin::Apart(of) => of.iter().enumerate().for_each(|(at, &slot)| hide(at, slot)),
-            Origin::Past(past) => past.present.iter().for_each(|&(at, slot)| hide(at, slot)),
+    fn hide(&mut self, of: &Gather, slots: &Slots, now: Instant) {
+        for (place, slot) in present(of) {
+            let (value, age) = (&mut self.values[place], now - self.stamps[place]);
+            let max_age = of.entries[place].max_age;
+            *value = seen(*value, self.read, slots.ran(slot), age, max_age);
         }
     }
 
@@ -328,13 +320,12 @@ impl Gathered {
 }
 
 impl AllPast {
-    fn new(entries: &[Entry]) -> Self {
-        let placed = || entries.iter().copied().enumerate();
-        let past = placed().filter(|(_, entry)| !entry.lag.is_zero());
-        let present = placed().filter(|(_, entry)| entry.lag.is_zero());
+    fn new(entries: &[Entry], with_history: &[usize]) -> Self {
+        let past = entries.iter().enumerate();
+        let past = past.filter(|(_, entry)| !entry.lag.is_zero());
         let past = past.map(|(place, entry)| Past {
-            place,
-            entry,
+            place: place as u32,
+            history: with_history.partition_point(|&slot| slot < entry.slot) as u32,
             cursor: 0,
             until: Instant::MIN,
         });
@@ -342,27 +333,26 @@ impl AllPast {
             of: past.collect(),
             until: Instant::MIN,
             whole: None,
-            present: present.map(|(place, entry)| (place, entry.slot)).collect(),
         }
     }
 
     #[inline(never)]
     fn read(
         &mut self,
+        of: &Gather,
         values: &mut [f64],
         stamps: &mut [Instant],
-        histories: &[Option<Box<History>>],
+        histories: &[History],
         now: Instant,
         changed: bool,
     ) {
         self.until = Instant::MAX;
         self.whole = Some(Instant::MAX);
         for past in &mut self.of {
-            let (entry, place) = (&past.entry, past.place);
+            let place = past.place as usize;
+            let entry = &of.entries[place];
             if now >= past.until {
-                let history = histories[entry.slot]
-                    .as_ref()
-                    .expect("a slot that is read with a lag has a history");
+                let history = &histories[past.history as usize];
                 let at = now - entry.lag;
                 let (value, stamp, until) = if entry.lag.is_negative() {
                     // A plan may be another at the next tick.
@@ -401,6 +391,14 @@ fn seen(value: f64, read: Read, ran: bool, age: Duration, max_age: Duration) -> 
         Read::Held | Read::Truth if !value.is_nan() && age > max_age => ABSENT,
         _ => value,
     }
+}
+
+/// The places and slots of what is read without a lag.
+#[inline]
+fn present(of: &Gather) -> impl Iterator<Item = (usize, usize)> {
+    let entries = of.entries.iter().enumerate();
+    let present = entries.filter(|(_, entry)| entry.lag.is_zero());
+    present.map(|(place, entry)| (place, entry.slot))
 }
 
 /// The first of slots that lie side by side, all of them read without a lag.

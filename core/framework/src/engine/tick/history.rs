@@ -41,7 +41,15 @@ impl History {
     /// Writes down what the channel holds from `at` on; NaN where a run gave nothing.
     pub fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
         self.drop_before(at - self.depth);
-        self.entries.push_back(Past { at, value, stamp });
+        self.append(Past { at, value, stamp });
+    }
+
+    /// Room is made by a part: a channel is about as long back at all times.
+    fn append(&mut self, past: Past) {
+        if self.entries.len() == self.entries.capacity() {
+            self.entries.reserve_exact((self.entries.len() / 16).max(4));
+        }
+        self.entries.push_back(past);
     }
 
     /// Writes down at `now` what is planned to be held from `at` on, in place of all that was planned for then or later.
@@ -51,7 +59,7 @@ impl History {
         }
         self.drop_before(now - self.depth);
         let stamp = at;
-        self.entries.push_back(Past { at, value, stamp });
+        self.append(Past { at, value, stamp });
     }
 
     /// What is planned for an instant, and from when on; NaN where that is longer before it than `max_age`, or nothing is planned.

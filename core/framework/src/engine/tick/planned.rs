@@ -11,6 +11,8 @@ use crate::time::{Duration, Instant};
 /// Its slot holds what applies at the tick, as if that had been measured when it began to. Its history goes on beyond the tick.
 pub(crate) struct PlannedSlot {
     pub(crate) slot: usize,
+    /// The place of its history, where it has one.
+    history: Option<usize>,
     /// The slot of the instant from which on a value applies.
     applies_at: usize,
     /// What applied before the tick.
@@ -18,12 +20,13 @@ pub(crate) struct PlannedSlot {
 }
 
 impl PlannedSlot {
-    /// Those of a plan.
-    pub(crate) fn all(plan: &Plan) -> Vec<Self> {
+    /// Those of a plan; `with_history` are the slots that have one.
+    pub(crate) fn all(plan: &Plan, with_history: &[usize]) -> Vec<Self> {
         let sources = plan.sources.iter().enumerate();
         let planned = sources.filter_map(|(slot, source)| {
             Some(Self {
                 slot,
+                history: with_history.binary_search(&slot).ok(),
                 applies_at: source.planned?.applies_at,
                 before: (f64::NAN, SlotTime::NEVER),
             })
@@ -37,7 +40,10 @@ impl PlannedSlot {
     }
 
     /// Writes down what was announced at the tick, and gives what begins to apply.
-    pub(crate) fn take(&self, slots: &mut Slots, history: &mut History, now: Instant) {
+    pub(crate) fn take(&self, slots: &mut Slots, histories: &mut [History], now: Instant) {
+        let Some(history) = self.history.map(|of| &mut histories[of]) else {
+            return;
+        };
         if slots.fresh(self.slot) {
             let from = slots.now(self.applies_at);
             let from = Duration::from_secs_f64(from).map_or(now, |from| Instant::from_ns(0) + from);

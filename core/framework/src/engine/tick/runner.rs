@@ -8,6 +8,7 @@ use super::estimate::{Estimate, fit_of};
 use super::vote::{Vote, Wires};
 use crate::compile::{AuxPorts, Plan, PlannedNode, PlannedRole};
 use crate::engine::at_work::{When, naming};
+use crate::engine::leap::Leaps;
 use crate::engine::learning::GatedLearner;
 use crate::engine::{EngineError, Fitted};
 use crate::node::{Inputs, Operator, Predictor, Role};
@@ -26,6 +27,8 @@ pub(crate) struct OperatorRunner {
     pub(crate) every_tick: bool,
     pub(crate) closes_loops: bool,
     pub(crate) slots: Range<usize>,
+    /// The truths among these whose windows may hold a leap, by their places.
+    pub(crate) truths: Range<usize>,
 }
 
 /// What runs an estimator.
@@ -81,7 +84,11 @@ impl NodeRunner {
 ///
 /// # Errors
 /// When something fitted does not belong to the plan.
-pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, EngineError> {
+pub(crate) fn runners(
+    plan: &Plan,
+    fitted: &Fitted,
+    leaps: &Leaps,
+) -> Result<Box<[NodeRunner]>, EngineError> {
     let learning = plan.nodes.iter().filter(|of| of.role.fit().is_some());
     let learning: HashSet<String> = learning.map(PlannedNode::instance).collect();
     if let Some(node) = fitted.keys().find(|name| !learning.contains(*name)) {
@@ -94,7 +101,7 @@ pub(crate) fn runners(plan: &Plan, fitted: &Fitted) -> Result<Vec<NodeRunner>, E
         nodes
             .map(|(nth, node)| {
                 at_work.is(nth);
-                runner(node, fitted.get(&node.instance()), &widths)
+                runner(node, fitted.get(&node.instance()), &widths, leaps)
             })
             .collect()
     })
@@ -105,6 +112,7 @@ fn runner(
     node: &PlannedNode,
     fit: Option<&Arc<dyn Predictor>>,
     widths: &[usize],
+    leaps: &Leaps,
 ) -> Result<NodeRunner, EngineError> {
     Ok(match (&node.role, node.spec.role()) {
         (
@@ -133,6 +141,7 @@ fn runner(
                 gathers: gathers.clone().into(),
                 every_tick: *every_tick,
                 closes_loops: *closes_loops,
+                truths: leaps.among(&node.slots),
                 slots: node.slots.clone(),
             })
         }
