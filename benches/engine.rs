@@ -6,7 +6,7 @@ use athermal::core::channel::{ABSENT, COLD};
 use athermal::{Engine, Instant, Model};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use die_tester::by_hand::{Dense, Learning, Shipped};
-use die_tester::{Tick, dense, has_truth, model, ticks, without_novelty};
+use die_tester::{Tick, dense, fitted, has_truth, model, text, ticks, without_novelty};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -49,12 +49,17 @@ fn warm_and_measured() -> (Vec<Tick>, Vec<Tick>) {
     (warm, measured)
 }
 
-#[divan::bench(args = [true, false], sample_count = 20)]
-fn live_ticks(bencher: Bencher, learning: bool) {
-    let model = model();
+/// With positions, without them, with what is computed for whoever looks on, and with a learner an axis of all slopes.
+#[divan::bench(args = ["positions", "none", "looked into", "rls"], sample_count = 20)]
+fn live_ticks(bencher: Bencher, of: &str) {
+    let mut model = model();
     let (warm, mut measured) = warm_and_measured();
-    if !learning {
+    if of == "none" {
         measured.retain(|tick| !has_truth(tick));
+    } else if of == "looked into" {
+        model.plan = model.plan.looked_into().into();
+    } else if of == "rls" {
+        model = fitted(&learning(), &ticks(7.0, 1));
     }
     let with_inputs = || {
         let mut engine = engine(&model);
@@ -73,6 +78,15 @@ fn live_ticks(bencher: Bencher, learning: bool) {
             }
             engine
         });
+}
+
+/// The graph in which `rls` is the first voter.
+fn learning() -> String {
+    let text = text().replace("type = \"linear\"", "type = \"rls\"");
+    let is_none_of_it = |line: &&str| !line.starts_with("solver") && !line.starts_with("selection");
+    text.lines()
+        .filter(is_none_of_it)
+        .fold(String::new(), |text, line| text + line + "\n")
 }
 
 #[divan::bench(sample_count = 20)]

@@ -1,9 +1,7 @@
 //! What it costs to learn from one row: recursive least squares, stochastic gradients and the Kalman filter of a local linear
 //! trend, each a thousand rows at a time.
 
-use athermal_numerics::{
-    Forgetting, Kalman, LearningRate, Passage, Rls, RlsOptions, Sgd, SgdOptions, Structural,
-};
+use athermal_numerics::{Kalman, LearningRate, Passage, Rls, RlsFit, Sgd, SgdOptions, Structural};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -34,14 +32,19 @@ fn rows(width: usize) -> Vec<(Vec<f64>, f64)> {
 #[divan::bench(args = [4, 16, 47])]
 fn recursive_least_squares(bencher: Bencher, width: usize) {
     let rows = rows(width);
-    let options = RlsOptions {
-        forgetting: Forgetting::Constant { factor: 0.999 },
-        most_trace: 1e3,
+    let cells = (0..width).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    let fit = RlsFit {
+        memory_s: 1000.0,
+        share: 0.1,
+        coefficients: vec![0.0; width],
+        information: cells.map(|(i, j)| f64::from(u8::from(i == j))).collect(),
+        rows: 1000.0,
+        variance: 1.0,
     };
-    let mut rls = Rls::new(width, 1.0, options).expect("the options are in range");
+    let mut rls = Rls::try_from(fit).expect("the fit is in range");
     bencher.counter(ItemsCount::new(ROWS)).bench_local(|| {
         for (x, y) in &rows {
-            divan::black_box(rls.step(x, *y));
+            divan::black_box(rls.step(x, *y, 1.0));
         }
     });
 }

@@ -168,7 +168,7 @@ fn serve(model: &Model) {
     let said = read.and_then(|read| declare(read, &mut mistakes));
     let graph = GraphFile {
         deployment: said.expect("it has no mistake").deployment,
-        ..model.graph.clone()
+        ..(*model.graph).clone()
     };
     let deployment = Deployment::read(&graph, &model.plan, &files, &mut mistakes);
     let deployment = deployment.expect("it has no mistake");

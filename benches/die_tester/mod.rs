@@ -82,7 +82,7 @@ pub fn fitted(text: &str, ticks: &[Tick]) -> Model {
     let plan = Arc::new(plan);
     let fitted = fit(&plan, &table(ticks), &FitOptions::default(), &mut |_| ());
     Model {
-        graph,
+        graph: Arc::new(graph),
         fitted: fitted.expect("a table in memory can be read").0,
         plan,
         card: None,

@@ -8,8 +8,8 @@ use std::time::Instant;
 use athermal::core::channel::{ABSENT, COLD};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use athermal_numerics::{
-    Folds, Forgetting, GramBlocks, Kalman, LeastSquares, Passage, Rls, RlsOptions, Search,
-    Standardization, Structural, cross_validated_penalties, logarithmic_grid,
+    Folds, GramBlocks, Kalman, LeastSquares, Passage, Rls, RlsFit, Search, Standardization,
+    Structural, cross_validated_penalties, logarithmic_grid,
 };
 
 type Found = Result<Vec<f64>, Box<dyn Error>>;
@@ -103,13 +103,18 @@ fn least_squares(rows: &[(&[f64], f64)], width: usize) -> Found {
 
 /// The coefficients after all rows, forgetting by 0.999.
 fn recursive_least_squares(rows: &[(&[f64], f64)], width: usize) -> Found {
-    let options = RlsOptions {
-        forgetting: Forgetting::Constant { factor: 0.999 },
-        most_trace: 1e12,
-    };
-    let mut rls = Rls::new(width, 1.0, options)?;
+    let cells = (0..width).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    // Nothing of a fit that it could go back to, as the peers have none.
+    let mut rls = Rls::try_from(RlsFit {
+        memory_s: -0.999_f64.ln().recip(),
+        share: 0.0,
+        coefficients: vec![0.0; width],
+        information: cells.map(|(i, j)| f64::from(u8::from(i == j))).collect(),
+        rows: 1.0,
+        variance: 1.0,
+    })?;
     for (x, y) in rows {
-        rls.step(x, *y);
+        rls.step(x, *y, 1.0);
     }
     Ok(rls.coefficients().to_vec())
 }

@@ -198,9 +198,9 @@ class Graph:
                 time, such as seconds. Without an offset from UTC it goes by the `zone` of `[time]`.
             to: Read rows before this time alone.
             blocks: Fit on the sums of UTC days in place of rows (`day`), or of stretches of another length, such as `6h` where there are
-                few days: folds end with them, and windows at the beginning of one know the one before. For estimators that are fitted by
+                few days. Folds end with them, and windows at the beginning of one know the one before. For estimators that are fitted by
                 least squares.
-            keep_blocks: Keep the blocks in this folder, of a fleet in a folder inside it for each machine: the next fit reads them, and of
+            keep_blocks: Keep the blocks in this folder, of a fleet in a folder inside it for each machine. The next fit reads them, and of
                 the data only what is new or changed.
             threads: Threads to work with; 0 takes one for each core. The result does not depend on it.
             memory: Megabytes of rows to keep; beyond, rows are streamed in a second pass.
@@ -650,6 +650,8 @@ def init(
     # Options of init, written by `python/options.py`:
     time_format: str | None = None,
     drifts: str | Sequence[str] | None = None,
+    keep: str | Sequence[str] | None = None,
+    applied: str | Sequence[str] | None = None,
     table: str | Sequence[str] | None = None,
     segments: bool = False,
     merge: bool = False,
@@ -662,6 +664,8 @@ def init(
     Options:
         time_format: How dates and times are written that are not as in RFC 3339, in the letters of strptime.
         drifts: The columns that drift.
+        keep: Columns that are inputs although they seem to repeat what drifts, or to count.
+        applied: The columns of what a correction applied, beside those that are called so.
         table: How the text is laid out where that is not found, as `[table]` of a graph says it: skip=2 names=1 separator=; decimal=,.
         segments: Take each file as a segment of its own, also where its times go on: windows, lags and filters start afresh with it.
         merge: Merge files of different columns by time although their times are no dates: all of them count from one instant.
@@ -689,6 +693,7 @@ def simulate(
     compensate: str | os.PathLike[str] | None = None,
     faults: str | Sequence[str] | None = None,
     disturb: str | Sequence[str] | None = None,
+    change: str | Sequence[str] | None = None,
 ) -> Frame:
     """The recording of a simulated machine, `die-tester` or `linear-axis`, as `athermal simulate` writes it.
 
@@ -702,6 +707,7 @@ def simulate(
         compensate: Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm.
         faults: A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…].
         disturb: The world changes: `door,from=8h,for=3h,size=3`, `lamp,size=0.6 mK/s` or `loose=SENSOR,size=0.5`.
+        change: The machine becomes another for good: `expansion=30%@2d`, `contact` (of joints), `load` (of motors), `season=4 K@2d..9d`.
     """
     call = _frames.Call(_given(locals()) | {"fault": faults}, progress)
     return Frame(call.run(_athermal.simulate))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "docs" / "src" / "python.md", ROOT / "python" / "README.md", ROOT / "README.md"]
+PAGES = [ROOT / "docs" / "src" / "python.md", ROOT / "docs" / "src" / "tutorial-notebook.md", ROOT / "python" / "README.md", ROOT / "README.md"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -49,7 +49,7 @@ impl Learner {
             *value = regressors[place];
         }
         let whole = self.row.iter().all(|value| !value.is_nan());
-        if !(whole && truth.abs() < self.below && self.range.contains(&self.row, 0.0)) {
+        if !(whole && truth.abs() < self.below && self.range.contains(&self.row, 1.0)) {
             return;
         }
         if !self.admits(truth - model.predict(regressors)) {
@@ -72,7 +72,7 @@ impl Learner {
         model.intercept = self.sgd.intercept() + self.level - shift.at(&self.means);
     }
 
-    /// Whether an error is below six times the recent one, for which the last fifty count.
+    /// Whether an error is below six times the recent one, for which the last fifty count; one that is not counts as twice the recent one.
     fn admits(&mut self, error: f64) -> bool {
         if self.refused >= 20 {
             (self.seen, self.mean_square, self.refused) = (0, 0.0, 0);
@@ -85,8 +85,13 @@ impl Learner {
             f64::INFINITY
         };
         self.seen = (self.seen + 1).min(50);
-        self.mean_square += (square.min(most) - self.mean_square) / f64::from(self.seen);
         let admitted = square <= most;
+        let counted = if admitted {
+            square
+        } else {
+            square.min(4.0 * self.mean_square)
+        };
+        self.mean_square += (counted - self.mean_square) / f64::from(self.seen);
         self.refused = if admitted { 0 } else { self.refused + 1 };
         admitted
     }

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use athermal::core::node::KindFacts;
 use athermal::core::node::prelude::*;
 use athermal::core::predictor;
 use pyo3::exceptions::PyException;
@@ -31,6 +32,13 @@ fn now() -> Vec<Duration> {
 }
 
 impl Estimator for PythonEstimator {
+    fn facts() -> KindFacts {
+        KindFacts {
+            can_change: true,
+            ..KindFacts::default()
+        }
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[

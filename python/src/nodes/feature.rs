@@ -1,5 +1,6 @@
 //! A feature that is written in Python.
 
+use athermal::core::node::KindFacts;
 use athermal::core::node::prelude::*;
 use athermal::core::state;
 use pyo3::exceptions::PyValueError;
@@ -62,6 +63,13 @@ impl PythonFeature {
 }
 
 impl Feature for PythonFeature {
+    fn facts() -> KindFacts {
+        KindFacts {
+            can_change: true,
+            ..KindFacts::default()
+        }
+    }
+
     fn inputs() -> &'static [InputPort] {
         const {
             &[InputPort::fresh(
