@@ -16,7 +16,7 @@
 //! This package links every built-in plugin: whoever uses it can load any graph that the command line can.
 //!
 //! The command line stands behind the default feature `cli`; diagnosis, charts and reports behind `analysis`, which `cli` implies.
-//! An embedder with `default-features = false` compiles neither: 132 crates instead of 217.
+//! An embedder with `default-features = false` compiles neither: 132 crates instead of 222.
 
 pub use athermal_core as core;
 pub use athermal_core::engine::{Engine, EngineError};
@@ -61,11 +61,15 @@ use athermal_command::{message, output, terminal};
 extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
+#[cfg(all(unix, feature = "cli"))]
+use athermal_alarms as _;
 #[cfg(feature = "parquet")]
 use athermal_arrow as _;
 use athermal_combiners as _;
 use athermal_connectors as _;
 use athermal_control as _;
+#[cfg(any(feature = "influx", feature = "postgres"))]
+use athermal_databases as _;
 use athermal_estimators as _;
 #[cfg(feature = "cli")]
 use athermal_export as _;
@@ -73,17 +77,27 @@ use athermal_features as _;
 #[cfg(feature = "cli")]
 use athermal_fleet as _;
 #[cfg(all(unix, feature = "cli"))]
+use athermal_history as _;
+#[cfg(all(unix, feature = "cli"))]
 use athermal_http as _;
 use athermal_kinematics as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_log as _;
 #[cfg(feature = "mqtt")]
 use athermal_mqtt as _;
+#[cfg(feature = "opcua")]
+use athermal_opcua as _;
+#[cfg(all(unix, feature = "cli"))]
+use athermal_page as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_retrain as _;
 use athermal_simulation as _;
+#[cfg(feature = "sparkplug")]
+use athermal_sparkplug as _;
 #[cfg(all(unix, feature = "cli"))]
 use athermal_systemd as _;
+#[cfg(all(unix, feature = "top"))]
+use athermal_top as _;
 
 // What features bring, where they were left out.
 #[cfg(not(feature = "mqtt"))]
@@ -93,15 +107,42 @@ mod without_mqtt {
     athermal_core::lacks!(SourceKind, "mqtt", "mqtt");
     athermal_core::lacks!(SinkKind, "mqtt", "mqtt");
     #[cfg(feature = "cli")]
-    athermal_core::lacks!(athermal_command::CommandKind, "mqtt", "browse");
+    athermal_core::lacks!(athermal_command::Scheme, "mqtt", "mqtt", "mqtts");
 }
+#[cfg(not(feature = "influx"))]
+athermal_core::lacks!(athermal_serve::connector::SinkKind, "influx", "influx");
+#[cfg(not(feature = "postgres"))]
+athermal_core::lacks!(athermal_serve::connector::SinkKind, "postgres", "postgres");
+#[cfg(not(feature = "sparkplug"))]
+mod without_sparkplug {
+    use athermal_serve::connector::{SinkKind, SourceKind};
+
+    athermal_core::lacks!(SourceKind, "sparkplug", "sparkplug");
+    athermal_core::lacks!(SinkKind, "sparkplug", "sparkplug");
+}
+#[cfg(not(feature = "opcua"))]
+mod without_opcua {
+    use athermal_serve::connector::{SinkKind, SourceKind};
+
+    athermal_core::lacks!(SourceKind, "opcua", "opcua");
+    athermal_core::lacks!(SinkKind, "opcua", "opcua");
+    #[cfg(feature = "cli")]
+    athermal_core::lacks!(athermal_command::Scheme, "opcua", "opc.tcp");
+    #[cfg(feature = "cli")]
+    athermal_core::lacks!(athermal_command::CommandKind, "opcua", "trust");
+}
+#[cfg(all(feature = "cli", not(all(unix, feature = "top"))))]
+athermal_core::lacks!(athermal_command::CommandKind, "top", "top");
 #[cfg(not(feature = "parquet"))]
 athermal_core::lacks!(athermal_serve::connector::SinkKind, "parquet", "parquet");
 #[cfg(not(all(unix, feature = "cli")))]
 athermal_core::lacks!(
     athermal_core::document::Section,
     "cli",
+    "alarms",
     "control",
+    "history",
+    "page",
     "retrain"
 );
 

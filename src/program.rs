@@ -33,6 +33,10 @@ static BUILT: LazyLock<String> = LazyLock::new(|| {
     let features = [
         ("mqtt", cfg!(feature = "mqtt")),
         ("tls", cfg!(feature = "tls")),
+        ("opcua", cfg!(feature = "opcua")),
+        ("sparkplug", cfg!(feature = "sparkplug")),
+        ("influx", cfg!(feature = "influx")),
+        ("postgres", cfg!(feature = "postgres")),
         ("parquet", cfg!(feature = "parquet")),
     ];
     let features = features.iter().filter(|(_, is_in)| *is_in);

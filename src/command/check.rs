@@ -99,7 +99,7 @@ fn machine(
     trial::declare(&graph, &plan, &Disk, sources, diagnostics);
     let deployment = Deployment::check(&graph, &plan, sources, diagnostics);
     let mut machine = Model {
-        graph,
+        graph: Arc::new(graph),
         plan: Arc::new(plan),
         fitted: Fitted::new(),
         card: None,
@@ -130,7 +130,7 @@ impl Check {
             for found in machine
                 .iter()
                 .filter(|_| self.live)
-                .flat_map(|of| of.1.look(&of.0.plan, PATIENCE))
+                .flat_map(|of| of.1.look(&of.0.plan, &of.1.state(path), PATIENCE))
             {
                 is_whole &= found.missing == 0;
                 match terminal.format {

@@ -17,7 +17,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Each prediction is compared with the truth measured later. Beside it stand no model, persistence (the
 /// last truth that shares nothing with the predicted one), and the standard error of the truth itself. Persistence is K
 /// steps back for predictions K steps ahead; a free run has none. What the graph puts out is scored wherever it has a value, as it is
-/// used; all other predictions of a truth, to be compared, on the instants at which all of them are valid.
+/// used. All other predictions of a truth are compared, on the instants at which all of them are valid.
 ///
 /// The standard error of a truth that is a slope is that of its line, from the residuals about it (root mean square over
 /// the instants). Scatter of the samples and curvature of the drift within the window both count there. So it may be more
@@ -34,7 +34,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// which should cover nine tenths. It shows the share of truths covered, the mean width, and the interval score: the width
 /// plus 2/(1 − share to cover) times the mean distance of truths outside. A small score is good.
 ///
-/// `--mode` shows how far the model reaches by itself: one step from measured past truths, several steps with its own
+/// `--mode` shows how far the model reaches by itself. It goes one step from measured past truths, several steps with its own
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
 /// stay as they were measured, and so do the weights of votes. Standard deviations are those of as many steps as there are
 /// since the newest measured truth, under the model's own noise.

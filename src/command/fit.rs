@@ -22,7 +22,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Fit a graph on recorded data
 ///
 /// Fits every node that learns: estimators, and features such as encoders. For each it prints the rows used and left out,
-/// the regressors chosen with their cross-validation scores (the mean, and each fold), the condition number, and the error
+/// the regressors chosen with their cross-validation scores (the mean, and each fold). Then come the condition number, and the error
 /// on the rows of the fit. Then it writes the model: one JSON file that holds all that is needed to run.
 /// `athermal show MODEL --format coefficients` prints what is in it.
 ///
@@ -122,7 +122,8 @@ impl Fit {
             let output = quoted(&self.output.display().to_string());
             return next(&[&program(), "run", &output, "--input", &unseen]);
         }
-        let unseen = self.job.data.others(vec![unseen.into()]);
+        let rest = self.job.data.rest();
+        let unseen = rest.unwrap_or_else(|| self.job.data.others(vec![unseen.into()]));
         next(&words_with(&unseen, "evaluate", &self.output))
     }
 

@@ -10,7 +10,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
-use crate::invocation::{command, quoted, words_with};
+use crate::invocation::{command, program, quoted, words_with};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 
 /// Write a starter graph for a log of yours
@@ -67,7 +67,7 @@ impl Init {
         }
         write_aside(&self.output, &starter.text)?;
         if people {
-            terminal.note(self.next(&data));
+            terminal.note(self.next(&data, &starter));
         } else {
             let facts = json!({
                 "graph": self.output,
@@ -80,16 +80,32 @@ impl Init {
         Ok(Answer::Fine)
     }
 
-    fn next(&self, data: &Data) -> String {
-        let mut fit = words_with(data, "fit", &self.output);
-        fit.push("-o model.json".to_owned());
-        let unseen = data.others(vec![data.unseen().into()]);
-        let evaluate = words_with(&unseen, "evaluate", Path::new("model.json"));
-        format!(
-            "wrote {}; look it over, then fit it, and test it on another log:\n{}\n{}",
-            quoted(&self.output.display().to_string()),
-            command(&fit),
-            command(&evaluate)
-        )
+    /// What goes out of the graph, what to edit, and the commands up to a report; a log whose times do not start again is parted for them.
+    fn next(&self, data: &Data, starter: &job::Starter) -> String {
+        let model = Path::new("model.json");
+        let cut = || starter.last_fifth.clone();
+        let fitted = data.within(None, cut());
+        let unseen = fitted.rest();
+        let unseen = unseen.unwrap_or_else(|| data.others(vec![data.unseen().into()]));
+        let graph = quoted(&self.output.display().to_string());
+        let mut fit = words_with(&fitted, "fit", &self.output);
+        fit.extend(["-o", "model.json"].map(str::to_owned));
+        let mut report = words_with(&unseen, "report", model);
+        report.extend(["-o", "report.html"].map(str::to_owned));
+        let parted = match cut() {
+            Some(cut) => format!("; the last fifth of the log, from {cut} on, is left to score it"),
+            None => ", and score it on another log".to_owned(),
+        };
+        let commands = [
+            vec![program(), "check".to_owned(), graph.clone()],
+            fit,
+            words_with(&unseen, "evaluate", model),
+            report,
+        ];
+        let head = format!(
+            "wrote {graph}: where a guess is wrong, edit its line there, or name columns with --time and --drifts. Then fit it{parted}:"
+        );
+        let head = paragraph("", 2, &starter.outputs) + &paragraph("", 2, &head);
+        head + &commands.map(|words| command(&words)).join("\n")
     }
 }

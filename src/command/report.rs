@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
@@ -23,7 +24,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal report model.json --data test.csv\n  \
-                        athermal report model.json --data test.csv -o report.html\n  \
+                        athermal report model.json --data test.csv -o report.html --open\n  \
                         athermal report model.json --data test.csv --plots plots\n  \
                         athermal report model.json --data test.csv --format json"
 )]
@@ -36,6 +37,9 @@ pub struct Report {
     /// Where the page goes; `-` is standard output
     #[arg(long, short, value_name = "FILE", value_parser = written())]
     output: Option<PathBuf>,
+    /// Open the page in a browser; without `-o` it goes into the folder for temporary files
+    #[arg(long)]
+    open: bool,
     /// A folder for the pictures, each as an SVG file
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
@@ -49,6 +53,11 @@ impl Report {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.job.data.check_lasting("--data")?;
         let to_stdout = self.output.as_deref() == Some(Path::new("-"));
+        if to_stdout && self.open {
+            let message = "--output -: what goes to standard output cannot be opened; name a file, or leave `-o` out";
+            return Err(Failure::Request(message.to_owned()));
+        }
+        let output = self.output.clone().or_else(|| self.open.then(passing));
         if let Some(output) = &self.output {
             if to_stdout && terminal.format == Format::Json {
                 let message = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
@@ -65,7 +74,7 @@ impl Report {
             Format::Table if to_stdout => {}
             Format::Table => print!("{}", found.text),
         }
-        if let Some(path) = &self.output {
+        if let Some(path) = &output {
             let page = page(&facts);
             if to_stdout {
                 print!("{page}");
@@ -75,11 +84,40 @@ impl Report {
                 terminal.note(format_args!("wrote {path} ({kb} kB)"));
             }
         }
+        if let Some(path) = output.filter(|_| self.open)
+            && let Err(error) = opened(&path)
+        {
+            let path = path.display();
+            terminal.warning(format_args!(
+                "no browser opens {path} ({error}): open it yourself"
+            ));
+        }
         if let Some(folder) = &self.plots {
             write_plots(terminal, folder, &plots(&facts))?;
         }
         Ok(Answer::Fine)
     }
+}
+
+/// A page that nobody asked to keep.
+fn passing() -> PathBuf {
+    std::env::temp_dir().join(format!("athermal-report-{}.html", std::process::id()))
+}
+
+/// Hands a page to whatever shows pages here: the program that `BROWSER` names, or that of the system.
+fn opened(path: &Path) -> std::io::Result<()> {
+    let path = std::path::absolute(path)?;
+    let named = std::env::var("BROWSER")
+        .ok()
+        .filter(|name| !name.is_empty());
+    let usual = match std::env::consts::OS {
+        "macos" => "open",
+        "windows" => "explorer",
+        _ => "xdg-open",
+    };
+    let mut browser = Command::new(named.as_deref().unwrap_or(usual));
+    let silent = browser.stdin(Stdio::null()).stdout(Stdio::null());
+    silent.stderr(Stdio::null()).arg(path).spawn().map(drop)
 }
 
 /// Writes pictures into a folder.

@@ -34,6 +34,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
       --fault temperature.plate1=stuck,from=6h,for=12h \\
       --fault \"temperature.room=drift,size=0.5 K/h\"
 
+  athermal simulate linear-axis -o changed.csv --change expansion=30%@2d
+
 Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` may be left out.")]
 pub struct Simulate {
     #[command(flatten)]
@@ -160,6 +162,9 @@ pub fn write_recording(
         Box::new(File::create(output).map_err(failed)?)
     };
     let mut out = BufWriter::with_capacity(1 << 16, out);
+    for change in &recording.setup().changes {
+        writeln!(out, "# change: {change}").map_err(failed)?;
+    }
     let rows =
         write_table(machine.channels(), &mut *simulation, truth, &mut out).map_err(failed)?;
     out.flush().map_err(failed)?;

@@ -16,6 +16,8 @@ fn graph(position: &str, time: &str) -> Graph {
         .with("column = 'applied'; optional = ['Z']")
         .section("nodes.free", "type = 'uncorrected'")
         .with("inputs = { position = 'position', applied = 'applied' }; until_first = 'zero'")
+        .section("nodes.beside", "type = 'uncorrected'")
+        .with("inputs.position = 'position'")
         .slope("drift", position, "5min", "nm/min")
         .slope("gradient", "temperature", "5min", "mK/min")
         .model("thermal", "linear", "gradient", "drift.Z", "150s")
@@ -45,28 +47,69 @@ fn log(from: i64, rows: i64, dated: bool) -> String {
 }
 
 #[test]
-fn a_correction_that_goes_by_positions_which_it_moves_is_told_of_by_who_runs_and_reports() {
-    let scratch = Scratch::new("told-feedback");
-    let data = scratch.file("log.csv", log(0, 360, false));
-    let told = "the correction goes by past drifts of position.Z, which on a machine that is being corrected";
+fn a_correction_that_goes_by_positions_which_it_moves_is_a_mistake_in_its_graph() {
+    let scratch = Scratch::new("feedback");
+    let told =
+        "error[A162]: the correction goes by past drifts of `position.Z`, which it moves itself";
     for (position, rate, moved) in [
         ("position", "vote", true),
         ("position", "thermal", false),
         ("free", "vote", false),
+        ("beside", "vote", false),
     ] {
         let text = graph(position, "s").replace("RATE", rate);
-        let (graph, model) = (scratch.file("graph.toml", text), scratch.path("model.json"));
-        athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
-        let run = athermal(&[&"run", &model, &"-i", &data]).ended(0);
-        let report = athermal_on("report", &model, &data, &[]).ended(0);
-        for command in [run, report] {
-            assert_eq!(
-                command.told.contains(told),
-                moved,
-                "{position} {rate}: {}",
-                command.told
-            );
-        }
+        let check = athermal(&[&"check", &scratch.file("graph.toml", text)]);
+        let (code, what) = (if moved { 2 } else { 0 }, format!("{position} {rate}"));
+        let check = check.ended(code);
+        assert_eq!(check.told.contains(told), moved, "{what}: {}", check.told);
+        assert_eq!(
+            check.told.contains("put an `uncorrected` node"),
+            moved,
+            "{what}"
+        );
+    }
+    // A learner or a lag is a past truth as a vote is.
+    for model in ["rls", "persistence"] {
+        let text = graph("position", "s")
+            .to_string()
+            .replace("RATE", "thermal");
+        let text = text.replace("type = \"linear\"", &format!("type = \"{model}\""));
+        let text = match model {
+            "persistence" => text.replace("inputs.features = \"gradient\"\n", ""),
+            _ => text,
+        };
+        let check = athermal(&[&"check", &scratch.file("graph.toml", text)]).ended(2);
+        assert!(check.told.contains(told), "{model}: {}", check.told);
+    }
+}
+
+#[test]
+fn a_prediction_that_is_sent_as_a_command_must_not_go_by_what_it_moves() {
+    let scratch = Scratch::new("feedback-command");
+    for (position, outputs, moved) in [
+        ("position", "predicted", true),
+        ("free", "predicted", false),
+        ("position", "drift", false),
+    ] {
+        let text = graph(position, "s").to_string().replace("RATE", "thermal");
+        let text = text.replace("[outputs]\n", "[outputs]\ndrift = \"drift\"\n");
+        scratch.file("graph.toml", text);
+        let machine = scratch.file(
+            "line.toml",
+            format!(
+                "schema = 1\nextends = \"graph.toml\"\n[sources.log]\ntype = \"csv\"\npath = \"log.csv\"\n\
+                 [sinks.plc]\ntype = \"mqtt\"\nbroker = \"mqtt://localhost\"\ntopic = \"drift\"\noutputs = [\"{outputs}\"]\n\
+                 rate = \"1 nm/min/s\"\n"
+            ),
+        );
+        let check = athermal(&[&"check", &machine]).ended(if moved { 2 } else { 0 });
+        let told = "error[A215]: `predicted.Z` is sent as a command and goes by past drifts of `position.Z`, which it moves";
+        assert_eq!(
+            check.told.contains(told),
+            moved,
+            "{position} {outputs}: {}",
+            check.told
+        );
     }
 }
 

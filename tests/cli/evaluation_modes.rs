@@ -189,6 +189,8 @@ fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
     let first = scratch.file("first.csv", csv(&rows[..250]));
     let second = scratch.file("second.csv", csv(&rows[250..]));
     let node = "[nodes.level]\ntype = \"kalman\"\n";
+    // Nothing fades in it between the truths of an evaluation.
+    let forever = "memory = \"100000d\"";
     let features = "inputs.features = \"input.a\"";
     for (ahead, more) in [
         ("0s", ""),
@@ -197,7 +199,7 @@ fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
         ("30s", "inputs.features = \"input.a\"\nlearn = false"),
     ] {
         let text = modes("");
-        let text = text.replace(node, &format!("{node}{more}\n"));
+        let text = text.replace(node, &format!("{node}{forever}\n{more}\n"));
         let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}\""));
         let graph = scratch.file("graph.toml", text);
         let model = scratch.path("model.json");
@@ -376,7 +378,7 @@ fn what_learns_and_reads_past_truths_predicts_several_steps_from_those_that_were
             .with("lags = ['0s']; solver = { type = 'sgd', eta0 = 0.01 }")
             .with(learn)
     };
-    let learns = scratch.file("learns.toml", nodes("learn = true"));
+    let learns = scratch.file("learns.toml", nodes("learn = true\noutside = \"pass\""));
     let still = scratch.file("still.toml", nodes("learn = false\noutside = \"pass\""));
     let learns = fitted(&scratch, "learns.json", &learns, &data);
     let still = fitted(&scratch, "still.json", &still, &data);

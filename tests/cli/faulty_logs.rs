@@ -107,7 +107,7 @@ fn a_fit_names_the_position_that_was_zeroed_anew_and_says_nothing_of_sound_data(
     let fitted = athermal_on("fit", &graph, &zeroed, &[&"-o", &model]).ended(0);
     fitted.tells(&[
         "warning: position.Z leaps once from ",
-        "at 120000 s: was it moved, or zeroed anew? That is learned as drift",
+        "at 120000 s: was it moved, or zeroed anew? That is no drift: truths whose window holds it are left out",
     ]);
     let fitted = athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
     assert!(!fitted.told.contains("warning"), "{}", fitted.told);

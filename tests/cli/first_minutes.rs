@@ -243,7 +243,7 @@ fn every_graph_of_the_project_is_shown_in_every_form() {
             continue;
         }
         let path = path.to_str().unwrap();
-        for form in ["plan", "mermaid", "dot", "svg", "json"] {
+        for form in ["plan", "mermaid", "dot", "svg", "json", "memory"] {
             for expand in [&[][..], &["--expand"]] {
                 // Of graphs with kinds that this program does not have, only the reason is shown.
                 let output = folder.run(&[&["show", path, "--format", form][..], expand].concat());
@@ -256,7 +256,50 @@ fn every_graph_of_the_project_is_shown_in_every_form() {
             }
         }
     }
-    assert!(shown >= 50, "{shown}");
+    assert!(shown >= 60, "{shown}");
+}
+
+#[test]
+fn a_graph_says_what_an_engine_of_it_holds_at_a_rate() {
+    let folder = Folder::new("holds");
+    let graph = graph("die-tester.toml");
+    let run = |rest: &[&str]| folder.run(&[&["show", graph.to_str().unwrap()][..], rest].concat());
+    let shown = |rest: &[&str]| {
+        let output = run(&[&["--format", "memory"][..], rest].concat());
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let total = |text: &str| -> f64 {
+        let last = text.lines().last().unwrap();
+        last.strip_prefix("in all").unwrap().trim().parse().unwrap()
+    };
+    let of_ten = shown(&["--rate", "10s", "--rate", "position=75s"]);
+    assert!(
+        of_ten.starts_with(
+            "an engine once all windows are full, with temperature each 10s, position each 75s"
+        ),
+        "{of_ten}"
+    );
+    let window = of_ten.lines().find(|line| line.contains("1343.22257503s"));
+    assert!(
+        window.is_some_and(|line| line.contains("samples") && line.contains(" 135 ")),
+        "{of_ten}"
+    );
+    let each_second = shown(&["--rate", "1s"]);
+    assert!(total(&each_second) > 2.5 * total(&of_ten), "{each_second}");
+    for (rest, told) in [
+        (
+            &["--format", "memory", "--rate", "nothing=1s"][..],
+            "there is no signal `nothing`",
+        ),
+        (&["--format", "memory", "--rate", "fast"], "--rate fast"),
+        (&["--rate", "1s"], "--format memory"),
+    ] {
+        let output = run(rest);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(text.contains(told), "{text}");
+    }
 }
 
 #[test]

@@ -135,6 +135,32 @@ fn every_key_of_the_schema_stands_in_the_section_of_its_table() {
 }
 
 #[test]
+fn every_key_in_a_table_of_the_page_is_one_of_the_schema() {
+    let schema = graph_schema();
+    let tables = schema["properties"].as_object().unwrap();
+    let mut wrong = Vec::new();
+    for section in PAGE.split("\n## ").skip(1) {
+        let heading = section.lines().next().unwrap();
+        let named = tables.iter();
+        let named = named.filter(|(name, _)| {
+            heading.contains(&format!("[{name}")) || heading.contains(&format!("`{name}`"))
+        });
+        let mut known = BTreeSet::new();
+        for (name, of) in named {
+            known.extend(keys(of, &schema["definitions"]));
+            known.insert(name.clone());
+        }
+        for row in section.lines().filter(|line| line.starts_with("| `")) {
+            let cell = row.split(" | ").next().unwrap();
+            let found = cell.split('`').skip(1).step_by(2);
+            let found = found.filter(|key| !known.is_empty() && !known.contains(*key));
+            wrong.extend(found.map(|key| format!("`{key}` under {heading}")));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join(", "));
+}
+
+#[test]
 fn the_keys_that_are_looked_for_are_those_of_every_depth() {
     let schema = schema_of_the_framework();
     let of = |key: &str| keys(&schema["properties"][key], &schema["definitions"]);

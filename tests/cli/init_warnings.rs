@@ -492,7 +492,8 @@ fn humidity_explains_and_does_not_drift_with_a_focus_in_its_unit() {
         "speed [1/min]: input, in 1/min;",
         "focus_steps: drifts, in 1; neither a temperature nor a length, so it is taken as what drifts",
         "the 6th column, which has no name: left out, it has 0 values",
-        "--data OTHER.tsv",
+        "the last fifth of the log, from ",
+        "--data scope.tsv",
     ] {
         assert!(told.contains(expected), "{expected}: {told}");
     }

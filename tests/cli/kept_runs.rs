@@ -1,6 +1,6 @@
 //! A run that goes on where the one before ended, as a user restarts it. Decides nothing about what a node keeps.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::workbench::{Graph, Scratch, athermal, athermal_fed, athermal_on, simulated};
 
@@ -16,7 +16,7 @@ fn learning() -> Graph {
         .slope("drift", "position", "5min", "nm/min")
         .slope("gradients", "temperature", "5min 15min", "mK/min")
         .model("model", "rls", "gradients", "drift.{axis}", "5min")
-        .with("each = 'axis'; forgetting = { type = 'constant', factor = 0.999 }; learn = true")
+        .with("each = 'axis'; memory = '6h'; learn = true")
         .vote("vote", "auto_weighted", "['model.{axis}']", "drift.{axis}")
         .with("each = 'axis'; memory = '15min'")
         .outputs("predicted = 'vote'")
@@ -65,6 +65,22 @@ fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_
     let after = athermal_fed(&arguments, new.as_bytes()).ended(0);
     assert!(!after.told.contains("seen"), "{}", after.told);
     assert_eq!(before + &rows(&after.out), whole);
+}
+
+/// What lies in `upgraded` was written by a program whose slopes, rows and errors lay otherwise in memory, in a log with gaps.
+#[test]
+fn a_run_goes_on_warm_from_a_state_that_an_older_program_wrote() {
+    let scratch = Scratch::new("kept-runs-upgraded");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/upgraded");
+    let of = |name: &str| folder.join(name);
+    let state = scratch.path("state");
+    std::fs::copy(of("state"), &state).unwrap();
+    let (model, rows) = (of("model.json"), of("rows.csv"));
+    let after = athermal(&[&"run", &model, &"-i", &rows, &"--state", &state]).ended(0);
+    let given = std::fs::read_to_string(of("outputs.csv")).unwrap();
+    assert_eq!(after.out, given);
+    let cold = athermal(&[&"run", &model, &"-i", &rows]).ended(0);
+    assert_ne!(cold.out, given);
 }
 
 #[test]

@@ -94,9 +94,9 @@ fn a_number_in_the_place_of_a_table_is_reported() {
     let wrong = text.replace(
         "[outputs]",
         "[nodes.online]\ntype = \"rls\"\neach = \"axis\"\ninputs.features = \"gradients\"\n\
-         inputs.truth = \"drift.{axis}\"\nahead = \"5min\"\nforgetting = 0.99\n[outputs]",
+         inputs.truth = \"drift.{axis}\"\nahead = \"5min\"\nselection = 0.99\n[outputs]",
     );
     let wrong = scratch.file("wrong.toml", wrong);
-    let expected = "expected a table for \"forgetting\", found the number 0.99";
+    let expected = "expected a table for \"selection\", found the number 0.99";
     athermal(&[&"check", &wrong]).ended(2).tells(&[expected]);
 }

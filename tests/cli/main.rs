@@ -8,6 +8,8 @@ mod workbench;
 
 #[cfg(unix)]
 mod ageing_services;
+#[cfg(feature = "mqtt")]
+mod alarms_over_mqtt;
 mod architecture_page;
 #[cfg(unix)]
 mod asked_services;
@@ -29,8 +31,10 @@ mod fit_json;
 mod fleet;
 mod forms_of_logs;
 mod graph_file_page;
+mod guide_pages;
 mod hosts;
 mod idle;
+mod init_readings;
 mod init_refuses;
 mod init_warnings;
 mod json_messages;
@@ -38,6 +42,7 @@ mod json_page;
 mod kept_runs;
 mod language_commands;
 mod levels;
+mod looked_at_services;
 mod meant_calls;
 mod named_models;
 mod not_files;
@@ -63,5 +68,7 @@ mod stopped_runs;
 mod stretches;
 mod swap_commands;
 mod thinned_sources;
+#[cfg(feature = "top")]
+mod top;
 mod trials;
 mod watched_runs;

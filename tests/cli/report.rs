@@ -215,7 +215,7 @@ fn corrections_of_different_units_are_each_worth_what_they_are_in_one() {
         let node = |nth: usize, axes: &str| {
             let range = if units[nth] == "um" { 50 } else { 50_000 };
             format!(
-                "[nodes.c{nth}]\ntype = \"compensate\"\ninputs.rate = \"vote.{axes}\"\n\
+                "[nodes.c{nth}]\ntype = \"compensate\"\ninputs.rate = \"rate.{axes}\"\n\
                  range = \"{range} {}\"\nmax_rate = \"1000 nm/min\"\nmax_slew = \"50 nm/s\"\n",
                 units[nth]
             )
@@ -254,7 +254,7 @@ fn a_correction_at_the_end_of_its_range_is_told_and_moves_its_axis_no_further() 
     let base = graph("linear-axis-compensate");
     let extends = serde_json::Value::from(base.display().to_string());
     let text = format!(
-        "schema = 1\nextends = {extends}\n[nodes.c]\ntype = \"compensate\"\ninputs.rate = \"vote.*\"\nrange = \"100 nm\"\n\
+        "schema = 1\nextends = {extends}\n[nodes.c]\ntype = \"compensate\"\ninputs.rate = \"rate.*\"\nrange = \"100 nm\"\n\
          max_rate = \"1000 nm/min\"\nmax_slew = \"50 nm/s\"\n[outputs]\nc = \"c\"\n"
     );
     let file = scratch.file("narrow.toml", text);

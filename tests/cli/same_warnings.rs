@@ -10,17 +10,16 @@ use serde_json::{Value, json};
 use crate::workbench::{Finished, Graph, Scratch, athermal, athermal_fed, athermal_on};
 
 /// What monitors report, warnings and notes.
-const KINDS: [&str; 7] = [
+const KINDS: [&str; 6] = [
     "rejected_samples",
     "outside_fit",
     "stuck",
     "silent",
     "changes_again",
     "has_samples_again",
-    "feeds_back",
 ];
 
-/// A correction that goes by positions which it moves, of which the temperatures have a range.
+/// A correction of which the temperatures have a range.
 fn graph() -> Graph {
     Graph::named("stage")
         .time("time")
@@ -28,7 +27,9 @@ fn graph() -> Graph {
         .section("signals.temperature", "unit = 'Cel'; channels = ['a', 'b']")
         .with("range = ['-20 Cel', '200 Cel']; max_age = '1min'")
         .signal("position", "nm", "Z", "1min")
-        .slope("drift", "position", "5min", "nm/min")
+        .section("nodes.beside", "type = 'uncorrected'")
+        .with("inputs.position = 'position'")
+        .slope("drift", "beside", "5min", "nm/min")
         .slope("gradient", "temperature", "5min", "mK/min")
         .model("thermal", "linear", "gradient", "drift.Z", "150s")
         .vote("vote", "auto_weighted", "['thermal']", "drift.Z")
@@ -141,10 +142,7 @@ fn the_same_rows_give_the_same_warnings_by_kind_channel_and_count_in_a_run_and_a
     // For people they are in the same words.
     std::fs::remove_dir_all(scratch.path("line.state")).unwrap();
     let words = |of: Finished| {
-        let lines = of
-            .told
-            .lines()
-            .filter(|line| line.contains("temperature.") || line.contains("past drifts"));
+        let lines = of.told.lines().filter(|line| line.contains("temperature."));
         let lines = lines.map(|line| line.replace(" s: ", ": ").replace(",", ""));
         lines.collect::<Vec<_>>()
     };
@@ -267,7 +265,6 @@ fn a_service_says_what_it_watches_and_what_became_of_each_sample_wherever_its_st
         &json!({ "unreadable": 1, "repeated": 1, "out_of_order": 1 })
     );
     let watched = &found["watched"];
-    assert_eq!(watched["feeds_back"], json!(["position.Z"]));
     let outside = &watched["outside_fit"][0];
     assert_eq!(
         (&outside["channel"], &outside["samples"]),
@@ -294,7 +291,6 @@ fn a_service_says_what_it_watches_and_what_became_of_each_sample_wherever_its_st
         "temperature.b: 642 samples of log",
         "left out 25 out of range",
         "temperature.a: 21 samples far outside of the fit, 35.5",
-        "the correction goes by past drifts of position.Z",
     ] {
         assert!(text.contains(words), "`{words}` is not in:\n{text}");
     }

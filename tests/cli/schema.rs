@@ -8,8 +8,14 @@ use athermal::schema::graph_schema;
 use serde_json::Value;
 
 #[cfg_attr(
-    feature = "parquet",
-    ignore = "it is of the program without this feature, which brings a kind of sink"
+    any(
+        feature = "parquet",
+        feature = "opcua",
+        feature = "sparkplug",
+        feature = "influx",
+        feature = "postgres"
+    ),
+    ignore = "it is of the program without these features, which bring kinds of sources and sinks"
 )]
 #[test]
 fn the_schema_beside_the_graphs_is_the_one_that_is_printed() {

@@ -258,7 +258,7 @@ fn logs_that_count_from_one_instant_are_started_with_merge_and_the_next_command_
         .ended(2)
         .tells(&["give `--merge` if both count from the same instant"]);
     let (told, _) = started(&scratch, &["--merge"], &[&one, &other]);
-    assert!(told.contains("g.toml --merge --data"), "{told}");
+    assert!(told.contains("g.toml --merge --to "), "{told}");
     let unknown = [&"init" as &dyn AsRef<std::ffi::OsStr>, &one, &other];
     let offset = ["--merge", "--offset", "third.csv=1s", "-o"];
     let mut words = unknown.to_vec();

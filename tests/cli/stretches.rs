@@ -51,8 +51,9 @@ fn a_fit_and_all_that_is_read_of_a_stretch_of_time_is_that_of_a_file_that_was_cu
     let said = fit(&whole, &one, &STRETCH);
     fit(&cut, &other, &[]);
     assert!(learned(&one) == learned(&other));
-    // The next command is about other data, of any time.
-    assert!(!said.told.contains("--from"), "{}", said.told);
+    // The next command is about what comes after that stretch.
+    assert!(said.told.contains("--from 150000"), "{}", said.told);
+    assert!(!said.told.contains("--to"), "{}", said.told);
     for command in ["evaluate", "diagnose"] {
         let words = ["--format", "json"];
         let of_stretch = on(command, &one, &whole, &[&STRETCH[..], &words].concat());

@@ -15,6 +15,7 @@ mod kinematics;
 mod language;
 mod leaks;
 mod learning;
+mod memory;
 mod modules;
 mod pictures;
 mod planned;

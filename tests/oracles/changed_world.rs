@@ -479,7 +479,7 @@ fn reference_the_picture_of_a_day_with_a_loose_sensor_is_that_of_the_guide() {
         ..Chart::default()
     };
     let drawn = chart.file();
-    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/loose-sensor.svg");
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src/loose-sensor.svg");
     if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
         std::fs::write(&kept, &drawn).unwrap();
     }

@@ -82,9 +82,13 @@ fn the_error_of_a_fit_of_what_follows_truths_is_that_of_evaluating_it_on_the_sam
         ("bj", features),
         ("oe", features),
         ("state_space", features),
-        ("kalman", ""),
-        ("kalman", features),
-        ("kalman", "trend = true"),
+        // Nothing fades in it between the truths of an evaluation.
+        ("kalman", "memory = \"100000d\""),
+        (
+            "kalman",
+            "memory = \"100000d\"\ninputs.features = \"input.a\"",
+        ),
+        ("kalman", "memory = \"100000d\"\ntrend = true"),
     ] {
         for (ahead, learn, spikes) in [
             ("30s", "", 0),

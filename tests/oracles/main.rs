@@ -27,4 +27,5 @@ mod state_space;
 mod streaming;
 mod uncertainty;
 mod unlike_machines;
+mod unusual_loads;
 mod watches;

@@ -20,9 +20,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// Shows whether what predictions leave is white (p of Ljung and Box not below 0.01), and which features explain the truth or
 /// the rest, at which lag. Shows how each estimator answers a change of each sensor, how well the data determine it, and what
-/// each sensor contributes. Fits of its own on the data show how well each day is predicted from the others, and how many
-/// days are needed, and of several loggers how much their clocks differ. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all
-/// of them are.
+/// each sensor contributes. Fits of its own on the data show how well each day is predicted from the others. They show how many
+/// days are needed, and of several loggers how much their clocks differ. Each prediction is looked at wherever it is valid
+/// itself; `evaluate` scores those of a truth where all of them are.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal diagnose model.json --data week.csv

@@ -152,9 +152,9 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         }
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
             line(
-                "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
+                "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 1.0 }`: not from \
                  truths that miss by more than so many times the recent error (both in units of `std_dev` where the kind has it), \
-                 nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `armax`",
+                 nor so many widths outside the range of the fit, for kinds that keep one; not as of `armax`",
             );
         }
     }
@@ -196,7 +196,7 @@ fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
                 port(
                     "learning",
                     "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an \
-                     outlier, 4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
+                     outlier, 4 outside the range of the fit. 5 is outside `train.abs_truth`, 6 a missing regressor",
                     |spec| matches!(spec, Role::Estimator(of) if !matches!(of.learns(), Learns::Never { .. })),
                 ),
                 port(

@@ -108,7 +108,6 @@ impl Run {
         }
         let usual = model.sample_ranges().to_vec();
         let mut watch = Watch::new(&model.plan, &read.sources, &usual);
-        reports.found(watch.begin());
         let mut looks = ChannelWatch::at(&model.plan);
         let mut session = Session::begin(model, options, &reports)?;
         if ends {

@@ -9,7 +9,7 @@ use athermal::core::compile::Wanted;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::serve::connector::LeftOut;
 use athermal::serve::deployment::Deployment;
-use athermal::serve::service::{Ended, Service, ServiceError, ServiceOptions, usual_state};
+use athermal::serve::service::{Ended, Service, ServiceError, ServiceOptions};
 use clap::Args;
 use serde_json::json;
 
@@ -50,8 +50,8 @@ impl Serve {
     /// When the file has mistakes, or the state cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let (model, deployment) = self.load(terminal)?;
-        let named = self.state.as_ref().or(deployment.runtime.state.as_ref());
-        let state = named.map_or_else(|| usual_state(&self.machine), PathBuf::clone);
+        let state = self.state.clone();
+        let state = state.unwrap_or_else(|| deployment.state(&self.machine));
         let options = ServiceOptions {
             is_dry: self.dry_run,
             frozen: self.frozen,

@@ -1,5 +1,6 @@
 //! `athermal show`: a graph as a plan, or as a picture; a model by its coefficients.
 
+mod memory;
 mod tables;
 
 use std::path::PathBuf;
@@ -34,6 +35,7 @@ use athermal_jobs::model::{self, load_fitted};
   athermal show graphs/die-tester.toml --format svg > die-tester.svg
   athermal show graphs/die-tester.toml --format mermaid      for Markdown
   athermal show model.json --format coefficients --node thermal.Z1
+  athermal show model.json --format memory --rate 1s
   athermal show model.json --expand --format dot | dot -Tpdf -o graph.pdf")]
 pub struct Show {
     /// The graph, or a model
@@ -45,6 +47,9 @@ pub struct Show {
     /// Show each instance of a node with `each` on its own
     #[arg(long)]
     expand: bool,
+    /// With `memory`, the time between two samples, of all signals or of one: 1s, position=10s. By default as in the data of the fit
+    #[arg(long, value_name = "[SIGNAL=]TIME")]
+    rate: Vec<String>,
     /// Show the coefficients of these estimators only, by node, instance or axis
     #[arg(long = "node", value_name = "NAME")]
     nodes: Vec<String>,
@@ -58,6 +63,8 @@ fn formats() -> PossibleValuesParser {
         PossibleValue::new("svg").help("A picture that needs no other program"),
         PossibleValue::new("coefficients")
             .help("What the fitted estimators of a model consist of: coefficients, noises, time constants"),
+        PossibleValue::new("memory")
+            .help("How many bytes an engine of it holds once all windows are full, window by window"),
         PossibleValue::new("json").help("Boxes and arrows for programs, and the coefficients of a model"),
     ])
 }
@@ -82,12 +89,19 @@ impl Show {
                 self.format
             )));
         }
+        if !self.rate.is_empty() && self.format != "memory" {
+            return Err(Failure::Request(format!(
+                "--rate is how often samples come for `--format memory`, and the format is {}",
+                self.format
+            )));
+        }
         let model = model::load(&self.graph, Wanted::default(), terminal)?;
         let drawn = || diagram(&model.plan, self.expand);
         let text = match self.format.as_str() {
             "mermaid" => mermaid::text(&drawn()),
             "dot" => dot::text(&drawn()),
             "svg" => svg::text(&drawn()),
+            "memory" => memory::text(&model, &self.rate, terminal)?,
             "json" => {
                 let (diagram, estimators) = (&drawn(), &*self.estimators(&model)?);
                 format!(

@@ -76,10 +76,40 @@ fn a_rarely_logged_input_leaves_the_vote_as_it_is() {
     let facts = rare.scores("rare.csv");
     assert!(score(&facts, "now/vote", "valid") > 0.99, "{facts}");
     let rmse = score(&facts, "now/result", "rmse");
-    assert!((5.2..5.32).contains(&rmse), "{rmse}");
+    assert!((5.2..5.33).contains(&rmse), "{rmse}");
     assert!(score(&facts, "now/result", "r2_zero") > 0.995);
     let told = rare.call("evaluate", "rare.csv", &[]).told;
     assert!(!told.contains("fallback"), "{told}");
+}
+
+/// The error of `now` as it is put out: a position each 5 min, drifts over 20 min, which hold four, in nm/min.
+fn by_hand(of: &Fitted, file: &str) -> f64 {
+    let out = of.scratch.path("out.csv");
+    let log = of.folder.join(file);
+    athermal(&[&"run", &of.model, &"-i", &log, &"-o", &out]).ended(0);
+    let column = |path: &std::path::Path, nth: usize| -> Vec<Option<f64>> {
+        let text = std::fs::read_to_string(path).unwrap();
+        let lines = text.lines().skip(1);
+        lines
+            .map(|line| line.split(',').nth(nth)?.parse().ok())
+            .collect()
+    };
+    let (um, now) = (column(&log, 4), column(&out, 1));
+    assert_eq!(um.len(), now.len());
+    // The least-squares slope of four even samples.
+    let drift = |of: &[Option<f64>]| {
+        let sum: f64 = of
+            .iter()
+            .zip([-0.3, -0.1, 0.1, 0.3])
+            .map(|(um, by)| by * um.unwrap())
+            .sum();
+        1000.0 * sum / 5.0
+    };
+    let pairs = um.windows(4).map(drift).zip(&now[3..]);
+    let squares: Vec<f64> = pairs
+        .filter_map(|(truth, now)| Some((truth - (*now)?).powi(2)))
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 #[test]
@@ -93,22 +123,40 @@ fn what_is_put_out_is_scored_whenever_it_is_put_out_and_what_it_fell_back_to_is_
         let facts = evaluated.json();
         let [found, r2_found] =
             ["rmse", "r2_zero"].map(|figure| score(&facts, "now/result", figure));
+        // Of when it is put out, as by hand and alone.
+        let by_hand = by_hand(&of, &file);
+        assert!((found / by_hand - 1.0).abs() < 1e-9, "{found} {by_hand}");
+        let alone = of.call(
+            "evaluate",
+            &file,
+            &[&"--each-on-its-own", &"--format", &"json"],
+        );
+        assert_eq!(found, score(&alone.json(), "now/result", "rmse"));
+        // The case has these figures of a vote with one voter less. At 53 % two sensors are swapped that read alike; `trusted` named one of
+        // them at once then, and does once it leaps, four hours later: what is put out errs no more for it.
+        let off = [found / rmse - 1.0, r2 - r2_found];
+        let least = if percent == 53 {
+            f64::NEG_INFINITY
+        } else {
+            0.0
+        };
+        assert!(off[0] < 0.005 && off[1] < 0.004, "{found} {r2_found}");
         assert!(
-            (found - rmse).abs() < 0.06 && (r2_found - r2).abs() < 6e-4,
+            off[0] > least - 0.005 && off[1] > least - 0.004,
             "{found} {r2_found}"
         );
         let of_result = facts["scores"].as_array().unwrap().iter();
         let mut of_result = of_result.filter(|of| of["node"] == "now/result");
         assert_eq!(of_result.next().unwrap()["own_instants"], true);
-        evaluated.tells(&["now/result.Z was its fallback at"]);
+        evaluated.tells(&["next/result.Z was its fallback at"]);
         let report = of.scratch.path("report.html");
         let reported = of.call("report", &file, &[&"-o", &report]);
         assert!(
-            reported.out.contains(&format!("{rmse:.1}")),
+            reported.out.contains(&format!("{found:.1}")),
             "{}",
             reported.out
         );
-        reported.tells(&["now/result.Z was its fallback at"]);
+        reported.tells(&["next/result.Z was its fallback at"]);
     }
 }
 
@@ -137,7 +185,7 @@ fn clocks_that_slopes_can_bring_together_are_not_called_apart() {
     }
     let ([from, to], is_apart) = found[0];
     assert!(
-        from <= 0.0 && (550.0..950.0).contains(&to) && !is_apart,
+        from <= 0.0 && (250.0..350.0).contains(&to) && !is_apart,
         "{found:?}"
     );
     let ([from, to], _) = found[1];
@@ -156,6 +204,9 @@ fn a_position_that_is_zeroed_at_each_homing_is_warned_of_and_one_that_is_not_is_
         let Some(of) = Fitted::of("homed-every-six-hours", &[file]) else {
             return;
         };
+        // As without homings: what holds one is left out of the fit, of lags, of votes and of scores.
+        let facts = of.scores(file);
+        assert!(score(&facts, "now/result", "r2_zero") > 0.99, "{facts}");
         let report = of.scratch.path("report.html");
         let all = [
             ("init", of.init.told.clone()),

@@ -108,7 +108,8 @@ fn persistence_of_several_horizons_is_told_for_each() {
     let scores = athermal_on("evaluate", &graph, &data, &[]).ended(0);
     let scored = athermal_on("evaluate", &graph, &data, &[&"--format", &"json"]).ended(0);
     let scored = scored.json();
-    let heading = scores.out.lines().nth(1).unwrap();
+    let mut lines = scores.out.lines();
+    let heading = lines.find(|line| line.contains("persistence")).unwrap();
     assert!(heading.contains(" at 30s and "), "{heading}");
     assert!(heading.contains(" at 2min"), "{heading}");
     let of = |row: usize| scored["scores"][row]["baseline_persistence"].as_f64();

@@ -14,7 +14,16 @@ use athermal::serve::deployment::Found;
 use serde_json::Value;
 
 /// What the logs here do not bring about: a sensor that cannot be tried since a node takes it for dead.
-const RARE: [&str; 3] = ["untold[].sensor", "untold[].estimator", "untold[].silent"];
+const RARE: [&str; 8] = [
+    "untold[].sensor",
+    "untold[].estimator",
+    "untold[].silent",
+    "learners[].node",
+    "learners[].learner",
+    "learners[].too_few",
+    "learners[].worse",
+    "learners[].silence",
+];
 
 /// A row of a table: keys, whether names that nobody knows beforehand stand below them, and the section whose keys do.
 #[derive(Debug)]
@@ -389,13 +398,18 @@ fn looked_at() -> Value {
         granted: "QoS 1".to_owned(),
     };
     let of = |channels| Found {
-        source: "line".to_owned(),
+        role: "source",
+        name: "line".to_owned(),
         channels,
         missing: 0,
     };
     let there = of(Ok(vec![("plate".to_owned(), "a/b".to_owned(), seen)]));
     let away = of(Err(ConnectorError::new("refused")));
-    serde_json::json!({ "live": [there.to_json(), away.to_json()] })
+    let out = Found {
+        role: "sink",
+        ..of(Ok(Vec::new()))
+    };
+    serde_json::json!({ "live": [there.to_json(), away.to_json(), out.to_json()] })
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A correction on a simulated machine, as a loop: bounded, still where it knows nothing, and as good as before once a fault is over.
 
 mod looped;
+mod misreported;
 mod recipe;
 mod remeasured;
 mod served;

@@ -342,7 +342,7 @@ fn model(label: &str) -> Model {
     .and_then(|read| declare(read, &mut diagnostics))
     .unwrap();
     Model {
-        graph,
+        graph: graph.into(),
         plan: plan(&text),
         fitted: Fitted::new(),
         card: None,

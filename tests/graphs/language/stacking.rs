@@ -235,7 +235,7 @@ fn stacked_over(learning: &str) -> (f64, Vec<f64>) {
         .node("never_higher", "scale", "higher")
         .with("factor = 0.0")
         .model("learns", "rls", "temperature.room", "position.Z", "0s")
-        .with("forgetting = { type = 'constant', factor = 0.9 }")
+        .with("memory = '100s'")
         .with(learning)
         .model("stays", "linear", "temperature.room", "position.Z", "0s")
         .vote("stack", "stack", "learns stays", "position.Z")

@@ -16,14 +16,14 @@ fn what_learns_follows_a_change_and_what_does_not_stays_wrong() {
             "{node} before the change"
         );
         let after = error(&rows, &learned, 900);
-        assert!(after < 0.13, "{node}: {after}");
         let mut frozen = engine(&graph(node));
         frozen.freeze(true);
         let stayed = run(&mut frozen, 0, &rows);
-        assert!(error(&rows, &stayed, 900) > 1.0);
-        // What learns passes beyond the edge of its fit.
-        let not = "learn = false\noutside = \"pass\"";
-        let off = node.replace("learn = { outliers = 6.0, margin = 0.5 }", not);
+        let wrong = error(&rows, &stayed, 900);
+        // Of one that goes back to a tenth of its fit an eleventh of the change is left.
+        let most = if node == RLS { 0.12 * wrong } else { 0.13 };
+        assert!(wrong > 1.0 && after < most, "{node}: {after} of {wrong}");
+        let off = node.replace("learn = { outliers = 6.0, margin = 0.5 }", "learn = false");
         let text = graph(&off).replace("learning = \"model:learning\"\n", "");
         let never = run(&mut engine(&text), 0, &rows);
         let same_prediction = |(a, b): (&Vec<f64>, &Vec<f64>)| (a[0] - b[0]).abs() < 1e-12;
@@ -43,7 +43,7 @@ fn predicting_changes_nothing_that_was_learned() {
     run(&mut gap, 0, &quiet[..260]);
     let probe = quiet[260];
     // The same row asked again and again, without a truth: the same answer, once what was on its way has arrived.
-    let answers = run(&mut gap, 260, &[probe; 80]);
+    let answers = run(&mut gap, 260, &[probe; 30]);
     let late = &answers[10..];
     assert!(
         late.iter()
@@ -61,16 +61,17 @@ fn learning_freezes_on_command_and_goes_on_after_it() {
     let frozen = run(&mut engine, 300, &rows[300..600]);
     assert_ne!(engine.snapshot(), before);
     assert!(
-        frozen[3..].iter().all(|outputs| outputs[1] == 1.0),
+        frozen[3..].iter().all(|outputs| outputs[1] % 10.0 == 1.0),
         "the port says so"
     );
     assert!(error(&rows[300..600], &frozen[..298], 0) > 1.0);
     engine.freeze(false);
     let thawed = run(&mut engine, 600, &rows[600..]);
     // Nothing that was seen while frozen is learned afterwards: neither rows nor truths.
-    let codes: Vec<f64> = thawed.iter().map(|outputs| outputs[1]).collect();
+    let codes: Vec<f64> = thawed.iter().map(|outputs| outputs[1] % 10.0).collect();
     assert_eq!(&codes[..6], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-    assert!(error(&rows[600..], &thawed, 200) < 0.13);
+    let wrong = error(&rows[300..600], &frozen[..298], 0);
+    assert!(error(&rows[600..], &thawed, 200) < 0.15 * wrong);
 }
 
 #[test]
@@ -81,13 +82,17 @@ fn a_channel_freezes_learning_while_it_is_not_zero_or_not_there() {
     assert!(
         open[10..]
             .iter()
-            .all(|outputs| outputs[1] == 0.0 || outputs[1] == 3.0)
+            .all(|outputs| outputs[1] % 10.0 == 0.0 || outputs[1] % 10.0 == 3.0)
     );
     for door in [1.0, -1.0, NAN] {
         held[200..].iter_mut().for_each(|row| row[3] = door);
         let outputs = run(&mut engine(&graph(&node)), 0, &held);
         // A door that is silent counts as it was for its maximum age of 30 s.
-        assert!(outputs[210..].iter().all(|outputs| outputs[1] == 2.0));
+        assert!(
+            outputs[210..]
+                .iter()
+                .all(|outputs| outputs[1] % 10.0 == 2.0)
+        );
         assert!(error(&held, &outputs, 400) > 1.0);
     }
 }
@@ -118,7 +123,7 @@ fn outliers_strange_rows_and_gaps_are_told_and_leave_no_trace() {
         }
         let outputs = run(&mut engine(&text), 0, &rows);
         // The truth of row 200 is told at the next tick.
-        assert_eq!(outputs[201][1], code);
+        assert_eq!(outputs[201][1] % 10.0, code);
         if code != 6.0 {
             assert!(
                 same_predictions(&outputs[201..], &without(200)[201..]),
@@ -134,7 +139,10 @@ fn an_outlier_among_the_first_truths_is_held_off_by_what_the_fit_was_off_by() {
     rows[4][2] = 1e6;
     for node in [RLS, SGD] {
         let outputs = run(&mut engine(&graph(node)), 0, &rows);
-        let told: Vec<f64> = outputs[3..8].iter().map(|outputs| outputs[1]).collect();
+        let told: Vec<f64> = outputs[3..8]
+            .iter()
+            .map(|outputs| outputs[1] % 10.0)
+            .collect();
         assert_eq!(told, [0.0, 0.0, 3.0, 0.0, 0.0], "{node}");
         assert!(error(&rows, &outputs, 20) < 0.3, "{node}");
     }
@@ -164,6 +172,7 @@ fn a_segment_break_keeps_what_was_learned_and_pairs_nothing_across() {
             .to_vec()
     };
     let outputs: Vec<_> = (0..300).map(&mut step).collect();
-    assert!(error(&rows[900..], &outputs, 0) < 0.13);
+    // An eleventh of a change by ten is left.
+    assert!(error(&rows[900..], &outputs, 0) < 1.5);
     assert!(outputs[0][1].is_nan() && outputs[1][1].is_nan() && outputs[2][1].is_nan());
 }

@@ -34,7 +34,10 @@ fn became(node: &str, rows: &[f64]) -> Vec<f64> {
     let (plan, fitted) = fitted_on(&graph(node), &each(&wandering(2000)));
     let mut engine = Engine::new(plan, &fitted).unwrap();
     let outputs = run(&mut engine, 0, &each(rows));
-    outputs.into_iter().map(|outputs| outputs[1]).collect()
+    outputs
+        .into_iter()
+        .map(|outputs| outputs[1] % 10.0)
+        .collect()
 }
 
 /// Whoever moves while no truth comes says that it may have.

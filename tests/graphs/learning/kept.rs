@@ -32,11 +32,7 @@ fn refitted(model: &Model) -> Model {
 
 #[test]
 fn an_engine_goes_on_from_a_snapshot_with_what_was_learned() {
-    let variable = RLS.replace(
-        "{ type = \"constant\", factor = 0.98 }",
-        "{ type = \"variable\", memory = 200.0 }",
-    );
-    for node in [RLS, SGD, &variable] {
+    for node in [RLS, SGD] {
         let rows = rows(8, 600, 200);
         let text = graph(&format!("{node}\ninputs.freeze = \"hold\""));
         let (plan, fit) = fitted(&text);
@@ -114,7 +110,7 @@ fn a_tick_that_learns_allocates_nothing_once_warm() {
         let allocated = allocation_counter::measure(|| {
             for (tick, row) in rows.iter().enumerate().skip(400) {
                 let outputs = engine.step(secs(10.0 * tick as f64), row).unwrap();
-                learned += usize::from(outputs[1] == 0.0);
+                learned += usize::from(outputs[1] % 10.0 == 0.0);
             }
         });
         assert_eq!(allocated.count_total, 0, "{node}: {allocated:?}");
@@ -127,7 +123,7 @@ fn a_swap_carries_what_was_learned_unless_the_fit_is_new_and_not_told_to() {
     let text = graph(RLS);
     let rows = rows(12, 900, 200);
     let old = model("carry-old", &text);
-    let retuned = model("carry-retuned", &text.replace("0.98", "0.97"));
+    let retuned = model("carry-retuned", &text.replace("500s", "400s"));
     // What was learned for one horizon is no answer for another.
     let farther = model(
         "carry-farther",

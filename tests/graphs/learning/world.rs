@@ -21,7 +21,7 @@ pub fn graph(node: &str) -> Graph {
         .outputs("out = 'model'; learning = 'model:learning'; hold = 'hold'")
 }
 
-pub const RLS: &str = "type = \"rls\"\nforgetting = { type = \"constant\", factor = 0.98 }\nlearn = { outliers = 6.0, margin = 0.5 }";
+pub const RLS: &str = "type = \"rls\"\nmemory = \"500s\"\nlearn = { outliers = 6.0, margin = 0.5 }";
 pub const SGD: &str = "type = \"linear\"\nsolver = { type = \"sgd\", eta0 = 0.05, power = 0.0 }\nlearn = { outliers = 6.0, margin = 0.5 }";
 
 /// Samples in the order of the plan: two temperatures, the shift, and the door.

@@ -123,3 +123,72 @@ fn where_ticks_come_fast_they_get_more_room_and_none_is_missed_on_the_way() {
     assert!(*seen.lock().unwrap() == times);
     assert_eq!(stepper.missed(), 0);
 }
+
+#[test]
+fn whoever_looks_on_sees_weights_and_deviations_that_nothing_reads_and_outputs_keep_their_bits() {
+    let (first, second) = (model(DIE_TESTER, "0"), model(DIE_TESTER, "1"));
+    let options = LiveOptions {
+        mirrors: true,
+        ..LiveOptions::default()
+    };
+    let (mut stepper, mut control) = pair(&first, options).unwrap();
+    let mut alone = first.engine().unwrap();
+    let seen = Arc::<Mutex<(usize, usize, usize, usize)>>::default();
+    let looking = Arc::clone(&seen);
+    control.look_on(move |tick| {
+        let mut seen = looking.lock().unwrap();
+        let Some(engine) = tick.engine else { return };
+        let slots = |port: &str| {
+            let of = tick.plan.nodes.iter().filter_map(|node| node.port(port));
+            of.flatten().collect::<Vec<_>>()
+        };
+        let has_value = |slot: &&usize| !engine.value(**slot).is_nan();
+        seen.0 += slots("weights").iter().filter(has_value).count();
+        // These fits know of no deviation, which is asked for all the same.
+        let ran = |slot: &&usize| engine.ran(**slot);
+        seen.1 += slots("std_dev").iter().filter(ran).count();
+        for output in &tick.plan.outputs {
+            let Some(parts) = engine.contributions(output.slot) else {
+                continue;
+            };
+            let sum: f64 = parts.iter().map(|of| of.value).sum();
+            let size: f64 = parts.iter().map(|of| of.value.abs()).sum();
+            assert!(
+                (sum - engine.value(output.slot)).abs() <= 1e-12 * size,
+                "{parts:?}"
+            );
+            let explained = parts.iter().filter(|of| of.regressor.is_some());
+            seen.2 += explained.count();
+            let voters: std::collections::BTreeSet<_> = parts.iter().map(|of| of.node).collect();
+            seen.3 += usize::from(voters.len() > 1);
+        }
+    });
+    let channels = stepper.feed().len();
+    let data = rows(&mut Prng::stream(9, "rows"), channels, 6, 900);
+    for (nth, (time, row)) in data.into_iter().enumerate() {
+        match nth {
+            400 => {
+                control.stage(&second, false).unwrap();
+                control.commit().unwrap();
+            }
+            600 => control.rollback().unwrap(),
+            _ => {}
+        }
+        let outputs = stepper.step(time, &row).unwrap().outputs.to_vec();
+        let expected = alone.step(time, &row).unwrap();
+        let bits = |of: &[f64]| of.iter().map(|of| of.to_bits()).collect::<Vec<_>>();
+        // The graph that was taken back is as if it had never been replaced.
+        if !(400..601).contains(&nth) {
+            assert_eq!(bits(&outputs), bits(expected), "at row {nth}");
+        }
+        control.pump();
+        if [399, 599, 899].contains(&nth) {
+            let (weights, deviations, parts, votes) = std::mem::take(&mut *seen.lock().unwrap());
+            assert!(
+                weights > 100 && deviations > 100,
+                "{nth}: {weights} {deviations}"
+            );
+            assert!(parts > 100 && votes > 10, "{nth}: {parts} {votes}");
+        }
+    }
+}

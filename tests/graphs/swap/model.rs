@@ -52,7 +52,7 @@ pub fn model(text: &str, salt: &str) -> Model {
         fitted.insert(node.instance(), Arc::from(fit));
     }
     Model {
-        graph,
+        graph: Arc::new(graph),
         plan: Arc::new(plan),
         fitted,
         card: None,
