@@ -66,6 +66,8 @@ struct Live {
     /// Until when they wait, where nothing more of those comes; none where they do not wait.
     until: Option<Clock>,
     samples: Vec<(Instant, usize, f64)>,
+    /// What was given last, by channel.
+    last: HashMap<usize, (Instant, f64)>,
 }
 
 impl Live {
@@ -76,11 +78,11 @@ impl Live {
         now: Clock,
         out: &mut Vec<Out>,
     ) {
-        let (stamp, channel, value) = sample;
         match &mut self.until {
-            None => out.push(Out::Sample(channel, stamp, value)),
+            None => self.give(sample, out),
             Some(until) if is_stored => {
                 *until = now + HISTORY;
+                let (stamp, channel, value) = sample;
                 out.push(Out::Sample(channel, stamp, value));
             }
             Some(_) => {
@@ -96,8 +98,22 @@ impl Live {
     fn release(&mut self, out: &mut Vec<Out>) {
         self.until = None;
         self.samples.sort_by_key(|of| of.0);
-        let samples = self.samples.drain(..);
-        out.extend(samples.map(|(stamp, channel, value)| Out::Sample(channel, stamp, value)));
+        for sample in std::mem::take(&mut self.samples) {
+            self.give(sample, out);
+        }
+    }
+
+    /// Stamps have milliseconds, and what is not after the last one would be left out: another value within one, such as the first after a
+    /// birth, is a nanosecond later.
+    fn give(&mut self, (mut stamp, channel, value): (Instant, usize, f64), out: &mut Vec<Out>) {
+        if let Some((last, is)) = self.last.get(&channel)
+            && (0..1_000_000).contains(&(last.as_ns() - stamp.as_ns()))
+        {
+            let is_another = value.to_bits() != is.to_bits();
+            stamp = *last + Duration::from_ns(is_another.into());
+        }
+        self.last.insert(channel, (stamp, value));
+        out.push(Out::Sample(channel, stamp, value));
     }
 }
 
@@ -259,11 +275,7 @@ impl Host {
             }
             _ => {}
         }
-        let is_known = edge.values(channels, (name, device), &read, (now, at), out);
-        if !is_known {
-            edge.rebirth(name, now, out);
-        }
-        // What was held for it.
+        // What was held for it comes before it.
         if matches!(kind, "NBIRTH" | "DBIRTH") {
             let held = std::mem::take(&mut edge.held);
             for (came, topic, payload, at) in held {
@@ -276,6 +288,10 @@ impl Host {
                     edge.values(channels, (name, device), &read, (now, at), out);
                 }
             }
+        }
+        let is_known = edge.values(channels, (name, device), &read, (now, at), out);
+        if !is_known {
+            edge.rebirth(name, now, out);
         }
     }
 

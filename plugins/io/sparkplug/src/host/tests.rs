@@ -67,6 +67,11 @@ fn sample(channel: usize, value: f64) -> Out {
     Out::Sample(channel, Instant::from_ns(2_000_000_000), value)
 }
 
+/// Another one within the millisecond of the one before.
+fn later(channel: usize, value: f64) -> Out {
+    Out::Sample(channel, Instant::from_ns(2_000_000_001), value)
+}
+
 fn rebirth() -> Out {
     Out::Rebirth("edge".to_owned())
 }
@@ -153,7 +158,7 @@ fn data_before_a_birth_are_held_for_a_while() {
     let out = bench.take("NBIRTH/edge", Some(7), birth_of(0));
     assert_eq!(
         out,
-        [sample(0, 20.0), sample(0, 2.0)],
+        [sample(0, 2.0), later(0, 20.0)],
         "the first one is too old"
     );
     // A device that is not born is held by itself.
@@ -164,7 +169,7 @@ fn data_before_a_birth_are_held_for_a_while() {
     let device = vec![double(Some("A/B"), Some(8), 1.0)];
     assert_eq!(
         bench.take("DBIRTH/edge/d", Some(8), device),
-        [sample(1, 1.0), sample(1, 3.0)]
+        [sample(1, 3.0), later(1, 1.0)]
     );
     bench.take("DDATA/edge/x", Some(9), vec![]);
     assert_eq!(
@@ -329,4 +334,23 @@ fn a_death_is_of_the_clock_of_its_edge_so_that_the_next_life_is_later() {
     let (now, at) = (bench.began + Wait::from_secs(9), Instant::from_ns(9));
     bench.host.take(topic, &said, now, at, &mut out);
     assert_eq!(died(out), 1500);
+}
+
+#[test]
+fn another_value_within_a_millisecond_comes_after_the_first_and_what_was_held_before_a_birth() {
+    let mut bench = Bench::new();
+    let given = |value: f64, ns: i64| Out::Sample(0, Instant::from_ns(2_000_000_000 + ns), value);
+    let data = |value| vec![double(None, Some(7), value)];
+    assert_eq!(bench.take("NDATA/edge", Some(0), data(19.0)), [rebirth()]);
+    assert_eq!(
+        bench.take("NBIRTH/edge", Some(0), birth_of(3)),
+        [given(19.0, 0), given(20.0, 1)]
+    );
+    for (number, value) in [(1, 21.0), (2, 20.0)] {
+        let out = bench.take("NDATA/edge", Some(number), data(value));
+        assert_eq!(out, [given(value, 1 + number as i64)]);
+    }
+    // The same once more is nothing new.
+    let out = bench.take("NDATA/edge", Some(3), data(20.0));
+    assert_eq!(out, [given(20.0, 3)]);
 }
