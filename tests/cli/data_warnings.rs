@@ -81,6 +81,21 @@ fn a_correction_that_goes_by_positions_which_it_moves_is_a_mistake_in_its_graph(
         let check = athermal(&[&"check", &scratch.file("graph.toml", text)]).ended(2);
         assert!(check.told.contains(told), "{model}: {}", check.told);
     }
+    // Nor may truths say which sensor is right.
+    let shipped = crate::workbench::graph("die-tester-compensate");
+    for (hindsight, code) in [(true, 2), (false, 0)] {
+        let text = format!(
+            "schema = 1\nextends = '{}'\nname = \"judged\"\nnodes.trusted.hindsight = {hindsight}\n",
+            shipped.display()
+        );
+        let check = athermal(&[&"check", &scratch.file("judged.toml", text)]).ended(code);
+        assert_eq!(
+            check.told.contains("error[A162]"),
+            hindsight,
+            "{}",
+            check.told
+        );
+    }
 }
 
 #[test]

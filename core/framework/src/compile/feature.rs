@@ -2,11 +2,11 @@
 
 use super::instance::Instance;
 use super::kind_fault::KindFault;
-use super::plan::{PlannedFit, PlannedRole};
+use super::plan::{PlannedFit, PlannedRole, TruthLink};
 use super::problem;
-use super::provenance::Provenance;
+use super::provenance::{Provenance, persistence_lag};
 use super::resolver::Resolver;
-use crate::node::{Feature, InputPort, Inputs, Mistake, OutputPort, Read};
+use crate::node::{Feature, Hindsight, InputPort, Inputs, Mistake, OutputPort, Read};
 use crate::time::Duration;
 
 /// The output ports of a feature, or all that is wrong with it; none and nothing where it is not known what it reads.
@@ -76,16 +76,23 @@ impl Resolver<'_> {
             return None;
         }
         let truth = ports.iter().find(|(port, _)| port.read == Read::Truth);
-        let fit = match (encoder, truth) {
+        let mut fit = match (encoder, truth) {
             (Some(_), Some((port, slots))) => {
                 let truth = self.one_of(instance, port, slots)?;
                 Some(self.fit(instance, truth, &lags, &ports)?)
             }
             _ => None,
         };
+        let mut hindsight = None;
+        if let Some(fit) = &mut fit
+            && encoder.is_some_and(|encoder| encoder.looks_back())
+        {
+            hindsight = Some(self.hindsight(instance, fit, lags, &ports, &mut gathers)?);
+        }
         let data = ports.iter().filter(|(port, _)| port.read != Read::Truth);
         let slots: Vec<Vec<usize>> = data.map(|(_, slots)| slots.clone()).collect();
         let mut inputs = self.inputs(instance, ports);
+        inputs.hindsight = hindsight;
         let outputs = match outputs_of(feature, Some(&inputs)) {
             Ok(outputs) => outputs,
             Err(mistakes) => {
@@ -138,6 +145,41 @@ impl Resolver<'_> {
         let place = instance.input_place(port.name);
         self.diagnostics.report(place, problem);
         false
+    }
+
+    /// Adds what a feature that looks back is given and fitted on besides, behind the gathers that it has.
+    fn hindsight(
+        &mut self,
+        instance: &Instance<'_>,
+        fit: &mut PlannedFit,
+        mut lags: Vec<Duration>,
+        ports: &[(InputPort, Vec<usize>)],
+        gathers: &mut Vec<usize>,
+    ) -> Option<Hindsight> {
+        let TruthLink { ahead, span, .. } = fit.truth;
+        let data = || ports.iter().filter(|(port, _)| port.read != Read::Truth);
+        if span > Duration::ZERO && !lags.contains(&span) {
+            lags.push(span);
+            for (port, slots) in data() {
+                let unit = Self::port_unit(port);
+                gathers.push(self.gather(instance, port, slots, &[span], unit.as_ref())?);
+                let regressors = self.regressors(slots, span, unit.as_ref());
+                fit.regressors.extend(regressors);
+                self.suspect(instance, port.name, slots.clone(), span, &fit.truth);
+            }
+        }
+        let port = gathers.len();
+        let known = persistence_lag(span, ahead);
+        let delay = known + ahead;
+        lags.iter_mut().for_each(|lag| *lag += delay);
+        for (port, slots) in ports {
+            let (unit, lags) = match port.read {
+                Read::Truth => (None, &[known][..]),
+                _ => (Self::port_unit(port), &lags[..]),
+            };
+            gathers.push(self.gather(instance, port, slots, lags, unit.as_ref())?);
+        }
+        Some(Hindsight { port, delay, span })
     }
 
     /// The rows that a feature is fitted on; `None` when an error about them has been reported.

@@ -311,6 +311,7 @@ impl Resolver<'_> {
                 .map(|(port, slots)| channels(port, slots))
                 .collect(),
             member: instance.decl.member.clone(),
+            hindsight: None,
             fit: None,
             names,
         }

@@ -224,7 +224,7 @@ pub enum PlannedRole {
     Estimator {
         /// What it is fitted on; its truth is what it predicts.
         fit: PlannedFit,
-        /// The gathers of a row, one after the other.
+        /// The gathers of a row, one after the other; not those that look back.
         gathers: Vec<usize>,
         /// Whether it runs at every tick, or only when something in its first gather is fresh.
         every_tick: bool,
@@ -357,15 +357,21 @@ impl PlannedNode {
         let fit = self.role.fit().filter(|_| self.fixed().is_none())?;
         let (gathers, triggers, every_tick) = match &self.role {
             PlannedRole::Feature {
+                inputs,
                 gathers,
                 every_tick,
                 ..
-            } => (gathers, gathers.len(), *every_tick),
+            } => {
+                // What looks back does so at each port, the truth too.
+                let later = inputs.hindsight.map_or(0, |_| inputs.ports.len());
+                let own = gathers.len() - later;
+                (&gathers[..own], own, *every_tick)
+            }
             PlannedRole::Estimator {
                 gathers,
                 every_tick,
                 ..
-            } => (gathers, gathers.len().min(1), *every_tick),
+            } => (&gathers[..], gathers.len().min(1), *every_tick),
             PlannedRole::Combiner { .. } => return None,
         };
         Some(Rows {

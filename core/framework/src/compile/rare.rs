@@ -19,9 +19,13 @@ impl Resolver<'_> {
             else {
                 continue;
             };
-            let spared: Vec<usize> = (gathers.clone().into_iter())
-                .map(|gather| self.sparing(gather, counts))
-                .collect();
+            let rows = self.nodes[node].rows();
+            let own = rows.map_or(gathers.len(), |rows| rows.gathers.len());
+            // What is known later stays as old as it is.
+            let (own, later) = gathers.split_at(own);
+            let (own, later) = (own.to_vec(), later.to_vec());
+            let spared = own.into_iter().map(|gather| self.sparing(gather, counts));
+            let spared: Vec<usize> = spared.chain(later).collect();
             if let PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } =
                 &mut self.nodes[node].role
             {

@@ -21,8 +21,28 @@ pub trait Encoder: Debug {
         vec![Duration::ZERO]
     }
 
+    /// Whether it is given, when it runs, the newest truth that a prediction as far ahead may know, and what it saw at the run that this
+    /// truth belongs to. Of a truth that is of a window it is also fitted on its inputs so long ago. Behind the ports of its inputs are then
+    /// those so long ago, if that is none of its lags; each once more, at all these lags before that run; and one of the truth. How long
+    /// ago that run was is in [`Inputs::hindsight`]. No embargo is kept for it: what it gives may not follow from the truth but by being
+    /// there or absent.
+    fn looks_back(&self) -> bool {
+        false
+    }
+
     /// What learns from the rows. Its [`Predictor`] is what `build` is given; it may predict the truth, or nothing.
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer>;
+}
+
+/// How long it takes to know better: what a feature that [looks back](Encoder::looks_back) has to know of the truth that it is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hindsight {
+    /// The place of the first port that looks back.
+    pub port: usize,
+    /// From a run until the truth that belongs to it is given.
+    pub delay: Duration,
+    /// How much of the past the truth is of.
+    pub span: Duration,
 }
 
 /// What a feature was fitted to, on its way into what runs.

@@ -37,8 +37,8 @@ mod training_error;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Evidence, Votes};
-pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
+pub use encoder::{Encoder, Hindsight};
 pub use estimator::{
     CandidateScore, Estimator, OrderFigure, OrderTable, PlannedRow, Regressor, Regressors, Runs,
     SelectionStep, Summed, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,

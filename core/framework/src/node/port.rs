@@ -1,6 +1,6 @@
 //! Decides how a node declares its ports and says what is wrong with its inputs; not which channels reach them.
 
-use super::FeatureFit;
+use super::{FeatureFit, Hindsight};
 use crate::channel::Channel;
 use crate::diagnostic::counted;
 
@@ -118,6 +118,8 @@ pub struct Inputs {
     pub ports: Vec<(InputPort, Vec<Channel>)>,
     /// The member of `each` that this instance stands for.
     pub member: Option<String>,
+    /// Of what is known later, for a feature that [looks back](super::Encoder::looks_back).
+    pub hindsight: Option<Hindsight>,
     pub(crate) fit: Option<FeatureFit>,
     /// What the graph calls the channels of each port; nothing once it is compiled.
     pub(crate) names: Vec<Vec<String>>,

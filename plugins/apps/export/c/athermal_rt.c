@@ -3922,7 +3922,8 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
 
 /* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at, since
  * when it contradicts the others, since when it is out and since when it agrees again, each behind whether it is known; whether its last
- * value passed, and whether a sample is new. Of numbers: the last value, its change, and the squares of what was sudden. Within a step: the
+ * value passed, and whether a sample is new; behind all, when the last truth was known that was looked at, of how many windows, and of which channel. Of
+ * numbers: the last value, its change, and the squares of what was sudden; behind all, those of errors with a sensor and without. Within a step: the
  * values, what of the form is left without the columns that are not there, the standardised columns, and what pulls at each. */
 
 #define AT_HAS_LOOKED 0
@@ -3940,6 +3941,13 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
 #define AT_CHANGE 1
 #define AT_SUDDEN 2
 #define AT_OF_READING 3
+/* Behind those of all channels. */
+#define AT_HAS_JUDGED 0
+#define AT_JUDGED 1
+#define AT_JUDGED_WINDOWS 2
+#define AT_JUDGED_CHANNEL 3
+#define AT_WITH 0
+#define AT_WITHOUT 1
 
 /* Whether something has lasted for so long; it begins now where it had not. */
 static int at_lasts(int64_t since[], int64_t now, int64_t length)
@@ -4086,11 +4094,72 @@ static void at_take_back(const at_cross_check *c, at_memory m, int32_t out, int 
     }
 }
 
+/* Nothing is known from truths yet. */
+static void at_begin_verdict(const at_cross_check *c, at_memory m)
+{
+    int64_t *verdict = &m.i[c->ints + (AT_OF_SENSOR * c->channels)];
+    at_real *squares = &m.r[c->reals + (AT_OF_READING * c->channels)];
+    verdict[AT_HAS_JUDGED] = 0;
+    verdict[AT_JUDGED_WINDOWS] = 0;
+    verdict[AT_JUDGED_CHANNEL] = -1;
+    squares[AT_WITH] = AT_R(0.0);
+    squares[AT_WITHOUT] = AT_R(0.0);
+}
+
+/* The truth as it was predicted at its run: from all columns, or without a channel. */
+static at_real at_answer(const at_plan *p, const at_cross_check *c, at_memory m, int32_t nth)
+{
+    const at_real *own = &c->answers[nth * (c->predicting + 1)];
+    at_real sum = own[0];
+    int64_t stamp;
+    int32_t column;
+    for (column = 0; column < c->predicting; column++) {
+        sum = sum + (own[column + 1] * at_port(p, m, c->before, c->places[column], &stamp));
+    }
+    return sum;
+}
+
+/* Looks at a truth of a run since a channel is out, one a window. */
+static void at_know_better(const at_plan *p, const at_cross_check *c, at_memory m)
+{
+    int64_t *verdict = &m.i[c->ints + (AT_OF_SENSOR * c->channels)];
+    at_real *squares = &m.r[c->reals + (AT_OF_READING * c->channels)];
+    int64_t known;
+    const at_real truth = at_port(p, m, c->later, 0, &known);
+    int32_t out = 0;
+    while ((out < c->channels) && (m.i[c->ints + (AT_OF_SENSOR * out) + AT_IS_OUT] == 0)) {
+        out++;
+    }
+    if ((out < c->channels) && (at_is_absent(truth) == 0)
+        && (at_minus(known, c->delay) >= m.i[c->ints + (AT_OF_SENSOR * out) + AT_IS_OUT + 1])
+        && ((verdict[AT_HAS_JUDGED] == 0)
+            || ((known > verdict[AT_JUDGED]) && (at_minus(known, verdict[AT_JUDGED]) >= c->span)))) {
+        const at_real with = at_answer(p, c, m, 0) - truth;
+        const at_real without = at_answer(p, c, m, out + 1) - truth;
+        if ((at_is_absent(with) == 0) && (at_is_absent(without) == 0)) {
+            verdict[AT_HAS_JUDGED] = 1;
+            verdict[AT_JUDGED] = known;
+            verdict[AT_JUDGED_WINDOWS]++;
+            squares[AT_WITH] = (AT_R(0.9) * squares[AT_WITH]) + (with * with);
+            squares[AT_WITHOUT] = (AT_R(0.9) * squares[AT_WITHOUT]) + (without * without);
+        }
+    }
+}
+
+/* Whether the sensor that is out is right by truths. */
+static int at_believes(const at_cross_check *c, at_memory m)
+{
+    const int64_t windows = m.i[c->ints + (AT_OF_SENSOR * c->channels) + AT_JUDGED_WINDOWS];
+    const at_real *squares = &m.r[c->reals + (AT_OF_READING * c->channels)];
+    return ((windows >= 3) && ((AT_R(2.0) * squares[AT_WITH]) < squares[AT_WITHOUT])) ? 1 : 0;
+}
+
 /* Finds which sensor contradicts the others. */
 static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
 {
     const int64_t now = m.i[AT_LAST];
     const at_real apart = at_apart(p, c, m);
+    int64_t *verdict = &m.i[c->ints + (AT_OF_SENSOR * c->channels)];
     int32_t there = 0;
     int32_t out = -1;
     int32_t suspect = -1;
@@ -4116,6 +4185,11 @@ static void at_compare(const at_plan *p, const at_cross_check *c, at_memory m)
                 sensor[AT_IS_OUT] = 1;
                 sensor[AT_IS_OUT + 1] = now;
                 sensor[AT_CONTRADICTS] = 0;
+                if ((verdict[AT_JUDGED_CHANNEL] != nth)
+                    || ((verdict[AT_HAS_JUDGED] != 0) && (at_minus(now, verdict[AT_JUDGED]) >= c->longest))) {
+                    at_begin_verdict(c, m);
+                    verdict[AT_JUDGED_CHANNEL] = nth;
+                }
             } else {
                 /* Not for long enough. */
             }
@@ -4154,6 +4228,7 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
     const int64_t now = m.i[AT_LAST];
     int64_t stamp;
     int32_t nth;
+    int believes = 0;
     for (nth = 0; nth < (2 * c->channels); nth++) {
         m.r[p->scratch + nth] = at_port(p, m, c->signal, nth, &stamp);
         if (nth < c->channels) {
@@ -4163,10 +4238,14 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
     if (c->columns > 0) {
         at_compare(p, c, m);
     }
+    if (AT_IS_USED(AT_HINDSIGHT) && (c->before >= 0)) {
+        at_know_better(p, c, m);
+        believes = at_believes(c, m);
+    }
     for (nth = 0; nth < c->channels; nth++) {
         int64_t *sensor = &m.i[c->ints + (AT_OF_SENSOR * nth)];
         const at_real value = at_port(p, m, c->signal, nth, &stamp);
-        const int passes = ((at_is_absent(value) == 0) && (sensor[AT_IS_OUT] == 0)) ? 1 : 0;
+        const int passes = ((at_is_absent(value) == 0) && ((sensor[AT_IS_OUT] == 0) || (believes != 0))) ? 1 : 0;
         at_real reason = AT_R(0.0);
         if ((passes != 0) && (sensor[AT_IS_NEW] != 0)) {
             at_give(p, m, c->slot + nth, value, stamp);
@@ -4180,6 +4259,7 @@ static void at_run_cross_check(const at_plan *p, const at_cross_check *c, at_mem
             reason = AT_R(3.0);
         } else if (sensor[AT_IS_OUT] != 0) {
             reason = (sensor[AT_AGREES] != 0) ? AT_R(2.0) : AT_R(1.0);
+            reason = (believes != 0) ? AT_R(4.0) : reason;
         } else {
             /* It agrees. */
         }
@@ -4693,6 +4773,7 @@ static void at_begin(const at_plan *p, at_memory m, const at_step *step, int seg
         for (nth = 0; nth < (AT_OF_SENSOR * p->cross_check[step->nth].channels); nth++) {
             m.i[p->cross_check[step->nth].ints + nth] = 0;
         }
+        at_begin_verdict(&p->cross_check[step->nth], m);
         break;
     case AT_LINEAR:
         if (AT_IS_USED(AT_LEARNS) && (p->linear[step->nth].learner != NULL)) {

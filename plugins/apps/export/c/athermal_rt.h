@@ -340,6 +340,12 @@ typedef struct {
     int64_t after;
     int64_t recover;
     int64_t longest;
+    int32_t before;         /* all channels at the run of a truth and a lag before, and that truth; -1 where no truth decides */
+    int32_t later;
+    int32_t predicting;     /* columns that the truth is predicted from: those that are compared, and more */
+    int64_t delay;          /* from such a run until its truth is known */
+    int64_t span;
+    const at_real *answers; /* the truth from all columns, and without each channel: a constant and coefficients */
     int32_t ints;
     int32_t reals;
 } at_cross_check;
@@ -402,14 +408,15 @@ typedef struct {
 #define AT_SAMPLE_AT 13
 #define AT_HEALTH 14
 #define AT_WINDOWED 15
-/* Parts of slopes, votes and estimators, beside these kinds, that a graph may do without. */
+/* Parts of slopes, votes, estimators and comparisons, beside these kinds, that a graph may do without. */
 #define AT_HEDGES 16
 #define AT_ANY_POWER 17
 #define AT_FADES 18
 #define AT_LEARNS 19
 #define AT_STD_DEVS 20
 #define AT_FAST 21
-#define AT_GATHER 22 /* as a step: reads whether anything in a gather is new */
+#define AT_HINDSIGHT 22
+#define AT_GATHER 23 /* as a step: reads whether anything in a gather is new */
 
 /* What is done at a tick, in order: a kind and the number of its parameters in the table of that kind. */
 typedef struct {

@@ -3,22 +3,24 @@
 use athermal_core::channel::ABSENT;
 use athermal_core::diagnostic::counted;
 use athermal_core::node::{
-    Duty, Encoder, Feature, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort, Outputs,
-    Pace, PortSummary, Predictor, Reach, Restored, State, Tick, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Duty, Encoder, Feature, Hindsight, InputPort, Inputs, KindFacts, Mistake, Operator, OutputPort,
+    Outputs, Pace, PortSummary, Predictor, Reach, Regressor, Restored, State, Tick, Trained,
+    Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Agreement, GramBlocks, Look};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use self::verdict::{Answer, Answers, Seen, Verdict};
 use crate::limit;
 
 /// Learns in the fit how sensors go together, and lets through only those that still do.
 ///
 /// A sensor that comes loose, or is moved or swapped while it reads, gives what is possible, and what the others do not. Its channel is
 /// then absent, as that of a sensor that is dead, and estimators on other sensors go on. The port `reason` says why: 0 it agrees,
-/// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass.
+/// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass, 4 it contradicts them and is
+/// right by the truths.
 ///
 /// `d = zᵀMz` with `M = 10⁻⁶ (ZᵀZ / n + 10⁻⁶ I)⁻¹`, over its 99.9 % quantile in the fit, is compared with `limit`. `z`
 /// are the standardised channels, now and `lag` ago, and `Z` those of the `n` rows of the fit, at the instants of the
@@ -35,6 +37,10 @@ use crate::limit;
 ///
 /// One sensor is left out at a time, and only while half of all channels stay, since others have to go on. It is given back when it
 /// agrees again, and after `longest` in any case.
+///
+/// With `hindsight` the fit also predicts the truth, by a ridge from all sensors, now, `lag` ago and at the beginning of the window that the
+/// truth is of, and by one without each sensor. From the run on at which a sensor has been left out, one truth of each window is set
+/// against both, once it is known. After three of them the sensor is given back where `2 Σ (y - ŷ)² < Σ (y - ŷ₋)²`, `ŷ₋` without it, and for as long as that stays so.
 ///
 /// A sensor can be named only as far as others know of it: of two that see nothing in common, neither contradicts the
 /// other. The rows of the fit must reach over 30 times `lag`, 5 hours, or nothing is learned.
@@ -60,6 +66,10 @@ pub struct CrossCheck {
     #[serde(default = "day")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub longest: Duration,
+    /// Whether truths decide if a sensor that contradicts the others is right: it is given back where predictions with it have been better.
+    /// Not for a machine that a correction moves by what is made of it, unless the truth is `uncorrected`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub hindsight: bool,
 }
 
 fn ten_minutes() -> Duration {
@@ -90,6 +100,7 @@ mod reason {
     pub(super) const CONTRADICTS: f64 = 1.0;
     pub(super) const RECOVERING: f64 = 2.0;
     pub(super) const UNKNOWN: f64 = 3.0;
+    pub(super) const BELIEVED: f64 = 4.0;
 }
 
 impl Feature for CrossCheck {
@@ -101,7 +112,9 @@ impl Feature for CrossCheck {
         const {
             &[
                 InputPort::held("signal", "the sensors that are compared"),
-                InputPort::truth("at whose instants it learns; what it is does not matter"),
+                InputPort::truth(
+                    "at whose instants it learns; what it is matters to `hindsight` alone",
+                ),
             ]
         }
     }
@@ -112,7 +125,7 @@ impl Feature for CrossCheck {
                 PortSummary::new("signal", "each channel while it agrees with the others"),
                 PortSummary::new(
                     "reason",
-                    "0 agrees, 1 contradicts the others, 2 recovering, 3 nothing was learned",
+                    "0 agrees, 1 contradicts the others, 2 recovering, 3 nothing was learned, 4 right by truths",
                 ),
             ]
         }
@@ -153,13 +166,15 @@ impl Feature for CrossCheck {
         let fit = inputs.fit::<Learned>();
         let learned = fit.and_then(|(fit, places)| {
             let agreement = fit.agreement.clone()?;
-            Some(Known::new(agreement, places, count))
+            Some(Known::new(agreement, &fit.answers, places, count))
         });
         Box::new(Checking {
             spec: self.clone(),
             is_fitted: fit.is_some(),
             learned,
+            hindsight: inputs.hindsight,
             sensors: vec![Sensor::default(); count],
+            verdict: Verdict::default(),
         })
     }
 }
@@ -169,13 +184,16 @@ impl Encoder for CrossCheck {
         vec![Duration::ZERO, self.lag]
     }
 
+    fn looks_back(&self) -> bool {
+        self.hindsight
+    }
+
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        let names = setup
-            .regressors
-            .iter()
-            .map(|regressor| regressor.name.clone());
+        let is_compared = |of: &&Regressor| of.lag.is_zero() || of.lag == self.lag;
         Box::new(Learning {
-            uses: names.collect(),
+            compared: setup.regressors.iter().take_while(is_compared).count(),
+            regressors: setup.regressors.clone(),
+            predicts: self.hindsight,
             least: Duration::from_ns(self.lag.as_ns().saturating_mul(LEAST_LAGS)),
             blocks: GramBlocks::with_row_memory(setup.regressors.len(), setup.memory),
             reached: Duration::ZERO,
@@ -186,7 +204,11 @@ impl Encoder for CrossCheck {
 
 /// Takes the rows of a fit.
 struct Learning {
-    uses: Vec<String>,
+    regressors: Vec<Regressor>,
+    /// How many of them go together; from the others the truth is predicted.
+    compared: usize,
+    /// Whether it learns to predict the truth too.
+    predicts: bool,
     /// Over how much time the rows must reach.
     least: Duration,
     blocks: GramBlocks,
@@ -195,8 +217,8 @@ struct Learning {
 }
 
 impl Trainer for Learning {
-    fn row(&mut self, regressors: &[f64], _truth: f64) {
-        self.blocks.push(regressors, 0.0);
+    fn row(&mut self, regressors: &[f64], truth: f64) {
+        self.blocks.push(regressors, truth);
     }
 
     fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
@@ -212,14 +234,25 @@ impl Trainer for Learning {
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let mut agreement = None;
+        let (mut agreement, mut answers) = (None, Vec::new());
         if self.reached < self.least {
             report.notes.push(format!(
                 "the rows reach over {} and it takes {} to learn how sensors go together, so all will pass",
                 self.reached, self.least
             ));
         } else if let Some(rows) = self.blocks.rows() {
-            agreement = Agreement::of(&self.blocks.total(), rows);
+            let total = self.blocks.total();
+            let compared: Vec<usize> = (0..self.compared).collect();
+            let own = total.of_columns(&compared).ok();
+            agreement = own.and_then(|own| Agreement::of(&own, rows));
+            if self.predicts && agreement.is_some() {
+                match Answer::all(&total, &self.regressors) {
+                    Ok(found) => answers = found,
+                    Err(error) => report.notes.push(format!(
+                        "the truth is not predicted, and no truth will decide: {error}"
+                    )),
+                }
+            }
         } else {
             report.notes.push(
                 "the rows did not fit in memory, so nothing is learned and all will pass"
@@ -227,9 +260,11 @@ impl Trainer for Learning {
             );
         }
         report.figure("learned", agreement.is_some());
+        let uses = self.regressors.into_iter().map(|of| of.name);
         let predictor = Box::new(Learned {
-            uses: self.uses,
+            uses: uses.collect(),
             agreement,
+            answers,
         });
         Ok(Trained { predictor, report })
     }
@@ -242,6 +277,9 @@ struct Learned {
     uses: Vec<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     agreement: Option<Agreement>,
+    /// What the truth was predicted from, where truths decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    answers: Vec<Answer>,
 }
 
 impl Predictor for Learned {
@@ -255,11 +293,17 @@ impl Predictor for Learned {
         };
         let width = self.uses.len();
         let lists = [("agreement.means", agreement.means.len())];
-        let mut mistakes = Mistake::of_lengths(width, &lists);
+        // What is only predicted from is behind.
+        let needed = match self.answers.is_empty() {
+            true => width,
+            false => agreement.means.len().min(width),
+        };
+        let mut mistakes = Mistake::of_lengths(needed, &lists);
         if !agreement.is_sound() {
             let message = "`agreement` has not as many finite values as its parts need";
             mistakes.push(Mistake::at("agreement", message));
         }
+        mistakes.extend(Answer::mistakes(&self.answers, width));
         mistakes
     }
 
@@ -278,16 +322,24 @@ struct Known {
     /// The columns of each channel; none of one that had no values in the fit.
     columns: Vec<Option<(usize, Option<usize>)>>,
     look: Look,
+    answers: Option<Answers>,
 }
 
 impl Known {
-    fn new(agreement: Agreement, places: &[usize], count: usize) -> Self {
+    fn new(agreement: Agreement, answers: &[Answer], places: &[usize], count: usize) -> Self {
         let columns = (0..count).map(|channel| {
-            let mut own = (0..places.len()).filter(|&column| places[column] % count == channel);
+            let compared = 0..agreement.means.len();
+            let mut own = compared.filter(|&column| places[column] % count == channel);
             own.next().map(|first| (first, own.next()))
         });
+        let columns: Vec<_> = columns.collect();
+        let firsts: Vec<_> = columns
+            .iter()
+            .map(|own| own.map(|(first, _)| first))
+            .collect();
         Self {
-            columns: columns.collect(),
+            answers: Answers::of(answers, &firsts),
+            columns,
             places: places.to_vec(),
             look: agreement.look(),
             agreement,
@@ -323,11 +375,15 @@ struct Checking {
     is_fitted: bool,
     /// How sensors go together, where the rows of the fit said so.
     learned: Option<Known>,
+    hindsight: Option<Hindsight>,
     sensors: Vec<Sensor>,
+    /// On the sensor that is out.
+    verdict: Verdict,
 }
 
 /// What is known of one sensor.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 struct Sensor {
     /// The stamp of the last sample that was looked at.
     last: Option<Instant>,
@@ -378,6 +434,7 @@ impl Checking {
             spec,
             learned,
             sensors,
+            verdict,
             ..
         } = self;
         let Some(known) = learned else { return };
@@ -408,8 +465,34 @@ impl Checking {
                 sensor.since = None;
             } else if now - *sensor.since.get_or_insert(now) >= spec.after {
                 (sensor.out, sensor.since) = (Some(now), None);
+                verdict.begin(nth, now, spec.longest);
             }
         }
+    }
+}
+
+impl Checking {
+    /// Sets what is known by now against predictions with the sensor that is out, and without it.
+    fn know_better(&mut self, tick: &Tick<'_>) {
+        let out = self.sensors.iter().enumerate();
+        let mut out = out.filter_map(|(nth, sensor)| Some((nth, sensor.out?)));
+        let Some((channel, began)) = out.next() else {
+            return;
+        };
+        let known = self.learned.as_ref();
+        let known = known.and_then(|known| Some((&known.places, known.answers.as_ref()?)));
+        let (Some((places, answers)), Some(hindsight)) = (known, self.hindsight) else {
+            return;
+        };
+        let (before, later) = (tick.port(hindsight.port), hindsight.port + 1);
+        let column = |nth: usize| before[places[nth]];
+        let seen = Seen {
+            truth: tick.port(later)[0],
+            known: tick.stamps(later)[0],
+            hindsight,
+            column: &column,
+        };
+        self.verdict.look(answers, channel, began, &seen);
     }
 }
 
@@ -423,9 +506,11 @@ impl Operator for Checking {
             sensor.read(values[nth], stamps[nth], self.spec.lag);
         }
         self.judge(values, tick.now);
+        self.know_better(tick);
+        let believes = self.verdict.believes();
         let count = self.sensors.len();
         for (nth, sensor) in self.sensors.iter_mut().enumerate() {
-            let passes = !values[nth].is_nan() && sensor.out.is_none();
+            let passes = !values[nth].is_nan() && (sensor.out.is_none() || believes);
             if passes && sensor.is_new {
                 outputs.set_stamped(nth, values[nth], stamps[nth]);
             } else if !passes && sensor.passes {
@@ -435,6 +520,7 @@ impl Operator for Checking {
             let reason = match (&self.learned, sensor.out, sensor.agrees_since) {
                 (None, ..) => reason::UNKNOWN,
                 (_, None, _) => reason::AGREES,
+                (_, Some(_), _) if believes => reason::BELIEVED,
                 (_, Some(_), None) => reason::CONTRADICTS,
                 (_, Some(_), Some(_)) => reason::RECOVERING,
             };
@@ -444,11 +530,13 @@ impl Operator for Checking {
 
     fn segment(&mut self) {
         self.sensors.fill(Sensor::default());
+        self.verdict = Verdict::default();
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
         Some(Box::new(Checked {
             sensors: self.sensors.clone(),
+            verdict: self.verdict.clone(),
         }))
     }
 
@@ -457,7 +545,7 @@ impl Operator for Checking {
             if state.sensors.len() != self.sensors.len() {
                 return Err("the number of channels differs");
             }
-            self.sensors = state.sensors;
+            (self.sensors, self.verdict) = (state.sensors, state.verdict);
             Ok(())
         })
     }
@@ -467,11 +555,15 @@ impl Operator for Checking {
 #[derive(Debug, Serialize, Deserialize)]
 struct Checked {
     sensors: Vec<Sensor>,
+    #[serde(default)]
+    verdict: Verdict,
 }
 
-athermal_core::state!(Checked, "cross_check/2");
+athermal_core::state!(Checked, "cross_check/1");
 
 athermal_core::register!(CrossCheck, Feature, "cross_check");
+
+mod verdict;
 
 #[cfg(test)]
 mod tests;

@@ -371,7 +371,8 @@ impl Writer<'_> {
                 text,
                 "\n{}\n\
                  type = \"cross_check\"\ninputs.signal = {}\ninputs.truth = \"drift.{}\"\n\
-                 ahead = \"{}\"\nlag = \"{lag}\"\nafter = \"{}\"\nrecover = \"{lag}\"",
+                 ahead = \"{}\"\nlag = \"{lag}\"\nafter = \"{}\"\nrecover = \"{lag}\"\n\
+                 hindsight = true",
                 beside(
                     &format!("[nodes.{}]", of_signal(group, "trusted")),
                     "a sensor that contradicts the others is absent, like a dead one"

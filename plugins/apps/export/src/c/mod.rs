@@ -185,7 +185,7 @@ pub fn operations(form: &Form) -> usize {
         // Of every column that is not there the form is made anew.
         "cross_check" => {
             let columns = node.place_of("columns");
-            columns * columns * (2 * columns + 4)
+            columns * columns * (2 * columns + 4) + 8 * node.place_of("predicting")
         }
         _ => 40,
     };

@@ -50,6 +50,7 @@ pub(super) fn used(form: &Form) -> Vec<&'static str> {
         ),
         ("AT_LEARNS", any(&|of| of.struct_of("learner").is_some())),
         ("AT_STD_DEVS", any(&|of| of.int_of("std_dev_slot") >= 0)),
+        ("AT_HINDSIGHT", any(&|of| of.int_of("before") >= 0)),
     ];
     let parts = parts.into_iter().filter(|(_, is)| *is);
     kinds

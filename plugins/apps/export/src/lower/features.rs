@@ -56,6 +56,32 @@ struct Learned {
     uses: Vec<String>,
     #[serde(default)]
     agreement: Option<Agreement>,
+    #[serde(default)]
+    answers: Vec<Answer>,
+}
+
+/// What the truth was predicted from: all columns, or those of all sensors but one.
+#[derive(Deserialize)]
+struct Answer {
+    #[serde(default)]
+    without: Option<i64>,
+    constant: f64,
+    coefficients: Vec<f64>,
+}
+
+/// The numbers of predictions from all columns, and without each channel by its columns; nothing where not all are there.
+fn answers(all: &[Answer], own: &[i64], columns: usize) -> Option<Vec<f64>> {
+    let firsts = own.iter().step_by(2).copied();
+    let each = std::iter::once(None).chain(firsts.map(Some));
+    let rows = each.map(|without| match without {
+        Some(-1) => Some(vec![0.0; columns + 1]),
+        _ => {
+            let answer = all.iter().find(|of| of.without == without)?;
+            let numbers = [answer.constant].into_iter();
+            Some(numbers.chain(answer.coefficients.iter().copied()).collect())
+        }
+    });
+    Some(rows.collect::<Option<Vec<_>>>()?.concat())
 }
 
 /// Nothing was learned where it has no columns.
@@ -171,10 +197,13 @@ impl Lowering<'_> {
         of: &Planned<'_>,
         spec: &CrossCheck,
         fit: Option<&PlannedFit>,
-        Learned { uses, agreement }: Learned,
+        learned: Learned,
     ) -> Result<Record, Refused> {
         let (channels, signal) = of.port("signal");
         let count = channels.len();
+        let Learned {
+            uses, agreement, ..
+        } = learned;
         let regressors = fit.map_or(&[][..], |fit| &fit.regressors);
         let mut places = Vec::with_capacity(uses.len());
         for name in &uses {
@@ -185,15 +214,26 @@ impl Lowering<'_> {
         }
         let agreement = agreement.unwrap_or_default();
         let columns = agreement.means.len();
-        places.truncate(columns);
+        let compared = &places[..columns.min(places.len())];
         let mut own = Vec::with_capacity(2 * count);
         for channel in 0..count {
             let of_channel = |&(_, &place): &(usize, &i64)| place as usize % count == channel;
-            let mut columns = places.iter().enumerate().filter(of_channel);
+            let mut columns = compared.iter().enumerate().filter(of_channel);
             let mut next = || columns.next().map_or(-1, |(column, _)| column as i64);
             own.extend([next(), next()]);
         }
         self.scratch(2 * count + columns * columns + 2 * columns);
+        let hindsight = of
+            .inputs
+            .hindsight
+            .zip(answers(&learned.answers, &own, places.len()));
+        let (judges, answers) = hindsight.unzip();
+        let predicting = judges.map_or(0, |_| places.len());
+        let place = |nth: usize| {
+            let gather = judges.and_then(|judges| of.gathers.get(judges.port + nth));
+            Field::Int(gather.map_or(-1, |gather| *gather as i64))
+        };
+        let time = |of: Option<Duration>| Field::Int(of.map_or(0, Duration::as_ns));
         Ok(of
             .record("cross_check")
             .int("signal", signal)
@@ -211,8 +251,14 @@ impl Lowering<'_> {
             .with("after", Field::Int(spec.after.as_ns()))
             .with("recover", Field::Int(spec.recover.as_ns()))
             .with("longest", Field::Int(spec.longest.as_ns()))
-            .int("ints", self.ints(10 * count))
-            .int("reals", self.reals(3 * count)))
+            .with("before", place(0))
+            .with("later", place(1))
+            .int("predicting", predicting)
+            .with("delay", time(judges.map(|of| of.delay)))
+            .with("span", time(judges.map(|of| of.span)))
+            .reals("answers", answers.unwrap_or_default())
+            .int("ints", self.ints(10 * count + 4))
+            .int("reals", self.reals(3 * count + 2)))
     }
 
     fn health(&mut self, of: &Planned<'_>, spec: &Health) -> Result<Record, Refused> {

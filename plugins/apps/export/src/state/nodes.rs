@@ -132,6 +132,16 @@ struct Watched {
 struct CrossCheck {
     state: String,
     sensors: Vec<Sensor>,
+    verdict: Verdict,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Verdict {
+    of: Option<usize>,
+    last: Option<i64>,
+    windows: u32,
+    with: f64,
+    without: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -365,6 +375,11 @@ pub(super) fn put(
                 let read = [sensor.value, sensor.change, sensor.sudden];
                 image.reals[reals + 3 * nth..][..3].copy_from_slice(&read);
             }
+            let (own, count) = (&state.verdict, state.sensors.len());
+            image.put_time(ints + 10 * count, own.last);
+            image.ints[ints + 10 * count + 2] = own.windows.into();
+            image.ints[ints + 10 * count + 3] = own.of.map_or(-1, |of| of as i64);
+            image.reals[reals + 3 * count..][..2].copy_from_slice(&[own.with, own.without]);
         }
         "health" => {
             let state: Health = read(node, own)?;
@@ -504,6 +519,14 @@ pub(super) fn take(
                 sensor.change = image.reals[number + 1];
                 sensor.sudden = image.reals[number + 2];
             }
+            let count = state.sensors.len();
+            state.verdict = Verdict {
+                of: usize::try_from(image.ints[ints + 10 * count + 3]).ok(),
+                last: image.time(ints + 10 * count),
+                windows: u32::try_from(image.ints[ints + 10 * count + 2]).unwrap_or(u32::MAX),
+                with: image.reals[reals + 3 * count],
+                without: image.reals[reals + 3 * count + 1],
+            };
             written(node, &state)?
         }
         "health" => {

@@ -41,14 +41,16 @@ impl Bench {
             blocks.push(&row, 0.0);
         }
         let agreement = Agreement::of(&blocks.total(), blocks.rows().unwrap()).unwrap();
-        let learned = Known::new(agreement, &[0, 1, 2, 3, 4, 5, 6, 7], 4);
+        let learned = Known::new(agreement, &[], &[0, 1, 2, 3, 4, 5, 6, 7], 4);
         let past = (6000 - lag as i64..6000).map(reads).collect();
         Self {
             node: Checking {
                 spec,
                 is_fitted: true,
                 learned: Some(learned),
+                hindsight: None,
                 sensors: vec![Sensor::default(); 4],
+                verdict: Verdict::default(),
             },
             nth: 6000,
             past,
@@ -155,4 +157,105 @@ fn over_a_hole_in_its_samples_nothing_is_sudden() {
     assert!(sensor.is_new);
     sensor.read(29.0, at(701), lag);
     assert!(!sensor.is_new);
+}
+
+/// Predictions of a truth by the first of two columns, and without its sensor, by nothing.
+fn answers() -> Answers {
+    let answer = |without, coefficient| Answer {
+        without,
+        constant: 0.0,
+        coefficients: vec![coefficient, 0.0],
+    };
+    let all = [answer(None, 2.0), answer(Some(0), 0.0)];
+    Answers::of(&all, &[Some(0), None]).unwrap()
+}
+
+/// What a truth that came to be known then says, of a window of 5 min that it ends, where the sensor read something.
+fn look(verdict: &mut Verdict, minute: i64, reads: f64, truth: f64) {
+    let at = |minute: i64| Instant::from_ns(minute * 60_000_000_000);
+    let seen = Seen {
+        truth,
+        known: at(minute),
+        hindsight: Hindsight {
+            port: 1,
+            delay: Duration::from_ns(300_000_000_000),
+            span: Duration::from_ns(300_000_000_000),
+        },
+        column: &|_| reads,
+    };
+    verdict.look(&answers(), 0, at(100), &seen);
+}
+
+#[test]
+fn a_sensor_is_believed_after_three_windows_with_which_predictions_were_better_and_while_they_are()
+{
+    let (mut verdict, start) = (Verdict::default(), Instant::from_ns(0));
+    verdict.begin(0, start, day());
+    // Truths of runs before it contradicted the others, of windows that overlap, and none, say nothing.
+    for (minute, truth) in [
+        (104, 2.0),
+        (105, 2.0),
+        (107, 2.0),
+        (109, 2.0),
+        (112, f64::NAN),
+    ] {
+        look(&mut verdict, minute, 1.0, truth);
+    }
+    look(&mut verdict, 113, 1.0, 2.1);
+    assert!(!verdict.believes());
+    look(&mut verdict, 118, f64::NAN, 2.0);
+    assert!(!verdict.believes());
+    look(&mut verdict, 118, 1.0, 2.2);
+    assert!(verdict.believes());
+    // It contradicts them again, and what is known counts; not of another, nor for ever.
+    verdict.begin(0, start, day());
+    assert!(verdict.believes());
+    let mut other = verdict.clone();
+    other.begin(1, start, day());
+    assert!(!other.believes());
+    let mut late = verdict.clone();
+    late.begin(0, Instant::from_ns(118 * 60_000_000_000) + day(), day());
+    assert!(!late.believes());
+    // Then it comes loose.
+    for minute in [123, 128, 133] {
+        look(&mut verdict, minute, -1.0, 2.0);
+    }
+    assert!(!verdict.believes());
+}
+
+#[test]
+fn a_sensor_no_better_than_none_is_not_believed() {
+    let mut verdict = Verdict::default();
+    for nth in 0..10 {
+        // Errors of 1 with it, and of 1.2 without: half of the squares are not enough.
+        look(&mut verdict, 105 + 5 * nth, 1.1, 1.2);
+    }
+    assert!(!verdict.believes());
+}
+
+#[test]
+fn a_state_of_before_leaps_and_truths_is_read() {
+    let old =
+        r#"{"sensors":[{"last":5,"since":null,"is_out":true,"passes":false,"agrees_since":7}]}"#;
+    let read: Checked = serde_json::from_str(old).unwrap();
+    assert_eq!(read.verdict, Verdict::default());
+    let sensor = &read.sensors[0];
+    assert_eq!((sensor.last, sensor.out), (Some(Instant::from_ns(5)), None));
+}
+
+#[test]
+fn a_fit_with_answers_that_do_not_fit_is_refused_and_one_without_an_answer_judges_nothing() {
+    let fit = |answers: &str| -> Learned {
+        let text = format!(
+            r#"{{"uses":["a","b"],"agreement":{{"means":[0.0,0.0],"scales":[1.0,1.0],"matrix":[1.0,0.0,1.0],"usual":1.0}},"answers":{answers}}}"#
+        );
+        serde_json::from_str(&text).unwrap()
+    };
+    let short = fit(r#"[{"constant":0.0,"coefficients":[1.0]}]"#);
+    assert_eq!(short.mistakes()[0].at, "answers.0.coefficients");
+    let beyond = fit(r#"[{"without":2,"constant":0.0,"coefficients":[1.0,1.0]}]"#);
+    assert_eq!(beyond.mistakes()[0].at, "answers.0.without");
+    let lacking = fit(r#"[{"constant":0.0,"coefficients":[1.0,1.0]}]"#);
+    assert!(lacking.mistakes().is_empty());
+    assert!(Answers::of(&lacking.answers, &[Some(0), Some(1)]).is_none());
 }
