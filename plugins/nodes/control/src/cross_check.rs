@@ -19,8 +19,8 @@ use crate::limit;
 ///
 /// A sensor that comes loose, or is moved or swapped while it reads, gives what is possible, and what the others do not. Its channel is
 /// then absent, as that of a sensor that is dead, and estimators on other sensors go on. The port `reason` says why: 0 it agrees,
-/// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass, 4 it contradicts them and is
-/// right by the truths.
+/// 1 it contradicts the others, 2 it has not agreed for `recover` yet, 3 nothing was learned, so that all pass. 4 says that it contradicts
+/// them and is right by the truths.
 ///
 /// `d = zᵀMz` with `M = 10⁻⁶ (ZᵀZ / n + 10⁻⁶ I)⁻¹`, over its 99.9 % quantile in the fit, is compared with `limit`. `z`
 /// are the standardised channels, now and `lag` ago, and `Z` those of the `n` rows of the fit, at the instants of the
@@ -38,8 +38,8 @@ use crate::limit;
 /// One sensor is left out at a time, and only while half of all channels stay, since others have to go on. It is given back when it
 /// agrees again, and after `longest` in any case.
 ///
-/// With `hindsight` the fit also predicts the truth, by a ridge from all sensors, now, `lag` ago and at the beginning of the window that the
-/// truth is of, and by one without each sensor. From the run on at which a sensor has been left out, one truth of each window is set
+/// With `hindsight` the fit also predicts the truth, by a ridge from all sensors and by one without each. It takes them as they are, as
+/// they were `lag` ago, and as they were at the beginning of the window that the truth is of. From the run on at which a sensor has been left out, one truth of each window is set
 /// against both, once it is known. After three of them the sensor is given back where `2 Σ (y - ŷ)² < Σ (y - ŷ₋)²`, `ŷ₋` without it, and for as long as that stays so.
 ///
 /// A sensor can be named only as far as others know of it: of two that see nothing in common, neither contradicts the
@@ -165,7 +165,12 @@ impl Feature for CrossCheck {
         let count = inputs.port("signal").len();
         let fit = inputs.fit::<Learned>();
         let learned = fit.and_then(|(fit, places)| {
-            let agreement = fit.agreement.clone()?;
+            // One that compares what is only predicted from was made by nobody.
+            let is_own = |of: &Agreement| {
+                let mut compared = places.iter().take(of.means.len());
+                compared.all(|&place| place < 2 * count)
+            };
+            let agreement = fit.agreement.clone().filter(is_own)?;
             Some(Known::new(agreement, &fit.answers, places, count))
         });
         Box::new(Checking {

@@ -1,11 +1,11 @@
 //! Features: what runs on a controller of each kind, with its limits in the units of its channels.
 
 use athermal_control::{
-    Compensate, CrossCheck, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected,
-    UntilFirst, WhenLost, optical_loss,
+    Compensate, Health, OpticalLoss, SafeState, Settled, Stability, Uncorrected, UntilFirst,
+    WhenLost, optical_loss,
 };
 use athermal_core::channel::Channel;
-use athermal_core::compile::{PlannedFit, PlannedNode, PlannedRole};
+use athermal_core::compile::{PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
 use athermal_core::node::Inputs;
 use athermal_core::quantity::Quantity;
@@ -14,10 +14,9 @@ use athermal_core::unit::Unit;
 use athermal_features::slope::Cold;
 use athermal_features::slope::kernel::{FEWEST_ROWS, MOST_ROWS};
 use athermal_features::{FirstOrder, FirstOrderOutput, Lag, Slope};
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::{Lowering, Refused, SPARE, first, refuse, samples, unfitted, unknown, ways};
+use super::{Lowering, Refused, SPARE, cross_check, first, refuse, samples, ways};
 use crate::form::{Field, Record};
 
 /// Sums over a run of rows of each channel.
@@ -26,85 +25,28 @@ pub(super) const SUMS: usize = 5;
 pub(super) const EACH: usize = 8;
 
 /// A feature as it is planned.
-struct Planned<'a> {
+pub(super) struct Planned<'a> {
     node: &'a PlannedNode,
-    inputs: &'a Inputs,
-    gathers: &'a [usize],
+    pub(super) inputs: &'a Inputs,
+    pub(super) gathers: &'a [usize],
     wanted: &'a [bool],
 }
 
 impl Planned<'_> {
-    fn record(&self, kind: &'static str) -> Record {
+    pub(super) fn record(&self, kind: &'static str) -> Record {
         Record::new(kind, self.node.instance())
     }
 
-    fn slot(&self) -> usize {
+    pub(super) fn slot(&self) -> usize {
         first(&self.node.slots)
     }
 
     /// The channels of a port and where they are gathered.
-    fn port(&self, name: &str) -> (&[Channel], usize) {
+    pub(super) fn port(&self, name: &str) -> (&[Channel], usize) {
         let mut ports = self.inputs.ports.iter().zip(self.gathers);
         let port = ports.find(|((port, _), _)| port.name == name);
         port.map_or((&[], 0), |((_, channels), &gather)| (channels, gather))
     }
-}
-
-/// How sensors go together, as models hold it.
-#[derive(Deserialize)]
-struct Learned {
-    uses: Vec<String>,
-    #[serde(default)]
-    agreement: Option<Agreement>,
-    #[serde(default)]
-    answers: Vec<Answer>,
-}
-
-/// What the truth was predicted from: all columns, or those of all sensors but one.
-#[derive(Deserialize)]
-struct Answer {
-    #[serde(default)]
-    without: Option<i64>,
-    constant: f64,
-    coefficients: Vec<f64>,
-}
-
-/// The numbers of predictions from all columns, and without each channel by its columns; nothing where not all are there.
-fn answers(all: &[Answer], own: &[i64], columns: usize) -> Option<Vec<f64>> {
-    let firsts = own.iter().step_by(2).copied();
-    let each = std::iter::once(None).chain(firsts.map(Some));
-    let rows = each.map(|without| match without {
-        Some(-1) => Some(vec![0.0; columns + 1]),
-        _ => {
-            let answer = all.iter().find(|of| of.without == without)?;
-            let numbers = [answer.constant].into_iter();
-            Some(numbers.chain(answer.coefficients.iter().copied()).collect())
-        }
-    });
-    Some(rows.collect::<Option<Vec<_>>>()?.concat())
-}
-
-/// Nothing was learned where it has no columns.
-#[derive(Default, Deserialize)]
-struct Agreement {
-    means: Vec<f64>,
-    scales: Vec<f64>,
-    matrix: Vec<f64>,
-    usual: f64,
-}
-
-/// The fit of a node that compares sensors.
-fn learned(engine: &Engine, node: &PlannedNode) -> Result<Learned, Refused> {
-    let Some(predictor) = engine.fitted().get(&node.instance()) else {
-        return unfitted();
-    };
-    let written = serde_json::to_value(&**predictor).and_then(serde_json::from_value);
-    written.or_else(|error| {
-        refuse(
-            format!("its fit cannot be read: {error}"),
-            "export it with the version that knows it",
-        )
-    })
 }
 
 /// The parameters of a node; the kind has been looked up, so that they are its own.
@@ -149,7 +91,7 @@ impl Lowering<'_> {
         };
         match (node.kind.package, node.kind.name) {
             ("athermal-control", "cross_check") => {
-                let learned = learned(engine, node)?;
+                let learned = cross_check::learned(engine, node)?;
                 self.cross_check(&planned, &parameters(node)?, fit.as_ref(), learned)
             }
             _ if fit.is_some() => refuse(
@@ -190,75 +132,6 @@ impl Lowering<'_> {
                 ),
             ),
         }
-    }
-
-    fn cross_check(
-        &mut self,
-        of: &Planned<'_>,
-        spec: &CrossCheck,
-        fit: Option<&PlannedFit>,
-        learned: Learned,
-    ) -> Result<Record, Refused> {
-        let (channels, signal) = of.port("signal");
-        let count = channels.len();
-        let Learned {
-            uses, agreement, ..
-        } = learned;
-        let regressors = fit.map_or(&[][..], |fit| &fit.regressors);
-        let mut places = Vec::with_capacity(uses.len());
-        for name in &uses {
-            match regressors.iter().position(|known| known.name == *name) {
-                Some(place) => places.push(place as i64),
-                None => return unknown(name),
-            }
-        }
-        let agreement = agreement.unwrap_or_default();
-        let columns = agreement.means.len();
-        let compared = &places[..columns.min(places.len())];
-        let mut own = Vec::with_capacity(2 * count);
-        for channel in 0..count {
-            let of_channel = |&(_, &place): &(usize, &i64)| place as usize % count == channel;
-            let mut columns = compared.iter().enumerate().filter(of_channel);
-            let mut next = || columns.next().map_or(-1, |(column, _)| column as i64);
-            own.extend([next(), next()]);
-        }
-        self.scratch(2 * count + columns * columns + 2 * columns);
-        let hindsight = of
-            .inputs
-            .hindsight
-            .zip(answers(&learned.answers, &own, places.len()));
-        let (judges, answers) = hindsight.unzip();
-        let predicting = judges.map_or(0, |_| places.len());
-        let place = |nth: usize| {
-            let gather = judges.and_then(|judges| of.gathers.get(judges.port + nth));
-            Field::Int(gather.map_or(-1, |gather| *gather as i64))
-        };
-        let time = |of: Option<Duration>| Field::Int(of.map_or(0, Duration::as_ns));
-        Ok(of
-            .record("cross_check")
-            .int("signal", signal)
-            .int("slot", of.slot())
-            .int("channels", count)
-            .int("columns", columns)
-            .with("places", Field::Ints(places))
-            .with("own", Field::Ints(own))
-            .reals("mean", agreement.means)
-            .reals("scale", agreement.scales)
-            .reals("matrix", agreement.matrix)
-            .real("usual", agreement.usual)
-            .real("limit", spec.limit)
-            .with("lag", Field::Int(spec.lag.as_ns()))
-            .with("after", Field::Int(spec.after.as_ns()))
-            .with("recover", Field::Int(spec.recover.as_ns()))
-            .with("longest", Field::Int(spec.longest.as_ns()))
-            .with("before", place(0))
-            .with("later", place(1))
-            .int("predicting", predicting)
-            .with("delay", time(judges.map(|of| of.delay)))
-            .with("span", time(judges.map(|of| of.span)))
-            .reals("answers", answers.unwrap_or_default())
-            .int("ints", self.ints(10 * count + 4))
-            .int("reals", self.reals(3 * count + 2)))
     }
 
     fn health(&mut self, of: &Planned<'_>, spec: &Health) -> Result<Record, Refused> {

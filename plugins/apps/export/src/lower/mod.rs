@@ -1,5 +1,6 @@
 //! Lowers a plan and its fit to what a controller can step: which kinds there are, and how much room their past takes.
 
+mod cross_check;
 mod estimators;
 mod features;
 mod votes;

@@ -167,13 +167,16 @@ lag = "{}s"
 limit = {}
 after = "{}s"
 recover = "{}s"
-longest = "200s"
+longest = "{}s"
+hindsight = {}
 "#,
             5 + random.between(0.0, 60.0) as u64,
             1 + random.between(0.0, 60.0) as u64,
             one_of(random, &["6.0", "60.0", "600.0"]),
             random.between(0.0, 20.0) as u64,
             20 + random.between(0.0, 100.0) as u64,
+            one_of(random, &["200", "5000"]),
+            random.between(0.0, 1.0) < 0.8,
         );
     }
     // What is measured rarely and counts long does not age what is made of it and of gradients.

@@ -153,7 +153,7 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
     let (seeds, ticks) = cases();
     let scratch = Scratch::new("random");
     let (mut values, mut outputs) = (0, 0);
-    let (mut reasons, mut became, mut faults) = ([0; 4], [0; 40], [0; 8]);
+    let (mut reasons, mut became, mut faults) = ([0; 5], [0; 40], [0; 8]);
     for seed in seeds {
         let mut random = Prng::stream(seed, "an exported graph");
         let text = graph(&mut random);
@@ -221,7 +221,11 @@ fn random_graphs_give_the_bits_of_the_engine_with_every_compiler_and_level_of_op
     println!(
         "sensors by what is known of them: {reasons:?}, and by what is wrong with them: {faults:?}"
     );
-    assert!(reasons[..3].iter().all(|&count| count > 200), "{reasons:?}");
+    let enough = reasons.iter().zip([200, 200, 200, 0, 50]);
+    assert!(
+        { enough }.all(|(&count, least)| count >= least),
+        "{reasons:?}"
+    );
     assert!(faults.iter().all(|&count| count > 10), "{faults:?}");
     println!("truths by what became of them: {became:?}");
     // By ones what became of truths, by tens who spoke.

@@ -47,7 +47,8 @@ pub fn made_up(plan: &Plan, random: &mut Prng) -> Fitted {
         let Some(rows) = node.rows() else { continue };
         let names = rows.fit.regressors.iter().map(|of| of.name.clone());
         if node.kind.name == "cross_check" {
-            let predictor = going_together(names.collect(), random);
+            let present = rows.fit.regressors.iter().filter(|of| of.lag.is_zero());
+            let predictor = going_together(names.collect(), present.count(), random);
             fitted.insert(node.instance(), Arc::from(predictor));
             continue;
         }
@@ -157,12 +158,15 @@ fn going_on(uses: Vec<String>, random: &mut Prng) -> Box<dyn Predictor> {
     predictor
 }
 
-/// How sensors go together, made up; in some fits nothing was learned, or a channel never had a value.
-fn going_together(mut uses: Vec<String>, random: &mut Prng) -> Box<dyn Predictor> {
+/// How so many sensors go together, now and a lag ago, made up; in some fits nothing was learned, or a channel had no value at first. What
+/// is behind them is only predicted from.
+fn going_together(mut uses: Vec<String>, count: usize, random: &mut Prng) -> Box<dyn Predictor> {
+    let mut order = 2 * count;
+    let predicts = uses.len() > order;
     if random.between(0.0, 1.0) < 0.3 {
         uses.remove(0);
+        order -= 1;
     }
-    let order = uses.len();
     let mut parts =
         |scale: f64| -> Vec<f64> { (0..order).map(|_| scale * random.normal()).collect() };
     let directions = [parts(0.5), parts(0.5), parts(0.1)];
@@ -174,6 +178,18 @@ fn going_together(mut uses: Vec<String>, random: &mut Prng) -> Box<dyn Predictor
         along + if i == j { 0.01 } else { 0.0 }
     };
     let mut written = json!({ "type": "cross_check", "uses": uses });
+    if predicts {
+        let answer = |without: Option<usize>, random: &mut Prng| {
+            let mut coefficients: Vec<f64> = uses.iter().map(|_| 30.0 * random.normal()).collect();
+            if let Some(column) = without {
+                coefficients[column] = 0.0;
+            }
+            let constant = random.normal();
+            json!({ "without": without, "constant": constant, "coefficients": coefficients })
+        };
+        let each = std::iter::once(None).chain((0..count).map(Some));
+        written["answers"] = each.map(|without| answer(without, random)).collect();
+    }
     if random.between(0.0, 1.0) < 0.9 {
         written["agreement"] = json!({
             "means": means,

@@ -85,7 +85,7 @@ fn births_say_what_aliases_mean_and_deaths_that_nothing_is_known() {
     );
     assert_eq!(
         bench.take("NDATA/edge", Some(1), vec![double(None, Some(7), 21.0)]),
-        [sample(0, 21.0)]
+        [later(0, 21.0)]
     );
     let device = vec![double(Some("A/B"), Some(8), 1.0)];
     assert_eq!(
@@ -94,7 +94,7 @@ fn births_say_what_aliases_mean_and_deaths_that_nothing_is_known() {
     );
     assert_eq!(
         bench.take("DDATA/edge/d", Some(3), vec![double(None, Some(8), 2.0)]),
-        [sample(1, 2.0)]
+        [later(1, 2.0)]
     );
     let absent = |of: &[Out]| -> Vec<usize> {
         let nan = |of: &Out| match of {
@@ -130,7 +130,7 @@ fn a_number_that_is_missing_and_an_alias_that_is_unknown_ask_for_a_rebirth_and_n
     let gap = "gap: 2 messages of edge node `edge` are missing by their numbers; it is asked for a rebirth";
     assert_eq!(
         out,
-        [Out::Remark(gap.to_owned()), rebirth(), sample(0, 22.0)]
+        [Out::Remark(gap.to_owned()), rebirth(), later(0, 22.0)]
     );
     let unknown = || vec![double(None, Some(99), 1.0)];
     let left_out = Out::Dropped(None, LeftOut::NoSuchName);
