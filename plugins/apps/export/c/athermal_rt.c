@@ -4151,7 +4151,7 @@ static int at_believes(const at_cross_check *c, at_memory m)
 {
     const int64_t windows = m.i[c->ints + (AT_OF_SENSOR * c->channels) + AT_JUDGED_WINDOWS];
     const at_real *squares = &m.r[c->reals + (AT_OF_READING * c->channels)];
-    return ((windows >= 3) && ((AT_R(2.0) * squares[AT_WITH]) < squares[AT_WITHOUT])) ? 1 : 0;
+    return ((windows >= 3) && (squares[AT_WITH] < squares[AT_WITHOUT])) ? 1 : 0;
 }
 
 /* Finds which sensor contradicts the others. */

@@ -39,8 +39,10 @@ use crate::limit;
 /// agrees again, and after `longest` in any case.
 ///
 /// With `hindsight` the fit also predicts the truth, by a ridge from all sensors and by one without each. It takes them as they are, as
-/// they were `lag` ago, and as they were at the beginning of the window that the truth is of. From the run on at which a sensor has been left out, one truth of each window is set
-/// against both, once it is known. After three of them the sensor is given back where `2 Σ (y - ŷ)² < Σ (y - ŷ₋)²`, `ŷ₋` without it, and for as long as that stays so.
+/// they were `lag` ago, and as they were at the beginning of the window that the truth is of. From the run on at which a sensor has been
+/// left out, one truth of each window is set against both, once it is known. After three of them the sensor is given back where
+/// `Σ (y - ŷ)² < Σ (y - ŷ₋)²`, `ŷ₋` without it, and for as long as that stays so. Each window counts a tenth less than the next. What was
+/// found counts when the same sensor contradicts the others again, up to `longest` later.
 ///
 /// A sensor can be named only as far as others know of it: of two that see nothing in common, neither contradicts the
 /// other. The rows of the fit must reach over 30 times `lag`, 5 hours, or nothing is learned.

@@ -9,8 +9,6 @@ use serde::{Deserialize, Serialize};
 const PENALTY: f64 = 1.0;
 /// So many windows of truth say something.
 const WINDOWS: u32 = 3;
-/// A sensor is believed where so many times the squares of what predictions with it err by are less than those without.
-const BETTER: f64 = 2.0;
 /// How much of what was summed stays with the next window.
 const STAYS: f64 = 0.9;
 
@@ -169,6 +167,6 @@ impl Verdict {
 
     /// Whether the sensor is right by them.
     pub(super) fn believes(&self) -> bool {
-        self.windows >= WINDOWS && BETTER * self.with < self.without
+        self.windows >= WINDOWS && self.with < self.without
     }
 }
