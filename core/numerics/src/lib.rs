@@ -40,6 +40,7 @@ mod gram;
 mod huber;
 mod kalman;
 mod least_squares;
+mod left_out;
 mod likeness;
 mod non_negative;
 mod normal_equations;
@@ -81,6 +82,7 @@ pub use kalman::{
 pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
 };
+pub use left_out::{LeftOut, ridges_left_out};
 pub use non_negative::non_negative_least_squares;
 pub use novelty::Novelty;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};

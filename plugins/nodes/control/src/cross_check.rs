@@ -254,10 +254,11 @@ impl Trainer for Learning {
             agreement = own.and_then(|own| Agreement::of(&own, rows));
             if self.predicts && agreement.is_some() {
                 match Answer::all(&total, &self.regressors) {
-                    Ok(found) => answers = found,
-                    Err(error) => report.notes.push(format!(
-                        "the truth is not predicted, and no truth will decide: {error}"
-                    )),
+                    Some(found) => answers = found,
+                    None => report.notes.push(
+                        "no ridge predicts the truth from the sensors, so no truth will decide"
+                            .to_owned(),
+                    ),
                 }
             }
         } else {

@@ -1,8 +1,10 @@
 //! What truths say of a sensor that contradicts the others: whether predictions with it have been better than those without.
 
+use std::collections::BTreeMap;
+
 use athermal_core::node::{Hindsight, Mistake, Regressor};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Gram, LeastSquares, NumericsError, Standardization};
+use athermal_numerics::{Gram, ridges_left_out};
 use serde::{Deserialize, Serialize};
 
 /// The penalty on the squares of the coefficients of standardised columns.
@@ -24,34 +26,24 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// What is predicted from all columns, and without each sensor, by ridges over the rows of a fit.
-    pub(super) fn all(gram: &Gram, regressors: &[Regressor]) -> Result<Vec<Self>, NumericsError> {
-        let Standardization { scales, .. } = Standardization::of(gram);
-        let lagged = |first: &Regressor, other: &Regressor| {
-            other.name == format!("{} lag {}", first.name, other.lag)
-        };
-        let is_of =
-            |of: usize, column: usize| column == of || lagged(&regressors[of], &regressors[column]);
-        let width = regressors.len();
-        let is_second =
-            |column: usize| (0..width).any(|of| lagged(&regressors[of], &regressors[column]));
-        let firsts = (0..width).filter(|&column| !is_second(column));
-        let each = std::iter::once(None).chain(firsts.map(Some));
-        each.map(|without| {
-            let kept = |column: &usize| without.is_none_or(|of| !is_of(of, *column));
-            let columns: Vec<usize> = (0..width).filter(kept).collect();
-            let fit = LeastSquares::ridge(PENALTY).solve(gram, &columns, &scales, None)?;
-            let mut coefficients = vec![0.0; width];
-            for (column, value) in columns.into_iter().zip(fit.coefficients) {
-                coefficients[column] = value;
-            }
-            Ok(Self {
-                without,
-                constant: fit.intercept,
-                coefficients,
-            })
-        })
-        .collect()
+    /// What is predicted from all columns, and without each sensor, by ridges over the rows of a fit; none where they cannot be solved.
+    pub(super) fn all(gram: &Gram, regressors: &[Regressor]) -> Option<Vec<Self>> {
+        let mut sensors = BTreeMap::<&str, Vec<usize>>::new();
+        for (column, of) in regressors.iter().enumerate() {
+            let past = format!(" lag {}", of.lag);
+            let name = of.name.strip_suffix(&past).unwrap_or(&of.name);
+            sensors.entry(name).or_default().push(column);
+        }
+        let groups: Vec<Vec<usize>> = sensors.into_values().collect();
+        let firsts = groups.iter().map(|of| Some(of[0]));
+        let without = std::iter::once(None).chain(firsts);
+        let found = ridges_left_out(gram, PENALTY, &groups)?;
+        let each = without.zip(found).map(|(without, of)| Self {
+            without,
+            constant: of.intercept,
+            coefficients: of.coefficients,
+        });
+        Some(each.collect())
     }
 
     pub(super) fn mistakes(all: &[Self], width: usize) -> Vec<Mistake> {
