@@ -224,7 +224,7 @@ pub enum PlannedRole {
     Estimator {
         /// What it is fitted on; its truth is what it predicts.
         fit: PlannedFit,
-        /// The gathers of a row, one after the other; not those that look back.
+        /// The gathers of a row, one after the other.
         gathers: Vec<usize>,
         /// Whether it runs at every tick, or only when something in its first gather is fresh.
         every_tick: bool,
@@ -335,7 +335,7 @@ pub struct PlannedFit {
 pub struct Rows<'a> {
     /// What they are made of, and which of them count.
     pub fit: &'a PlannedFit,
-    /// The gathers of a row, one after the other.
+    /// The gathers of a row, one after the other; not those that look back.
     pub gathers: &'a [usize],
     /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
     pub triggers: &'a [usize],
@@ -362,9 +362,7 @@ impl PlannedNode {
                 every_tick,
                 ..
             } => {
-                // What looks back does so at each port, the truth too.
-                let later = inputs.hindsight.map_or(0, |_| inputs.ports.len());
-                let own = gathers.len() - later;
+                let own = inputs.hindsight.map_or(gathers.len(), |of| of.port);
                 (&gathers[..own], own, *every_tick)
             }
             PlannedRole::Estimator {

@@ -14,18 +14,18 @@ impl Resolver<'_> {
             let Some(counts) = counts.min() else {
                 continue;
             };
-            let (PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. }) =
-                &self.nodes[node].role
-            else {
-                continue;
+            let (mut spared, hindsight) = match &self.nodes[node].role {
+                PlannedRole::Feature {
+                    gathers, inputs, ..
+                } => (gathers.clone(), inputs.hindsight),
+                PlannedRole::Estimator { gathers, .. } => (gathers.clone(), None),
+                PlannedRole::Combiner { .. } => continue,
             };
-            let rows = self.nodes[node].rows();
-            let own = rows.map_or(gathers.len(), |rows| rows.gathers.len());
             // What is known later stays as old as it is.
-            let (own, later) = gathers.split_at(own);
-            let (own, later) = (own.to_vec(), later.to_vec());
-            let spared = own.into_iter().map(|gather| self.sparing(gather, counts));
-            let spared: Vec<usize> = spared.chain(later).collect();
+            let own = hindsight.map_or(spared.len(), |of| of.port);
+            for gather in &mut spared[..own] {
+                *gather = self.sparing(*gather, counts);
+            }
             if let PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } =
                 &mut self.nodes[node].role
             {

@@ -3922,9 +3922,9 @@ static void at_run_pick(const at_plan *p, const at_pick *k, at_memory m)
 
 /* ---- Sensors that are compared with each other. Of integers, of each channel: the stamp of the last sample that was looked at, since
  * when it contradicts the others, since when it is out and since when it agrees again, each behind whether it is known; whether its last
- * value passed, and whether a sample is new; behind all, when the last truth was known that was looked at, of how many windows, and of which channel. Of
- * numbers: the last value, its change, and the squares of what was sudden; behind all, those of errors with a sensor and without. Within a step: the
- * values, what of the form is left without the columns that are not there, the standardised columns, and what pulls at each. */
+ * value passed, and whether a sample is new; behind all, when the last truth was known that was looked at, of how many windows, and of
+ * which channel. Of numbers: the last value, its change, and the squares of what was sudden; behind all, those of errors with a sensor and
+ * without. Within a step: the values, what of the form is left without the columns that are not there, the standardised columns, and what pulls at each. */
 
 #define AT_HAS_LOOKED 0
 #define AT_LOOKED 1

@@ -389,7 +389,7 @@ struct Checking {
     verdict: Verdict,
 }
 
-/// What is known of one sensor.
+/// What is known of one sensor. A state of before leaps were looked for has less of it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 struct Sensor {
@@ -477,9 +477,7 @@ impl Checking {
             }
         }
     }
-}
 
-impl Checking {
     /// Sets what is known by now against predictions with the sensor that is out, and without it.
     fn know_better(&mut self, tick: &Tick<'_>) {
         let out = self.sensors.iter().enumerate();
